@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
@@ -47,18 +46,21 @@ class Nodes:
 
 def join_nodes(parts: Sequence[Nodes]) -> Nodes:
     """Put nodes of one phase after the other together; where they meet, those of the later one count."""
-    return reduce(_join, parts)
-
-
-def _join(first: Nodes, later: Nodes) -> Nodes:
-    """Put nodes of two phases together."""
-    times = np.concatenate([first.times[:-1], first.times[-1] + later.times])
-    q, qdot, qddot = (
-        np.concatenate([getattr(first, name)[:-1], getattr(later, name)])
-        for name in ("q", "qdot", "qddot")
+    begins = np.cumsum([0.0, *(part.times[-1] for part in parts[:-1])])
+    times = [begin + part.times for begin, part in zip(begins, parts, strict=True)]
+    later = [part.qddot_before[1:] for part in parts]
+    return Nodes(
+        _join(times),
+        _join([part.q for part in parts]),
+        _join([part.qdot for part in parts]),
+        _join([part.qddot for part in parts]),
+        np.concatenate([parts[0].qddot_before[:1], *later]),
     )
-    before = np.concatenate([first.qddot_before, later.qddot_before[1:]])
-    return Nodes(times, q, qdot, qddot, before)
+
+
+def _join(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Put arrays together, each without its last row but the last one."""
+    return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
 
 
 def interpolate(

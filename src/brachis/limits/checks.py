@@ -154,10 +154,10 @@ def build_user_limits(
         if has_check(model):
             moments = sample_moments(robot)
             motion = (moments.q, moments.qdot, moments.qddot, moments.torque(robot))
-            few = [
-                own[: 1 + len(limit.labels) % 2] for own in motion
-            ]  # not as many as values
-            check_ratios(where, model, robot, few, len(limit.labels))
+            few = 1 + len(limit.labels) % 2  # moments, not as many as values
+            check_ratios(
+                where, model, robot, [own[:few] for own in motion], len(limit.labels)
+            )
         labels |= {str(label) for label in limit.labels}
         limits.append(limit)
     return limits
@@ -191,10 +191,10 @@ def _check_members(limit: Limit, where: str) -> None:
             where=where,
             found=[limit.lower, limit.upper],
         )
-    for name, (allowed, tell) in _MEMBERS.items():
+    for name, (allowed, accepts) in _MEMBERS.items():
         value = getattr(limit, name)
         try:
-            is_allowed = tell(value, limit)
+            is_allowed = accepts(value, limit)
         except (TypeError, ValueError):
             is_allowed = False
         if not is_allowed:

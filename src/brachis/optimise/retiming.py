@@ -290,6 +290,7 @@ def improve_joint_paths(
     )
 
     def time_paths(*, is_rough: bool) -> tuple[PhaseTiming, ...]:
+        """Time the given joint paths."""
         return tuple(
             PhaseTiming.through(*pair, effort.places, is_rough=is_rough)
             for pair in zip(program.phases, curves, strict=True)

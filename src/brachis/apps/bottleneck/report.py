@@ -194,14 +194,15 @@ def report(
         active = saturations(trajectory)
         phases = limits_by_phase(trajectory, active)
         return BottleneckReport(trajectory.t_end, None, active, phases)
-    is_loaded = isinstance(motion, Trajectory)
-    refined = None if isinstance(motion, Trajectory) else motion.candidate.refined
-    if refined is None and not is_loaded:
-        raise InputError(
-            "the result contains no solved optimisation problem",
-            where="result",
-            allowed="a result of brachis.plan",
-        )
+    refined = None
+    if not isinstance(motion, Trajectory):
+        refined = motion.candidate.refined
+        if refined is None:
+            raise InputError(
+                "the result contains no solved optimisation problem",
+                where="result",
+                allowed="a result of brachis.plan",
+            )
     if refined is not None and not (
         refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r
     ):
