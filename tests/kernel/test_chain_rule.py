@@ -8,16 +8,20 @@ import numpy as np
 import pytest
 
 from brachis.kernel import (
-    Conditions,
     CurvePattern,
+    Formula,
+    FormulaQuantity,
     MotionSlopes,
     PathMotion,
     Prescribed,
     ScaledQuantity,
     ValueGroups,
     VariableSlopes,
+    differentiate,
+    formula,
 )
 from kernel.test_chain import chain_of, random_model
+from kernel.test_path_motion import motion_in
 
 POINTS = 9
 N = 5
@@ -58,7 +62,7 @@ def test_the_chain_rule(with_jerk, width):
     by_s = rng.normal(size=(POINTS, 2))
     partials = [(given, None), ((None, constant, None, None), by_s)]
     groups = ValueGroups([None, None], [4, 2])
-    found, entries = groups.differentiate(motion, states, partials)
+    found, entries = differentiate(groups, motion, states, partials)
     assert not entries.size
     known = slopes_of(first, parts, with_jerk)
     np.testing.assert_allclose(found[:, :, :4], known, atol=1e-12)
@@ -78,7 +82,7 @@ def test_the_chain_rule(with_jerk, width):
     np.testing.assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
     by_one = np.einsum("oz,zoc->zc", basis, found[:, points, :, curves])
     np.testing.assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
-    again = groups.differentiate(motion, states, partials, variables)
+    again = differentiate(groups, motion, states, partials, variables)
     np.testing.assert_array_equal(again[0], found)
     np.testing.assert_array_equal(again[1], entries)
 
@@ -122,21 +126,68 @@ def test_scaled_quantities(chain, quantity):
     partials = partials[:, :, joints] * factors[:, None]
     has_jerk = quantity == "qdddot"
     motion = MotionSlopes(*parts[:4], parts[4] if has_jerk else None)
-    found, _ = groups.differentiate(motion, states[:3], [])
+    found, _ = differentiate(groups, motion, states[:3], [])
     known = slopes_of(partials, parts, has_jerk)
     np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
 
 
+def test_formulas_of_the_posture():
+    """Margins are such: numbers of a formula, times signs."""
+    rng = np.random.default_rng(7)
+    states = rng.normal(size=(3, POINTS, N))
+
+    def function(q):
+        return np.stack([q[:, 0] * q[:, 2], formula.sin(q[:, 4])], axis=1)
+
+    factors = np.array([2.0, -1.0])
+    margins = FormulaQuantity(
+        Formula.of(function, N), Formula.gradient(function, N), factors
+    )
+    groups = ValueGroups([None, margins], [1, 2])
+    values = groups.values(states)[1]
+    np.testing.assert_allclose(values, function(states[0]) * factors, atol=1e-14)
+    parts = rng.normal(size=(5, POINTS, N, 3))
+    by_q = margins.slopes_of(states[0]) * factors[:, None]
+    zero = np.zeros_like(by_q)
+    given = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
+    motion = MotionSlopes(*parts[:4])
+    found, _ = differentiate(groups, motion, states, given)
+    known = slopes_of((by_q, zero, zero, zero), parts, with_jerk=False)
+    np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
+    with pytest.raises(ValueError, match="have the shapes"):
+        ValueGroups([margins], [3])
+
+
+def test_values_come_with_a_motion_along_a_path(chain):
+    rng = np.random.default_rng(8)
+    joints = np.arange(N)
+    torque = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
+    groups = ValueGroups([torque, None], [N, 2])
+    one = np.ones((POINTS, 3))
+    given = {"y": one, "rows": np.eye(N, N + 1)[:2]}
+    for name in ("ydot", "yddot", "xi", "xi_ds", "xi_dds"):
+        given[name] = rng.normal(size=(POINTS, 3))
+    motion = PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, groups=groups)
+    motion.q[:] = rng.normal(size=(POINTS, N))
+    assert not motion.evaluate()
+    known = chain.torques(motion.q, motion.qdot, motion.qddot)
+    np.testing.assert_array_equal(motion.torque, known)
+    np.testing.assert_array_equal(motion.values[0], known)
+    other = chain_of(*random_model(3, 1))
+    with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
+        PathMotion.prepare(other, Prescribed((0,)), given, groups=groups)
+
+
 def test_a_motion_along_a_path_is_differentiated_when_it_is_needed(chain):
     rng = np.random.default_rng(6)
-    rows = np.eye(N)[:2]
+    rows = np.eye(N, N + 1)[:2]
     q = rng.normal(size=(POINTS, N))
     path = tuple(rng.normal(size=(3, POINTS, 3)))
     curves = tuple(rng.normal(size=(2, POINTS, 3)))
     asked = Prescribed((0, 1, 2))
 
     def make():
-        return PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
+        return motion_in(chain, asked, q, path, [rows], curves)
 
     joints = np.arange(N)
     scaled = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
@@ -145,12 +196,12 @@ def test_a_motion_along_a_path_is_differentiated_when_it_is_needed(chain):
     states = (q, motion.qdot, motion.qddot)
     assert not motion._structure.is_differentiated
     slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
-    found, _ = groups.differentiate(slopes, states, [])
+    found, _ = differentiate(groups, slopes, states, [])
     assert motion._structure.is_differentiated
     known = MotionSlopes(motion.gradient, *make().derivatives())
     for own, other in zip(motion.derivatives(), make().derivatives(), strict=True):
         np.testing.assert_array_equal(own, other)
-    np.testing.assert_array_equal(found, groups.differentiate(known, states, [])[0])
+    np.testing.assert_array_equal(found, differentiate(groups, known, states, [])[0])
 
 
 def test_groups_can_be_sent_to_another_process(chain):
@@ -189,7 +240,7 @@ def test_what_does_not_fit_is_refused(chain):
     groups = ValueGroups([None], [1])
     partials = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
     with pytest.raises(ValueError, match="other points"):
-        groups.differentiate(motion, states, partials, variables)
+        differentiate(groups, motion, states, partials, variables)
     one = np.ones(1)
     beyond = ScaledQuantity("q", np.array([N]), one, one, chain)
     with pytest.raises(ValueError, match="joint"):
@@ -203,7 +254,7 @@ def test_what_does_not_fit_is_refused(chain):
         groups.values(states[:, :, :3], states[0, :, :3])
     fewer = MotionSlopes(*np.zeros((4, POINTS, 3, 3)))
     with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
-        groups.differentiate(fewer, states[:, :, :3], [])
+        differentiate(groups, fewer, states[:, :, :3], [])
     other = chain_of(*random_model(3, 1))
     with pytest.raises(ValueError, match="different numbers"):
         ValueGroups([torque, ScaledQuantity("q", first, one, one, other)], [1, 1])
@@ -217,12 +268,15 @@ def test_partials_by_the_jerk_need_its_slopes(chain):
     states = np.zeros((3, POINTS, N))
     partials = np.zeros((POINTS, 1, N))
     with pytest.raises(ValueError, match="qdddot_y"):
-        ValueGroups([None], [1]).differentiate(
-            motion, states, [((None, None, None, partials), None)]
+        differentiate(
+            ValueGroups([None], [1]),
+            motion,
+            states,
+            [((None, None, None, partials), None)],
         )
     one = np.ones(1)
     jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
     with pytest.raises(ValueError, match="qdddot_y"):
-        ValueGroups([jerk], [1]).differentiate(motion, states, [])
+        differentiate(ValueGroups([jerk], [1]), motion, states, [])
     with pytest.raises(ValueError, match="qdddot"):
         ValueGroups([jerk], [1]).values(states)

@@ -75,12 +75,16 @@ def test_what_has_no_value_is_not_finite():
 
 
 def test_a_row_is_found_as_a_whole():
-    whole = Formula.of(lambda a: np.stack([sqrt(a[:, 0]), a[:, 1]], axis=1), 2)
+
+    def function(a):
+        return np.stack([sqrt(a[:, 0]), a[:, 1]], axis=1)
+
+    whole = Formula.of(function, 2, discards_incomplete=True)
     points = np.array([[4.0, 5.0], [-1.0, 5.0], [4.0, np.inf]])
-    found = whole(points, discard_incomplete=True)
+    found = whole(points)
     np.testing.assert_array_equal(found[0], [2.0, 5.0])
     assert np.isnan(found[1:]).all()
-    assert whole(points)[1, 1] == 5.0
+    assert Formula.of(function, 2)(points)[1, 1] == 5.0
 
 
 def test_points_of_another_size_are_refused(points):

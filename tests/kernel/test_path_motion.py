@@ -1,10 +1,11 @@
 """Motion along a path, its derivatives and the chain rule against NumPy's formulas, on random chains."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from brachis.kernel import (
-    Conditions,
     PathMotion,
     Prescribed,
     find_least_singular,
@@ -22,6 +23,18 @@ CASES = {
     "one row, r = 2": (3, Prescribed((2,))),
     "two rows and yaw, r = 1": (4, Prescribed((0, 2), 1, -1.0)),
 }
+
+
+def motion_in(chain, asked, q, path, tables, curves):
+    """Motion in known postures; `tables` are [C, p] and, or not, its derivatives."""
+    given = dict(zip(("xi", "xi_ds", "xi_dds"), path, strict=True))
+    given |= dict(zip(("ydot", "yddot"), curves, strict=True))
+    given["y"] = np.zeros_like(curves[0])
+    given |= dict(zip(("rows", "turning"), tables, strict=False))
+    motion = PathMotion.prepare(chain, asked, given)
+    motion.q[:] = q
+    motion.evaluate()
+    return motion
 
 
 def rates_of(asked, twists):
@@ -48,14 +61,16 @@ def case(request):
     m = asked.count
     r = n - m
     path = tuple(rng.normal(size=(3, POINTS, m)))
-    rows = rng.normal(size=(POINTS, r, n))
-    conditions = Conditions(rows)
-    if turns and r:
-        turning = rng.normal(size=(2, POINTS, r, n))
-        conditions = Conditions(rows, turning, rng.normal(size=(3, POINTS, r)))
-    curves = tuple(rng.normal(size=(2, POINTS, 1 + r)))
+    tables = [rng.normal(size=(POINTS, r, n + 1))]
     q = rng.normal(size=(POINTS, n))
-    motion = PathMotion.of(chain, asked, q, path, conditions, curves)
+    conditions = SimpleNamespace(rows=tables[0][..., :n], turning=None, drift=None)
+    if turns and r:
+        tables.append(rng.normal(size=(3, POINTS, r, n + 1)))
+        conditions.turning = tables[1][:2, ..., :n]
+        drift = np.einsum("okij,kj->oki", tables[1][..., :n], q)
+        conditions.drift = drift - tables[1][..., n]
+    curves = tuple(rng.normal(size=(2, POINTS, 1 + r)))
+    motion = motion_in(chain, asked, q, path, tables, curves)
     return chain, asked, q, path, conditions, curves, motion
 
 
@@ -156,13 +171,13 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
     n, asked = 7, Prescribed()
     rng = np.random.default_rng(4)
     chain = chain_of(*random_model(n, n))
-    row = rng.normal(size=(1, n))
+    row = rng.normal(size=(1, n + 1))
     q = rng.normal(size=(POINTS, n))
     path = tuple(rng.normal(size=(3, POINTS, 6)))
     curves = tuple(rng.normal(size=(2, POINTS, 2)))
-    many = np.broadcast_to(row, (POINTS, 1, n))
+    many = np.broadcast_to(row, (POINTS, 1, n + 1))
     motions = [
-        PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
+        motion_in(chain, asked, q, path, [rows], curves)
         for rows in (many.copy(), many, row)
     ]
     for name in ("gradient", "qdot", "qddot", "determinants"):
@@ -171,28 +186,46 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
             np.testing.assert_array_equal(own, first)
 
 
-def test_a_singular_matrix_has_determinant_zero():
+@pytest.mark.parametrize(
+    ("row", "side", "fault"),
+    [
+        ([0.0, 0.0, 0.0], 0.0, "singular"),
+        ([0.0, 0.0, 1.0], 0.0, ""),
+        ([0.0, 0.0, -1.0], 1.0, "singular"),
+        ([0.0, 0.0, -1.0], -1.0, ""),
+    ],
+)
+def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
     chain = chain_of(*random_model(3, 1))
-    rows = np.zeros((1, 1, 3))
     ones = np.ones((1, 2))
-    motion = PathMotion.of(
-        chain,
-        Prescribed((0, 1)),
-        np.zeros((1, 3)),
-        (ones, ones, ones),
-        Conditions(rows),
-        (ones, ones),
-    )
-    assert motion.determinants[0] == 0.0
+    given = dict.fromkeys(("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds"), ones)
+    given["rows"] = np.array([[*row, 0.0]])
+    asked = Prescribed((0, 1))
+    upright = PathMotion.prepare(chain, asked, given | {"rows": np.eye(3, 4)[[2]]})
+    upright.q[:] = 0.3
+    upright.evaluate()
+    side *= np.sign(upright.determinants[0])
+    motion = PathMotion.prepare(chain, asked, given, side=side)
+    motion.q[:] = 0.3
+    assert motion.evaluate() == fault
 
 
-def test_conditions_that_turn_need_their_drift():
+def test_what_is_not_finite_is_no_posture():
     chain = chain_of(*random_model(3, 1))
-    conditions = Conditions(np.zeros((1, 1, 3)), np.zeros((2, 1, 1, 3)))
     ones = np.ones((1, 2))
-    rest = (Prescribed((0, 1)), np.zeros((1, 3)), (ones, ones, ones), conditions)
+    given = dict.fromkeys(("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds"), ones)
+    given["rows"] = np.eye(3, 4)[[2]]
+    motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
+    motion.q[:] = np.nan
+    assert motion.evaluate() == "no posture"
+
+
+def test_conditions_of_other_shapes_are_refused():
+    chain = chain_of(*random_model(3, 1))
+    ones = np.ones((1, 2))
+    given = {"y": ones, "rows": np.zeros((1, 1, 4)), "turning": np.zeros((2, 1, 1, 4))}
     with pytest.raises(ValueError, match="needed"):
-        PathMotion.of(chain, *rest, (ones, ones))
+        PathMotion.prepare(chain, Prescribed((0, 1)), given)
 
 
 def test_close_least_singular_values():

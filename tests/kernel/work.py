@@ -7,8 +7,8 @@ import numpy as np
 
 from brachis.kernel import (
     Basis,
+    Branch,
     Chain,
-    Conditions,
     CurvePattern,
     Formula,
     MotionSlopes,
@@ -18,13 +18,11 @@ from brachis.kernel import (
     Spline,
     ValueGroups,
     VariableSlopes,
+    differentiate,
     find_least_singular,
     find_postures,
-    follow_turns,
     formula,
     library,
-    pick_nearest,
-    set_turns,
 )
 
 POINTS, N = 61, 7
@@ -53,18 +51,24 @@ def work() -> None:
     chain.torques(q, qdot, qddot)
     partials = chain.torque_derivatives(q, qdot, qddot)
     asked = Prescribed()
-    row = np.eye(N)[[0]]
-    rows = np.broadcast_to(row, (POINTS, 1, N))
-    path = tuple(rng.normal(size=(3, POINTS, 6)))
-    curves = tuple(rng.normal(size=(2, POINTS, 2)))
-    motion = PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
+    names = ("xi", "xi_ds", "xi_dds", "ydot", "yddot")
+    sizes = (6, 6, 6, 2, 2)
+    given = {
+        name: rng.normal(size=(POINTS, size))
+        for name, size in zip(names, sizes, strict=True)
+    }
+    given["rows"] = np.eye(N, N + 1)[[0]]
+    given["y"] = rng.normal(size=(POINTS, 2))
+    every = np.arange(N)
+    torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
+    groups = ValueGroups([torque, None], [N, N])
+    motion = PathMotion.prepare(chain, asked, given, groups=groups)
+    motion.q[:] = q
+    motion.evaluate()
     motion.derivatives()
     motion.singular_slopes(*find_least_singular(motion.inverse))
     for quantity in ("speed", "angular speed", "acceleration"):
         chain.tool_size_slopes(quantity, q, qdot, qddot)
-    every = np.arange(N)
-    torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
-    groups = ValueGroups([torque, None], [N, N])
     groups.values((q, qdot, qddot), q)
     slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
     places = np.arange(POINTS)
@@ -72,11 +76,7 @@ def work() -> None:
     shared = np.ones((2, 3, POINTS, 2))
     variables = VariableSlopes(shared, of_curves, np.ones((3, POINTS)))
     states = (q, qdot, qddot)
-    groups.differentiate(slopes, states, [((*partials, None), None)], variables)
-    mask = np.ones(N)
-    follow_turns(q.copy(), mask, q[0])
-    set_turns(q.copy(), (qdot, qddot), places, q[0], mask, 0.0 * mask)
-    pick_nearest(rng.normal(size=(POINTS, 8, N)), mask, q[:1], follows=True)
+    differentiate(groups, slopes, states, [((*partials, None), None)], variables)
     positions, rotations, _ = chain.tool(q, in_tool_axes=True)
     targets = np.concatenate([positions, rotations.reshape(POINTS, 9)], axis=1)
     find_postures(
@@ -84,12 +84,23 @@ def work() -> None:
         asked,
         targets,
         q + 0.01,
-        (np.array(rows), q[:, :1]),
+        (np.eye(N)[[0]], q[:, :1]),
         steps=20,
         tolerance=1e-12,
         largest_step=0.5,
         beside=False,
     )
+    mask = np.ones(N)
+    branch = Branch(every[:1], every[1:], mask, mask, q[0], alternatives=8)
+    turned = given | {"targets": targets, "t": np.linspace(0.0, 1.0, POINTS)}
+    motion = PathMotion.prepare(chain, asked, turned, branch=branch)
+    motion.answers[:] = q[:, None, 1:] + rng.normal(size=(8, N - 1))
+    motion.evaluate()
+    aside = np.zeros((POINTS, N))
+    reference = np.column_stack([q + 0.01, q[:, 0], aside])
+    along = np.column_stack([places, q[:, 0]])
+    charted = given | {"targets": targets, "reference": reference, "y": along}
+    PathMotion.prepare(chain, asked, charted).find_postures()
     spline = Spline.through(np.linspace(0.0, 1.0, POINTS), q)
     spline(np.linspace(0.0, 1.0, POINTS), nu=1)
     basis = Basis(rng.normal(size=(4, POINTS, 4)), places % 10)

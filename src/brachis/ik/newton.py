@@ -17,6 +17,7 @@ import numpy as np
 from brachis.common.arrays import apply_each
 from brachis.ik.screws import ChainGeometry
 from brachis.kernel import find_postures
+from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE
 from brachis.robot import TaskMap
 
 
@@ -85,11 +86,9 @@ class Newton:
             targets,
             q,
             (rows, levels),
-            steps=8 if beside else 15,
-            # A miss, m or rad, after which one more step meets the target to rounding: Newton's method squares it.
-            tolerance=1e-10,
-            # rad or m; the linear model says little about postures farther away.
-            largest_step=0.2 if beside else 0.5,
+            steps=8 if beside else STEPS,
+            tolerance=TOLERANCE,
+            largest_step=0.2 if beside else LARGEST_STEP,
             beside=beside,
         )
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from brachis.ik.screws import ChainGeometry
-from brachis.kernel import Formula
+from brachis.kernel import Formula, FormulaQuantity
 from brachis.robot import TaskMap
 
 
@@ -73,6 +73,14 @@ class IKSolver(ABC):
             Dimensionless, of the order of one in the middle of the branch.
         """
 
+    def branch_formula(self, branch: int, *counts: int) -> Formula | None:
+        """Return the formula of `solve_branch`, of so many task coordinates and redundant joints; None without one."""
+        return None
+
+    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
+        """Return the formulas of margins and slopes in postures of n joints; None without them."""
+        return None
+
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Differentiate the branch margins with respect to all joints, (K, k, n), exact by complex steps."""
         count, n = q.shape
@@ -110,15 +118,21 @@ class FormulaMargins(IKSolver):
             self._formulas[key] = make(*given)
         return self._formulas[key]
 
+    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity:
+        """Record the margins and their slopes, and take the branch's signs."""
+        values = self._formula("margins", Formula.of, self.margins, n)
+        slopes = self._formula("slopes", Formula.gradient, self.margins, n)
+        return FormulaQuantity(values, slopes, self.margin_signs(branch))
+
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Evaluate the margins by their formula."""
-        formula = self._formula("margins", Formula.of, self.margins, q.shape[1])
-        return formula(q) * self.margin_signs(branch)
+        formulas = self.margin_formulas(branch, q.shape[1])
+        return formulas.values_of(q) * formulas.factors
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Evaluate the slopes of the margins."""
-        formula = self._formula("slopes", Formula.gradient, self.margins, q.shape[1])
-        return formula(q) * self.margin_signs(branch)[:, None]
+        formulas = self.margin_formulas(branch, q.shape[1])
+        return formulas.slopes_of(q) * formulas.factors[:, None]
 
 
 class FormulaSolver(FormulaMargins):
@@ -128,23 +142,25 @@ class FormulaSolver(FormulaMargins):
     def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Non-redundant joints, (K, B, A, m), as of `solve`; one of them is not finite where there is no answer."""
 
+    def _answers_formula(self, *counts: int) -> Formula:
+        make = partial(Formula.of, discards_incomplete=True)
+        return self._formula("answers", make, self.answers, *counts)
+
+    def branch_formula(self, branch: int, *counts: int) -> Formula:
+        """Return the part of a branch of the answers' formula."""
+        return self._formula(branch, self._answers_formula(*counts).part, branch)
+
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Evaluate the answers of all branches."""
-        formula = self._answers_formula(targets, q_r)
-        return formula(targets, q_r, discard_incomplete=True)
+        formula = self._answers_formula(targets.shape[1], q_r.shape[1])
+        return formula(targets, q_r)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
         """Evaluate the answers of one branch."""
-        formula = self._formula(
-            branch, self._answers_formula(targets, q_r).part, branch
-        )
-        return formula(targets, q_r, discard_incomplete=True)
-
-    def _answers_formula(self, *at: np.ndarray) -> Formula:
-        counts = [own.shape[1] for own in at]
-        return self._formula("answers", Formula.of, self.answers, *counts)
+        formula = self.branch_formula(branch, targets.shape[1], q_r.shape[1])
+        return formula(targets, q_r)
 
 
 class NotApplicableError(Exception):

@@ -8,30 +8,37 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.chain_rule import (
     CurvePattern,
     MotionSlopes,
-    ScaledQuantity,
-    ValueGroups,
     VariableSlopes,
+    differentiate,
 )
 from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.lattice import largest_parts
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
-from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
+from brachis.kernel.path_motion import PathMotion, find_least_singular
+from brachis.kernel.postures import Branch
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.splines import Basis, Spline, blossom, collocation
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
-from brachis.kernel.turns import follow_turns, pick_nearest, set_turns
+from brachis.kernel.value_groups import (
+    FormulaQuantity,
+    Quantity,
+    ScaledQuantity,
+    ValueGroups,
+)
 
 __all__ = [
     "Basis",
+    "Branch",
     "Chain",
-    "Conditions",
     "CurvePattern",
     "Formula",
+    "FormulaQuantity",
     "MotionSlopes",
     "PathMotion",
     "Prescribed",
+    "Quantity",
     "ScaledQuantity",
     "Spline",
     "ValueGroups",
@@ -40,16 +47,14 @@ __all__ = [
     "body_twists",
     "bounds_of_pairs",
     "collocation",
+    "differentiate",
     "find_least_singular",
     "find_postures",
-    "follow_turns",
     "go_backwards",
     "go_forwards",
     "halve_intervals",
     "largest_parts",
-    "pick_nearest",
     "rotation_derivatives",
     "rotation_vectors",
-    "set_turns",
     "tool_derivatives",
 ]

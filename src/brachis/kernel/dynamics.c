@@ -142,20 +142,10 @@ static inline matrix coriolis(const bodies *own, twist v)
 
 static inline void add_bodies(bodies *sum, const bodies *own)
 {
-    sum->mass += own->mass;
-    sum->moment = add(sum->moment, own->moment);
-    sum->J.xx += own->J.xx;
-    sum->J.xy += own->J.xy;
-    sum->J.xz += own->J.xz;
-    sum->J.yy += own->J.yy;
-    sum->J.yz += own->J.yz;
-    sum->J.zz += own->J.zz;
-    sum->momentum = add(sum->momentum, own->momentum);
-    sum->E.x = add(sum->E.x, own->E.x);
-    sum->E.y = add(sum->E.y, own->E.y);
-    sum->E.z = add(sum->E.z, own->E.z);
-    sum->torque = add(sum->torque, own->torque);
-    sum->force = add(sum->force, own->force);
+    pack *numbers = (pack *)sum; /* all that a body is made of */
+    for (unsigned long i = 0; i < sizeof(bodies) / sizeof(pack); i++) {
+        numbers[i] += ((const pack *)own)[i];
+    }
 }
 
 static inline twist gravity_upwards(const chain *arm)
@@ -213,13 +203,11 @@ void brachis_torques(
             twist psi = cross_twists(v, axes[i]);
             pass_joint(arm, i, &placed, axes[i], psi, rate, acceleration, &v, &a, &moved[i]);
         }
-        vec torque = moved[n - 1].torque;
-        vec force = moved[n - 1].force;
+        vec torque = {0};
+        vec force = {0};
         for (long i = n - 1; i >= 0; i--) {
-            if (i < n - 1) {
-                torque = add(torque, moved[i].torque);
-                force = add(force, moved[i].force);
-            }
+            torque = add(torque, moved[i].torque);
+            force = add(force, moved[i].force);
             scatter(pair(axes[i], torque, force) + resisted[i], torques, count, n, k, i);
         }
     }
@@ -347,7 +335,7 @@ void brachis_mass_matrices(const chain *arm, long count, const double *q, double
         for (long i = n - 1; i >= 0; i--) {
             bodies *own = &placed_bodies[i];
             if (i < n - 1) {
-                add_bodies(own, &placed_bodies[i + 1]);
+                add_bodies(own, own + 1);
             }
             twist S = axes[i];
             vec turning = add(times(&own->J, S.w), cross(own->moment, S.v));

@@ -1,11 +1,10 @@
 /* Formulas: straight sequences of steps, each of one or two numbers, at many points. See formula.py. */
 #include <math.h>
 
+#include "motion.h"
+
 enum { SIDE_BY_SIDE = 16 };
-typedef struct {
-    int operation, first, second;
-} step;
-enum { ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2, CEIL };
+enum { PLUS, MINUS, TIMES, OVER, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2, CEIL };
 
 #define FOR_EACH(formula)                               \
     for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {   \
@@ -13,36 +12,39 @@ enum { ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2,
     }                                                   \
     break
 
-/* Evaluate at K points, (K, inputs). Numbers are the inputs, then the constants, then what each step gives; those that
-are wanted are found, (K, outputs). `numbers` has room for all of them. They come in groups of
-`together`: a group with a number that is not finite becomes NaN throughout; 0 turns this off. */
+/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. `numbers` has room for all
+numbers of the formula, of SIDE_BY_SIDE points. Found are (K, outputs). */
 void brachis_formula(
-    long inputs, long constants, const double *constant, long steps, const step *step_of, long count,
-    const double *points, long outputs, const int *wanted, long together, double (*numbers)[SIDE_BY_SIDE],
-    double *found
+    const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
+    double *room, double *found
 )
 {
-    for (long i = 0; i < constants; i++) {
+    double (*numbers)[SIDE_BY_SIDE] = (double (*)[SIDE_BY_SIDE])room;
+    long inputs = own->counts[0] + own->counts[1];
+    long outputs = own->outputs;
+    const step *step_of = own->step_of;
+    for (long i = 0; i < own->constants; i++) {
         for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
-            numbers[inputs + i][lane] = constant[i];
+            numbers[inputs + i][lane] = own->constant[i];
         }
     }
     for (long k = 0; k < count; k += SIDE_BY_SIDE) {
         for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
-            long own = k + lane < count ? k + lane : count - 1;
+            long at = k + lane < count ? k + lane : count - 1;
             for (long i = 0; i < inputs; i++) {
-                numbers[i][lane] = points[own * inputs + i];
+                long other = i - own->counts[0];
+                numbers[i][lane] = other < 0 ? first[at * first_step + i] : second[at * second_step + other];
             }
         }
-        for (long i = 0; i < steps; i++) {
+        for (long i = 0; i < own->steps; i++) {
             const double *a = numbers[step_of[i].first];
             const double *b = numbers[step_of[i].second];
-            double *c = numbers[inputs + constants + i];
+            double *c = numbers[inputs + own->constants + i];
             switch (step_of[i].operation) {
-            case ADD: FOR_EACH(a[lane] + b[lane]);
-            case SUBTRACT: FOR_EACH(a[lane] - b[lane]);
-            case MULTIPLY: FOR_EACH(a[lane] * b[lane]);
-            case DIVIDE: FOR_EACH(a[lane] / b[lane]);
+            case PLUS: FOR_EACH(a[lane] + b[lane]);
+            case MINUS: FOR_EACH(a[lane] - b[lane]);
+            case TIMES: FOR_EACH(a[lane] * b[lane]);
+            case OVER: FOR_EACH(a[lane] / b[lane]);
             case NEGATE: FOR_EACH(-a[lane]);
             case SQRT: FOR_EACH(sqrt(a[lane]));
             case SIN: FOR_EACH(sin(a[lane]));
@@ -54,16 +56,14 @@ void brachis_formula(
         }
         for (int lane = 0; lane < SIDE_BY_SIDE && k + lane < count; lane++) {
             for (long i = 0; i < outputs; i++) {
-                found[(k + lane) * outputs + i] = numbers[wanted[i]][lane];
+                found[(k + lane) * outputs + i] = numbers[own->wanted[i]][lane];
             }
         }
     }
+    long together = own->together;
     for (long i = 0; together && i < count * outputs; i += together) {
-        double sum = 0.0; /* of zeros, or NaN */
-        for (long j = i; j < i + together; j++) {
-            sum += 0.0 * found[j];
-        }
-        for (long j = i; j < i + together && sum != 0.0; j++) {
+        int complete = all_finite(found + i, together);
+        for (long j = i; j < i + together && !complete; j++) {
             found[j] = NAN;
         }
     }

@@ -11,8 +11,9 @@ count as zero, also where the other factor would be infinite.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -232,9 +233,24 @@ arctan2: Callable[..., Any] = _make_recordable(np.arctan2)
 ceil: Callable[..., Any] = _make_recordable(np.ceil)
 
 
+class _Formula(ctypes.Structure):
+    """`formula` of motion.h."""
+
+    _fields_ = [
+        ("counts", ctypes.c_long * 2),
+        ("constants", ctypes.c_long),
+        ("constant", ctypes.c_void_p),
+        ("steps", ctypes.c_long),
+        ("step_of", ctypes.c_void_p),
+        ("outputs", ctypes.c_long),
+        ("wanted", ctypes.c_void_p),
+        ("together", ctypes.c_long),
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """A recorded function of K points.
+    """A recorded function of K points, with one argument or two.
 
     Attributes
     ----------
@@ -247,6 +263,8 @@ class Formula:
         Operation and operands, which are counted over inputs, constants and steps.
     wanted : (o,) int32 ndarray
         What is found, counted likewise.
+    discards_incomplete : bool
+        Whether a row of the last axis becomes NaN throughout if one of its numbers is not finite.
     """
 
     counts: tuple[int, ...]
@@ -254,14 +272,21 @@ class Formula:
     constants: np.ndarray
     steps: np.ndarray
     wanted: np.ndarray
+    discards_incomplete: bool = False
 
     @classmethod
-    def of(cls, function: Callable[..., np.ndarray], *counts: int) -> Formula:
+    def of(
+        cls,
+        function: Callable[..., np.ndarray],
+        *counts: int,
+        discards_incomplete: bool = False,
+    ) -> Formula:
         """Record a function of arrays, (K, count) each, that returns an array, (K, ...)."""
         record = Record()
         with np.errstate(all="ignore"):
             found = function(*(record.inputs(count) for count in counts))
-        return cls._of_numbers(record, counts, found[0])
+        whole = cls._of_numbers(record, counts, found[0])
+        return replace(whole, discards_incomplete=discards_incomplete)
 
     @classmethod
     def gradient(
@@ -324,46 +349,50 @@ class Formula:
         steps = self.steps[needed[begin:]]
         steps[:, 1:] = place[steps[:, 1:]]
         constants = self.constants[needed[inputs:begin]]
-        return Formula(
-            self.counts, wanted.shape, constants, steps, place[wanted].ravel()
+        return replace(
+            self,
+            shape=wanted.shape,
+            constants=constants,
+            steps=steps,
+            wanted=place[wanted].ravel(),
         )
 
-    def __call__(
-        self, *points: np.ndarray, discard_incomplete: bool = False
-    ) -> np.ndarray:
-        """Evaluate at K points, (K, count) for every argument; returns (K, ...).
-
-        With `discard_incomplete` a row of the last axis becomes NaN throughout if one of its numbers is not finite.
-        """
+    def __call__(self, *points: np.ndarray) -> np.ndarray:
+        """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
         given = [as_doubles(own, (count, size)) for own, size in pairs]
-        inputs = given[0] if len(given) == 1 else np.concatenate(given, axis=1)
         found = np.empty((count, *self.shape))
-        numbers = np.empty(self._room)
-        constants, steps, wanted = self._addresses
+        numbers = np.empty(self.room)
+        first, second = given[0], given[-1]
         load().brachis_formula(
-            inputs.shape[1],
-            len(self.constants),
-            constants,
-            len(self.steps),
-            steps,
+            self.address,
             count,
-            address(inputs),
-            len(self.wanted),
-            wanted,
-            self.shape[-1] if discard_incomplete else 0,
+            address(first),
+            first.shape[1],
+            address(second),
+            second.shape[1],
             address(numbers),
             address(found),
         )
         return found
 
     @cached_property
-    def _addresses(self) -> tuple[int, ...]:
-        return tuple(map(address, (self.constants, self.steps, self.wanted)))
+    def _structure(self) -> _Formula:
+        """As the library takes it."""
+        counts = (*self.counts, 0)[:2]
+        parts = (self.constants, self.steps, self.wanted)
+        sized = [part for own in parts for part in (len(own), address(own))]
+        together = self.shape[-1] if self.discards_incomplete else 0
+        return _Formula((ctypes.c_long * 2)(*counts), *sized, together)
+
+    @property
+    def address(self) -> int:
+        """Where the library finds the formula."""
+        return ctypes.addressof(self._structure)
 
     @cached_property
-    def _room(self) -> int:
+    def room(self) -> int:
         """Numbers of all inputs, constants and steps, as many as are computed side by side."""
         numbers = sum(self.counts) + len(self.constants) + len(self.steps)
         return numbers * int(load().brachis_side_by_side())

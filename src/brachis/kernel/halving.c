@@ -104,9 +104,9 @@ static void sink(interval *heap, long count)
     }
 }
 
-/* Halve `pieces` equal intervals of 0 to 1 until they lose less than `tolerance` together, or are `most`. Those shorter
-than `shortest` stay as they are. `heap` and `begins` have room for the larger of both numbers. Returns how many there are; `begins` is where they
-begin, in any order. */
+/* Halve `pieces` equal intervals of 0 to 1 until they lose less than `tolerance` together, or are `most`. Those shorter than
+`shortest` stay as they are. `heap` and `begins` have room for the larger of both numbers. Returns how many there are; `begins`
+is where they begin, in any order. */
 long brachis_halve(
     const timing *own, long pieces, double tolerance, double shortest, long most, interval *heap, double *begins
 )

@@ -34,23 +34,21 @@ FUNCTIONS = {
     "brachis_go_forwards": "- llppppp",
     "brachis_rotations": "- llpp",
     "brachis_body_twists": "- llpp",
-    "brachis_newton": "- ppllpplplplddip",
+    "brachis_newton": "- ppllpplpllplddip",
     "brachis_halve": "l plddlpp",
-    "brachis_path_motion": "- p",
+    "brachis_postures": "- p",
+    "brachis_evaluate": "i plppppp",
     "brachis_path_derivatives": "- p",
     "brachis_least_singular": "- llppp",
     "brachis_singular_slopes": "- ppppp",
     "brachis_entries": "- lllppp",
-    "brachis_differentiate": "- lllpppplpllppp",
-    "brachis_values": "- llplpp",
-    "brachis_pick_nearest": "- lllppipp",
-    "brachis_follow_turns": "- llppp",
-    "brachis_set_turns": "i llppppppp",
+    "brachis_differentiate": "- lllpppplppllppp",
+    "brachis_values": "- llplppp",
     "brachis_largest_parts": "- lllpppp",
     "brachis_solve_band": "- lllpp",
     "brachis_blossoms": "- lllpppppp",
     "brachis_curves": "- lllllpppp",
-    "brachis_formula": "- llplplplplpp",
+    "brachis_formula": "- plplplpp",
     "brachis_side_by_side": "l ",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""
@@ -103,22 +101,6 @@ def address(values: np.ndarray) -> int:
     except (TypeError, ValueError):  # read-only, or empty
         place, _ = values.__array_interface__["data"]
         return int(place)
-
-
-def where_written(values: np.ndarray, shape: tuple[int, ...]) -> int:
-    """Return where the numbers of an array begin that the library writes to.
-
-    Raises
-    ------
-    ValueError
-        It is not a writeable, contiguous array of doubles of this shape.
-    """
-    flags = values.flags
-    if values.dtype is not _DOUBLE or not (flags.c_contiguous and flags.writeable):
-        raise ValueError("an array is not writeable, contiguous and of doubles")
-    if values.shape != shape:
-        raise ValueError(f"an array has the shape {values.shape}; needed: {shape}")
-    return address(values)
 
 
 def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -5,21 +5,64 @@
 
 #include "tool.h"
 
-/* Motion along a path; see path_motion.py. m rows of the tool are prescribed, r conditions are linear in the joints, and
-J_aug has the m rows of the task Jacobian, then those of the conditions. Curves are c = 1 + r. */
+/* A formula of one or two arguments, with `counts` numbers each; see formula.py. Numbers are the arguments, then the constants,
+then what each step gives; of them `wanted` are found. They come in groups of `together`: a group with a number that is not
+finite becomes NaN throughout; 0 turns this off. */
+typedef struct {
+    int operation, first, second;
+} step;
+
+typedef struct {
+    long counts[2];
+    long constants;
+    const double *constant;
+    long steps;
+    const step *step_of;
+    long outputs;
+    const int *wanted;
+    long together;
+} formula;
+
+/* A branch of a closed form; see postures.py. m joints follow from the target and the r redundant ones. */
+typedef struct {
+    const formula *answers_of; /* of target and redundant joints; null where the answers are given */
+    long alternatives;         /* A answers of a branch, of which continuity chooses one */
+    const long *redundant;     /* (r) */
+    const long *others;        /* (m) */
+    const double *turns;       /* (n): 1 for a joint whose turns are counted */
+    const double *ranged;      /* (n): 1 for one that has a finite range: its turns must be certain */
+    const double *start;       /* (n): the first posture is in the turns nearest to this one */
+} branch;
+
+/* Motion along a path; see path_motion.py. m rows of the tool are prescribed, r conditions C(s) q - p(s) are linear in the
+joints, and J_aug has the m rows of the task Jacobian, then C. Curves are c = 1 + r. */
 typedef struct {
     const chain *arm;
     const prescribed *asked;
+    const branch *by;                  /* null in a chart, or where q is given */
     long count;                        /* K */
     long rows_step;                    /* from the rows of one point to those of the next, in doubles; 0 if all points share them */
-    const double *q;                   /* (K, n) */
+    double side;                       /* sign that det J_aug must have; 0: either */
+    long steps;                        /* of Newton's method in a chart */
+    double tolerance, largest_step;    /* of it, rad or m */
+    const double *y, *ydot, *yddot;    /* (K, c) */
+    const double *targets;             /* (K, coordinates) */
     const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
-    const double *rows;                /* (r, n): of the conditions, at every point */
-    const double *ydot, *yddot;        /* (K, c) */
-    const double *turning;             /* (2, K, r, n): first and second derivative of the rows by s; null where none */
-    const double *drift;               /* (3, K, r): e, e' and e''; null likewise */
+    const double *rows;                /* (r, n + 1): C and p, at every point */
+    const double *turning;             /* (3, K, r, n + 1): derivatives of C and p by s; null where they vanish */
+    const double *reference;           /* (K, n + r + n r): of a chart, see postures.c; null without one */
+    const double *t;                   /* (K): times, by which turns are counted; null: turns are the nearest ones */
+    const double *near;                /* (K, n): postures known to be near, which decide about turns; null without them */
 
-    /* Found by brachis_path_motion: columns of the tool's Jacobian, inverse and determinant of J_aug, dq/dy, qdot, qddot. */
+    /* Found by brachis_postures. */
+    double *answers; /* (K, A, m) */
+    double *numbers; /* room for a formula */
+    double *levels;  /* (K, r) */
+    double *q;       /* (K, n) */
+
+    /* Found by brachis_path_motion: e = C' q - p' and two derivatives of it; columns of the tool's Jacobian, inverse and
+    determinant of J_aug, dq/dy, qdot, qddot. */
+    double *drift;        /* (3, K, r) */
     double *twists;       /* (6, K, n) */
     double *inverses;     /* (K, n, n) */
     double *determinants; /* (K) */
@@ -38,10 +81,49 @@ typedef struct {
     double *torque;
 } motion_slopes;
 
-void brachis_path_derivatives(path_motion *own);
+/* Partial derivatives, (K, values, n), of values by the joints' positions, or rates, ...; null where they vanish. `step` is 0
+where they are the same at all points, else values * n. */
+typedef struct {
+    double *numbers;
+    long step;
+} partial;
 
+enum { TORQUE = 4, FORMULA };
+
+/* A group of values. Either each value is (quantity of one joint - offset) * factor, with `quantity` 0 to 3 for q and its
+derivatives and TORQUE for the torque. Or it is a number of a FORMULA of the posture times a factor; its slopes by q go to
+`by[0]`. Or `quantity` is -1, and partial derivatives by q, qdot, qddot and qdddot, and by s, (K, values), are given; a null
+pointer stands for zeros. */
+typedef struct {
+    long values;
+    long quantity;
+    const long *joints;              /* (values) */
+    const double *offsets, *factors; /* (values) */
+    const formula *values_of, *slopes_of;
+    partial by[4];
+    const double *by_s;
+} group;
+
+/* What the functions of one file ask of another's. */
+void brachis_torques(
+    const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *found
+);
 void brachis_torque_slopes(
     const chain *arm, long count, long width, const double **states, const motion_slopes *motion
+);
+void brachis_formula(
+    const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
+    double *numbers, double *found
+);
+void brachis_newton(
+    const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
+    const double *starts, long conditions, const double *rows, long rows_step, long row_width, const double *levels,
+    long steps, double tolerance, double largest_step, int beside, double *found
+);
+void brachis_path_motion(path_motion *own);
+void brachis_path_derivatives(path_motion *own);
+void brachis_values(
+    long count, long n, const double **quantities, long groups, const group *of, double *numbers, double *found
 );
 
 #endif

@@ -2,14 +2,9 @@
 
 #include <math.h>
 
-#include "tool.h"
+#include "motion.h"
 
 static const double TURN = 6.283185307179586;
-
-static inline double lane_of(pack values, int lane)
-{
-    return values[lane];
-}
 
 /* Solve a linear system, (n, n) row by row with `right` behind each row, by elimination with pivots. */
 static void eliminate(long n, double *system, double *answer)
@@ -50,18 +45,16 @@ static long write_task(
     double *system
 )
 {
-    double position[3] = {
-        lane_of(tool->position.x, lane), lane_of(tool->position.y, lane), lane_of(tool->position.z, lane)};
+    const double position[3] = {tool->position.x[lane], tool->position.y[lane], tool->position.z[lane]};
     double R[3][3]; /* columns */
     for (int j = 0; j < 3; j++) {
-        R[j][0] = lane_of(tool->rotation[j].x, lane);
-        R[j][1] = lane_of(tool->rotation[j].y, lane);
-        R[j][2] = lane_of(tool->rotation[j].z, lane);
+        R[j][0] = tool->rotation[j].x[lane];
+        R[j][1] = tool->rotation[j].y[lane];
+        R[j][2] = tool->rotation[j].z[lane];
     }
     double miss[6] = {0};
-    long used[6];
-    double signs[6];
-    long count = rows_of(asked, used, signs);
+    const selection chosen = select_parts(asked);
+    long count = chosen.count;
     if (asked->is_pose) {
         double to[9];
         for (int i = 0; i < 3; i++) {
@@ -73,7 +66,7 @@ static long write_task(
         logarithm(to, miss + 3);
     } else {
         for (long i = 0; i < asked->rows; i++) {
-            miss[i] = target[i] - position[used[i]];
+            miss[i] = target[i] - position[asked->axes[i]];
         }
         if (asked->tool_axis >= 0) {
             const double *axis = R[asked->tool_axis];
@@ -85,7 +78,7 @@ static long write_task(
     for (long row = 0; row < count; row++) {
         double *own = system + row * (n + 1);
         for (long i = 0; i < n; i++) {
-            own[i] = signs[row] * lane_of(part_of(&columns[i], used[row]), lane);
+            own[i] = chosen_part(&columns[i], &chosen, row)[lane];
         }
         own[n] = miss[row];
     }
@@ -104,24 +97,14 @@ static double largest_of(const double *values, long count)
     return largest;
 }
 
-static int all_finite(const double *values, long count)
-{
-    for (long i = 0; i < count; i++) {
-        if (!isfinite(values[i])) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
 /* Find postures, (K, n), that meet targets, (K, c), and C q = levels, from `starts`, (K, n); NaN where the method does not
-converge. From the rows C of one point, (r, n), to those of the next it is `rows_step`, 0 if all points share them. A step is
-no longer than `largest_step`. `beside` gives a posture up whose steps do not halve; tolerance and largest step are then in
-proportion to its size where that is above 1. */
+converge. They may be found where `starts` are. From one row of C to the next it is `row_width`, from the rows of one point to
+those of the next `rows_step`, 0 if all points share them. A step is no longer than `largest_step`. `beside` gives a posture up
+whose steps do not halve; tolerance and largest step are then in proportion to its size where that is above 1. */
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
-    const double *starts, long conditions, const double *rows, long rows_step, const double *levels, long steps,
-    double tolerance, double largest_step, int beside, double *found
+    const double *starts, long conditions, const double *rows, long rows_step, long row_width, const double *levels,
+    long steps, double tolerance, double largest_step, int beside, double *found
 )
 {
     long n = arm->joints;
@@ -161,7 +144,7 @@ void brachis_newton(
                 long width = n + 1;
                 long m = write_task(asked, &tool, columns, n, lane, targets + own * coordinates, system);
                 for (long j = 0; j < conditions; j++) {
-                    const double *row = rows + own * rows_step + j * n;
+                    const double *row = rows + own * rows_step + j * row_width;
                     double aside = levels[own * conditions + j];
                     for (long i = 0; i < n; i++) {
                         system[(m + j) * width + i] = row[i];

@@ -11,6 +11,13 @@ import numpy as np
 from brachis.kernel.chain import Chain
 from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
 
+STEPS = 15
+"""Of Newton's method, at most."""
+TOLERANCE = 1e-10
+"""A miss, m or rad, after which one more step meets the target to rounding: Newton's method squares it."""
+LARGEST_STEP = 0.5
+"""rad or m; the linear model says little about postures farther away."""
+
 
 class _Prescribed(ctypes.Structure):
     """`prescribed` of tool.h."""
@@ -105,6 +112,7 @@ def find_postures(
         free,
         address(own_rows),
         step,
+        chain.n,
         levels_at,
         steps,
         tolerance,

@@ -20,20 +20,16 @@ static inline pack all(double value)
     return (pack){value, value, value, value};
 }
 
-static inline pack sines(pack a)
-{
-    return (pack){sin(a[0]), sin(a[1]), sin(a[2]), sin(a[3])};
-}
-
-static inline pack cosines(pack a)
-{
-    return (pack){cos(a[0]), cos(a[1]), cos(a[2]), cos(a[3])};
-}
-
-static inline pack tanhs(pack a)
-{
-    return (pack){tanh(a[0]), tanh(a[1]), tanh(a[2]), tanh(a[3])};
-}
+/* A function of one number for each lane. */
+#define FOR_LANES(name, function) \
+    static inline pack name(pack a) \
+    { \
+        return (pack){function(a[0]), function(a[1]), function(a[2]), function(a[3])}; \
+    }
+FOR_LANES(sines, sin)
+FOR_LANES(cosines, cos)
+FOR_LANES(tanhs, tanh)
+FOR_LANES(roots, sqrt)
 
 static inline vec constant(const double *a)
 {
@@ -106,6 +102,16 @@ static inline pack inner_product(const pack *a, const pack *b, long count)
         sum += a[i] * b[i];
     }
     return sum;
+}
+
+static inline int all_finite(const double *values, long count)
+{
+    for (long i = 0; i < count; i++) {
+        if (!isfinite(values[i])) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 enum { SET, ADD, SUBTRACT };

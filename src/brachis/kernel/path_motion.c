@@ -47,6 +47,21 @@ static double invert(long n, double *A)
     return determinant;
 }
 
+static void set_zero(pack *values, long count)
+{
+    for (long i = 0; i < count; i++) {
+        values[i] = all(0.0);
+    }
+}
+
+/* Rows and offsets of conditions, or derivatives of them, at LANES points of a table, (K, r, n + 1). */
+static void read_rows(const double *table, long count, long r, long n, long k, pack *rows)
+{
+    for (long i = 0; i < r * n; i++) {
+        rows[i] = gather(table, count, r * (n + 1), k, i + i / n);
+    }
+}
+
 /* The motion in postures q. */
 void brachis_path_motion(path_motion *own)
 {
@@ -54,9 +69,8 @@ void brachis_path_motion(path_motion *own)
     const prescribed *asked = own->asked;
     long count = own->count;
     long n = arm->joints;
-    long used[6];
-    double signs[6];
-    long m = rows_of(asked, used, signs);
+    const selection chosen = select_parts(asked);
+    long m = chosen.count;
     long r = n - m;
     long c = 1 + r;
     for (long k = 0; k < count; k += LANES) {
@@ -67,12 +81,23 @@ void brachis_path_motion(path_motion *own)
         read_block(own->yddot, count, c, k, yddot);
         place_tool(arm, posture, asked->is_pose != 0, columns);
         for (long i = 0; i < r * n; i++) {
-            J[m * n + i] = own->rows_step ? gather(own->rows, count, r * n, k, i) : all(own->rows[i]);
+            long at = i + i / n;
+            J[m * n + i] = own->rows_step ? gather(own->rows, count, own->rows_step, k, at) : all(own->rows[at]);
+        }
+        /* e = C' q - p', e' = C'' q - p'', and so on */
+        for (long i = 0; i < 3 * r && own->turning; i++) {
+            const double *table = own->turning + i / r * count * r * (n + 1);
+            pack row[n + 1];
+            for (long j = 0; j <= n; j++) {
+                row[j] = gather(table, count, r * (n + 1), k, i % r * (n + 1) + j);
+            }
+            pack drift = inner_product(row, posture, n) - row[n];
+            scatter(drift, own->drift + i / r * count * r, count, r, k, i % r);
         }
         for (long i = 0; i < n; i++) {
             write_twist(columns[i], own->twists, count, n, k, i);
             for (long row = 0; row < m; row++) {
-                J[row * n + i] = signs[row] * part_of(&columns[i], used[row]);
+                J[row * n + i] = chosen_part(&columns[i], &chosen, row);
             }
         }
         for (int lane = 0; lane < LANES && k + lane < count; lane++) {
@@ -90,7 +115,7 @@ void brachis_path_motion(path_motion *own)
         /* G = J_aug^-1 [xi, 0; -e, 1] */
         read_block(own->xi, count, m, k, right);
         for (long i = 0; i < r; i++) {
-            right[m + i] = own->drift ? -gather(own->drift, count, r, k, i) : all(0.0);
+            right[m + i] = own->turning ? -gather(own->drift, count, r, k, i) : all(0.0);
         }
         for (long i = 0; i < n; i++) {
             G[i * c] = inner_product(inverse + i * n, right, n);
@@ -105,17 +130,17 @@ void brachis_path_motion(path_motion *own)
         pack sdot = ydot[0];
         for (long row = 0; row < m; row++) {
             pack wanted = gather(own->xi_ds, count, m, k, row) * sdot * sdot;
-            right[row] = wanted - signs[row] * part_of(&bias, used[row]);
+            right[row] = wanted - chosen_part(&bias, &chosen, row);
+        }
+        pack C_s[r > 0 ? r * n : 1];
+        if (own->turning) {
+            read_rows(own->turning, count, r, n, k, C_s);
         }
         for (long i = 0; i < r; i++) {
             right[m + i] = all(0.0);
             if (own->turning) {
-                pack row[n];
-                for (long j = 0; j < n; j++) {
-                    row[j] = gather(own->turning, count, r * n, k, i * n + j);
-                }
                 pack drift = gather(own->drift + count * r, count, r, k, i);
-                right[m + i] = -sdot * (2.0 * inner_product(row, rate, n) + drift * sdot);
+                right[m + i] = -sdot * (2.0 * inner_product(C_s + i * n, rate, n) + drift * sdot);
             }
         }
         for (long i = 0; i < n; i++) {
@@ -136,9 +161,8 @@ void brachis_path_derivatives(path_motion *own)
     if (__atomic_load_n(&own->is_differentiated, __ATOMIC_ACQUIRE)) {
         return;
     }
-    long used[6];
-    double signs[6];
-    long m = rows_of(asked, used, signs);
+    const selection chosen = select_parts(asked);
+    long m = chosen.count;
     long r = n - m;
     long c = 1 + r;
     for (long k = 0; k < count; k += LANES) {
@@ -157,9 +181,9 @@ void brachis_path_derivatives(path_motion *own)
         differentiate_tool(n, columns, rate, more, asked->is_pose != 0, slopes, by_q, by_qdot);
         for (long row = 0; row < m; row++) {
             for (long i = 0; i < n; i++) {
-                V[row * n + i] = signs[row] * part_of(&slopes[i], used[row]);
-                A_q[row * n + i] = signs[row] * part_of(&by_q[i], used[row]);
-                A_v[row * n + i] = signs[row] * part_of(&by_qdot[i], used[row]);
+                V[row * n + i] = chosen_part(&slopes[i], &chosen, row);
+                A_q[row * n + i] = chosen_part(&by_q[i], &chosen, row);
+                A_v[row * n + i] = chosen_part(&by_qdot[i], &chosen, row);
             }
         }
         /* Derivatives of the conditions: C' and C'' in the rows below m. */
@@ -167,17 +191,15 @@ void brachis_path_derivatives(path_motion *own)
         pack *C_ss = A_q + m * n;
         pack e_s[r > 0 ? r : 1], e_ss[r > 0 ? r : 1];
         if (own->turning) {
-            read_block(own->turning, count, r * n, k, C_s);
-            read_block(own->turning + count * r * n, count, r * n, k, C_ss);
+            read_rows(own->turning, count, r, n, k, C_s);
+            read_rows(own->turning + count * r * (n + 1), count, r, n, k, C_ss);
             read_block(own->drift + count * r, count, r, k, e_s);
             read_block(own->drift + 2 * count * r, count, r, k, e_ss);
         }
         long rows = own->turning ? n : m;
 
         /* (-V_q G + [xi_ds sdot, 0];  -C' G sdot - [C' qdot + e' sdot, 0]) */
-        for (long i = 0; i < m * c; i++) {
-            right[i] = all(0.0);
-        }
+        set_zero(right, m * c);
         for (long row = 0; row < m; row++) {
             right[row * c] = gather(own->xi_ds, count, m, k, row) * sdot;
         }
@@ -195,9 +217,7 @@ void brachis_path_derivatives(path_motion *own)
         multiply(inverse, n, right, n, rows, c, SET, first);
 
         /* (-A_v G + [2 xi_ds sdot, 0];  twice the rows above) */
-        for (long i = 0; i < m * c; i++) {
-            right[i] = all(0.0);
-        }
+        set_zero(right, m * c);
         for (long row = 0; row < m; row++) {
             right[row * c] = 2.0 * gather(own->xi_ds, count, m, k, row) * sdot;
         }
@@ -209,9 +229,7 @@ void brachis_path_derivatives(path_motion *own)
 
         /* (-A_q G - A_v dqdot/dy + [xi_dds sdot^2 + xi_ds sddot, 0];
             -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0]) */
-        for (long i = 0; i < m * c; i++) {
-            right[i] = all(0.0);
-        }
+        set_zero(right, m * c);
         for (long row = 0; row < m; row++) {
             pack bend = gather(own->xi_dds, count, m, k, row);
             right[row * c] = bend * sdot * sdot + gather(own->xi_ds, count, m, k, row) * sddot;
@@ -268,12 +286,9 @@ void brachis_least_singular(long count, long n, const double *inverses, double *
                 trace += power[i * (n + 1)];
             }
             for (long i = 0; i < n * n; i++) {
-                power[i] /= trace;
+                squared[i] = power[i] / trace;
             }
-            multiply_by_transpose(n, power, squared);
-            for (long i = 0; i < n * n; i++) {
-                power[i] = squared[i];
-            }
+            multiply_by_transpose(n, squared, power);
         }
         for (int lane = 0; lane < LANES; lane++) {
             long largest = 0;
@@ -284,20 +299,14 @@ void brachis_least_singular(long count, long n, const double *inverses, double *
                 v[i][lane] = power[i * n + largest][lane];
             }
         }
-        pack size = inner_product(v, v, n);
-        for (int lane = 0; lane < LANES; lane++) {
-            size[lane] = sqrt(size[lane]);
-        }
+        pack size = roots(inner_product(v, v, n));
         for (long i = 0; i < n; i++) {
             v[i] /= size;
         }
         for (long i = 0; i < n; i++) {
             image[i] = inner_product(M + i * n, v, n);
         }
-        pack value = inner_product(v, image, n);
-        for (int lane = 0; lane < LANES && k + lane < count; lane++) {
-            values[k + lane] = 1.0 / sqrt(value[lane]);
-        }
+        scatter(1.0 / roots(inner_product(v, image, n)), values, count, 1, k, 0);
         write_block(v, vectors, count, n, k);
     }
 }
@@ -311,9 +320,8 @@ void brachis_singular_slopes(
     const prescribed *asked = own->asked;
     long count = own->count;
     long n = own->arm->joints;
-    long used[6];
-    double signs[6];
-    long m = rows_of(asked, used, signs);
+    const selection chosen = select_parts(asked);
+    long m = chosen.count;
     for (long k = 0; k < count; k += LANES) {
         twist columns[n], slopes[n], unused_q[n], unused_qdot[n];
         pack inverse[n * n], v[n], still[n], u[n], found[n], turned[n * n];
@@ -322,10 +330,10 @@ void brachis_singular_slopes(
         pack value = gather(values, count, 1, k, 0);
         for (long i = 0; i < n; i++) {
             columns[i] = read_twist(own->twists, count, n, k, i);
-            still[i] = all(0.0);
-            u[i] = all(0.0);
-            found[i] = all(0.0);
         }
+        set_zero(still, n);
+        set_zero(u, n);
+        set_zero(found, n);
         for (long i = 0; i < n; i++) {
             for (long j = 0; j < n; j++) {
                 u[j] += value * inverse[i * n + j] * v[i];
@@ -334,13 +342,13 @@ void brachis_singular_slopes(
         differentiate_tool(n, columns, v, still, asked->is_pose != 0, slopes, unused_q, unused_qdot);
         for (long row = 0; row < m; row++) {
             for (long i = 0; i < n; i++) {
-                found[i] += signs[row] * u[row] * part_of(&slopes[i], used[row]);
+                found[i] += u[row] * chosen_part(&slopes[i], &chosen, row);
             }
         }
         write_block(found, by_q, count, n, k);
         pack along_path = all(0.0);
         if (own->turning) {
-            read_block(own->turning, count, (n - m) * n, k, turned);
+            read_rows(own->turning, count, n - m, n, k, turned);
             for (long i = m; i < n; i++) {
                 along_path += u[i] * inner_product(turned + (i - m) * n, v, n);
             }

@@ -3,38 +3,58 @@
 from __future__ import annotations
 
 import ctypes
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from brachis.kernel.chain import Chain
 from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
-from brachis.kernel.newton import Prescribed
+from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE, Prescribed
+from brachis.kernel.postures import Branch
+from brachis.kernel.value_groups import ValueGroups
 
-
-@dataclass(frozen=True, eq=False)
-class Conditions:
-    """Linear functions C(s) q - p(s) of the joints at K points of a path.
-
-    Attributes
-    ----------
-    rows : (K, r, n) ndarray
-        C; (r, n) where it is constant.
-    turning : (2, K, r, n) ndarray or None
-        C' and C''; None where C is constant and p = 0.
-    drift : (3, K, r) ndarray or None
-        e = C' q - p', e' = C'' q - p'' and e'', likewise.
-    """
-
-    rows: np.ndarray
-    turning: np.ndarray | None = None
-    drift: np.ndarray | None = None
-
-
-_GIVEN = ("q", "xi", "xi_ds", "xi_dds", "rows", "ydot", "yddot", "turning", "drift")
-_FOUND = ("twists", "inverse", "determinants", "gradient", "qdot", "qddot")
-_SLOPES = ("qdot_y", "qddot_y", "qddot_ydot")
+_GIVEN = {
+    "y": "Kc",
+    "ydot": "Kc",
+    "yddot": "Kc",
+    "targets": "Kz",
+    "xi": "Km",
+    "xi_ds": "Km",
+    "xi_dds": "Km",
+    "rows": "Krw",
+    "turning": "3Krw",
+    "reference": "Kg",
+    "t": "K",
+    "near": "Kn",
+}
+"""What the library reads, and its shape: K points, n joints, c curves, m prescribed rows, z task coordinates, r rows of
+w = n + 1 numbers, and g = n + r + n r numbers of a chart's reference."""
+_FOUND = {
+    "answers": "Kam",
+    "numbers": "f",
+    "levels": "Kr",
+    "q": "Kn",
+    "drift": "3Kr",
+    "twists": "6Kn",
+    "inverse": "Knn",
+    "determinants": "K",
+    "gradient": "Knc",
+    "qdot": "Kn",
+    "qddot": "Kn",
+    "qdot_y": "Knc",
+    "qddot_y": "Knc",
+    "qddot_ydot": "Knc",
+}
+"""What it writes: also `a` answers of a closed form, and `f` numbers of formulas."""
+_OF_LIMITS = {"torque": "Kn", "values": "Kv"}
+"""What it writes besides, with v values of limits."""
+_DOUBLE = np.dtype(float).itemsize
+FAULTS = ("", "no posture", "singular", "turns too far")
+"""What `PathMotion.evaluate` may find, in the order of postures.c."""
 
 
 class _PathMotion(ctypes.Structure):
@@ -43,25 +63,75 @@ class _PathMotion(ctypes.Structure):
     _fields_ = [
         ("arm", ctypes.c_void_p),
         ("asked", ctypes.c_void_p),
+        ("by", ctypes.c_void_p),
         ("count", ctypes.c_long),
         ("rows_step", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in (*_GIVEN, *_FOUND, *_SLOPES)),
+        ("side", ctypes.c_double),
+        ("steps", ctypes.c_long),
+        ("tolerance", ctypes.c_double),
+        ("largest_step", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in (*_GIVEN, *_FOUND)),
         ("is_differentiated", ctypes.c_long),
     ]
 
 
+class _Block(NamedTuple):
+    """Where in a block of numbers what is found begins and ends, and of which shape it is."""
+
+    begin: int
+    end: int
+    shape: tuple[int, ...]
+
+
+@lru_cache
+def _divide(
+    **sizes: int,
+) -> tuple[dict[str, tuple[int, ...]], dict[str, _Block], int]:
+    """Return the shapes of what is given, the parts of one block for all that is found, and the block's length."""
+
+    def shape_of(letters: str) -> tuple[int, ...]:
+        """Return the numbers that letters stand for."""
+        return tuple(sizes[own] if own in sizes else int(own) for own in letters)
+
+    given = {name: shape_of(letters) for name, letters in _GIVEN.items()}
+    blocks = {}
+    end = 0
+    for name, letters in (_FOUND | _OF_LIMITS).items():
+        begin = end
+        shape = shape_of(letters)
+        end += math.prod(shape)
+        blocks[name] = _Block(begin, end, shape)
+    return given, blocks, end
+
+
 @dataclass(frozen=True, eq=False)
 class PathMotion:
-    """Motion at K points.
+    """Motion at K points along a path.
+
+    First all is prepared; answers of a closed form without a formula, or postures that are known, are then written to
+    `answers` or `q`. Without `branch` and ``given["reference"]`` the postures are known.
 
     Attributes
     ----------
     chain : Chain
     prescribed : Prescribed
-    given : tuple of (ndarray or None)
-        From which it was computed, contiguous: what is named in `_GIVEN`.
+    branch : Branch or None
+        By which postures are found; in a chart, None.
+    side : float
+        Sign that det J_aug must have; 0: either.
+    groups : ValueGroups or None
+        Values that are computed with the motion.
+    given : dict of str to ndarray
+        What is named in `_GIVEN`, contiguous; what has no meaning, or vanishes, is left out.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
+    blocks : dict of str to _Block
+        Where in `room` what is found stands.
+    room : (...) ndarray
+        All that is found.
+    answers : (K, A, m) ndarray
+        Of a closed form.
+    q, qdot, qddot : (K, n) ndarray
     twists : (6, K, n) ndarray
         Columns of the tool's Jacobian.
     inverse : (K, n, n) ndarray
@@ -70,74 +140,105 @@ class PathMotion:
         Of J_aug.
     gradient : (K, n, 1 + r) ndarray
         dq/dy.
-    qdot, qddot : (K, n) ndarray
-    slopes : tuple of (K, n, 1 + r) ndarray
-        Room for dqdot/dy, dqddot/dy and dqddot/dydot.
+    torque : (K, n) ndarray
+        Where values depend on it.
     """
 
     chain: Chain
     prescribed: Prescribed
-    given: tuple[np.ndarray | None, ...]
+    branch: Branch | None
+    side: float
+    groups: ValueGroups | None
+    given: dict[str, np.ndarray]
     rows_step: int
-    twists: np.ndarray
-    inverse: np.ndarray
-    determinants: np.ndarray
-    gradient: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
-    slopes: tuple[np.ndarray, np.ndarray, np.ndarray]
+    blocks: dict[str, _Block]
+    room: np.ndarray
 
     @classmethod
-    def of(
+    def prepare(
         cls,
         chain: Chain,
         prescribed: Prescribed,
-        q: np.ndarray,
-        path: tuple[np.ndarray, np.ndarray, np.ndarray],
-        conditions: Conditions,
-        curves: tuple[np.ndarray, np.ndarray],
+        given: Mapping[str, np.ndarray],
+        *,
+        branch: Branch | None = None,
+        side: float = 0.0,
+        groups: ValueGroups | None = None,
     ) -> PathMotion:
-        """Compute the motion in postures, (K, n), with ``path`` = xi, xi_ds, xi_dds and ``curves`` = ydot, yddot."""
-        count = len(q)
+        """Check what is given, and make room; see the class.
+
+        Raises
+        ------
+        ValueError
+            An array has another shape: the library would read beyond its end.
+        """
         n = chain.n
         m = prescribed.count
-        c = 1 + n - m
-        given = [as_doubles(q, (count, n))]
-        given += [as_doubles(own, (count, m)) for own in path]
-        rows, step = as_doubles_at_points(conditions.rows, (count, n - m, n))
-        given.append(rows)
-        given += [as_doubles(own, (count, c)) for own in curves]
-        turning = conditions.turning
-        drift = conditions.drift
-        if turning is not None or drift is not None:
-            turning = as_doubles(turning, (2, count, n - m, n))
-            drift = as_doubles(drift, (3, count, n - m))
-        slopes = np.empty((3, count, n, c))
-        motion = cls(
-            chain,
-            prescribed,
-            (*given, turning, drift),
-            step,
-            np.empty((6, count, n)),
-            np.empty((count, n, n)),
-            np.empty(count),
-            np.empty((count, n, c)),
-            np.empty((count, n)),
-            np.empty((count, n)),
-            (slopes[0], slopes[1], slopes[2]),
+        room = 0
+        alternatives = 0
+        values = 0
+        if branch is not None:
+            alternatives = branch.alternatives
+            room = branch.room
+        if groups is not None:
+            groups.check_joints(n)
+            values = groups.size
+            room = max(room, groups.room)
+        shapes, blocks, length = _divide(
+            K=len(given["y"]),
+            n=n,
+            m=m,
+            r=n - m,
+            c=1 + n - m,
+            w=n + 1,
+            z=prescribed.coordinates,
+            g=n + (n - m) * (n + 1),
+            a=alternatives,
+            f=room,
+            v=values,
         )
-        load().brachis_path_motion(motion.address)
-        return motion
+        kept = {
+            name: as_doubles(own, shapes[name])
+            for name, own in given.items()
+            if name != "rows"
+        }
+        kept["rows"], step = as_doubles_at_points(given["rows"], shapes["rows"])
+        found = np.empty(length)
+        return cls(chain, prescribed, branch, side, groups, kept, step, blocks, found)
+
+    def _find(self, name: str) -> np.ndarray:
+        begin, end, shape = self.blocks[name]
+        return self.room[begin:end].reshape(shape)
+
+    answers = cached_property(lambda self: self._find("answers"))
+    q = cached_property(lambda self: self._find("q"))
+    qdot = cached_property(lambda self: self._find("qdot"))
+    qddot = cached_property(lambda self: self._find("qddot"))
+    twists = cached_property(lambda self: self._find("twists"))
+    inverse = cached_property(lambda self: self._find("inverse"))
+    determinants = cached_property(lambda self: self._find("determinants"))
+    gradient = cached_property(lambda self: self._find("gradient"))
+    torque = cached_property(lambda self: self._find("torque"))
 
     @cached_property
     def _structure(self) -> _PathMotion:
         """What the library reads, and where it writes."""
-        found = (getattr(self, name) for name in _FOUND)
-        parts = (*self.given, *found, *self.slopes)
-        addresses = (None if own is None else address(own) for own in parts)
-        asked = ctypes.addressof(self.prescribed.structure)
-        before = (self.chain.address, asked, len(self.qdot), self.rows_step)
-        return _PathMotion(*before, *addresses)
+        given = self.given
+        blocks = self.blocks
+        first = address(self.room)
+        return _PathMotion(
+            self.chain.address,
+            ctypes.addressof(self.prescribed.structure),
+            None if self.branch is None else self.branch.address,
+            len(given["y"]),
+            self.rows_step,
+            self.side,
+            STEPS,
+            TOLERANCE,
+            LARGEST_STEP,
+            *[address(given[name]) if name in given else None for name in _GIVEN],
+            *[first + blocks[name].begin * _DOUBLE for name in _FOUND],
+        )
 
     @property
     def address(self) -> int:
@@ -145,8 +246,37 @@ class PathMotion:
         return ctypes.addressof(self._structure)
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave addresses behind."""
-        return {name: value for name, value in vars(self).items() if name[0] != "_"}
+        """Leave addresses and views behind."""
+        return {name: vars(self)[name] for name in self.__dataclass_fields__}
+
+    def find_postures(self) -> np.ndarray:
+        """Find the postures alone, (K, n); NaN where there is none."""
+        load().brachis_postures(self.address)
+        return self.q
+
+    def evaluate(self) -> str:
+        """Find postures, motion, and values of the groups; return what is at fault, one of `FAULTS`."""
+        groups = self.groups
+        own = (0, None, None) if groups is None else groups.places
+        first = address(self.room)
+        where = [
+            first + self.blocks[name].begin * _DOUBLE
+            for name in ("torque", "numbers", "values")
+        ]
+        return FAULTS[load().brachis_evaluate(self.address, *own, *where)]
+
+    @property
+    def values(self) -> list[np.ndarray]:
+        """Values of each group, (K, size); nothing is set where it has partials."""
+        if self.groups is None:
+            return []
+        found = self._find("values")
+        return self.groups.split(found.ravel(), len(found))
+
+    @property
+    def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Room for dqdot/dy, dqddot/dy and dqddot/dydot, (K, n, 1 + r) each; see `derivatives`."""
+        return self._find("qdot_y"), self._find("qddot_y"), self._find("qddot_ydot")
 
     def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each; once."""

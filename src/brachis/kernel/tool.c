@@ -13,18 +13,13 @@ void brachis_tool(
     for (long k = 0; k < count; k += LANES) {
         pack posture[n];
         twist columns[n];
-        for (long i = 0; i < n; i++) {
-            posture[i] = gather(q, count, n, k, i);
-        }
+        read_block(q, count, n, k, posture);
         placement tool = place_tool(arm, posture, in_tool_axes, columns);
-        for (int j = 0; j < 3; j++) {
-            scatter(tool.rotation[j].x, rotations, count, 9, k, j);
-            scatter(tool.rotation[j].y, rotations, count, 9, k, 3 + j);
-            scatter(tool.rotation[j].z, rotations, count, 9, k, 6 + j);
-        }
-        scatter(tool.position.x, positions, count, 3, k, 0);
-        scatter(tool.position.y, positions, count, 3, k, 1);
-        scatter(tool.position.z, positions, count, 3, k, 2);
+        const vec *R = tool.rotation;
+        const pack rows[9] = {R[0].x, R[1].x, R[2].x, R[0].y, R[1].y, R[2].y, R[0].z, R[1].z, R[2].z};
+        const pack position[3] = {tool.position.x, tool.position.y, tool.position.z};
+        write_block(rows, rotations, count, 9, k);
+        write_block(position, positions, count, 3, k);
         for (long i = 0; i < n; i++) {
             write_twist(columns[i], twists, count, n, k, i);
         }
@@ -43,9 +38,9 @@ void brachis_tool_derivatives(
         pack rates[n], more[n];
         for (long i = 0; i < n; i++) {
             columns[i] = read_twist(twists, count, n, k, i);
-            rates[i] = gather(qdot, count, n, k, i);
-            more[i] = gather(qddot, count, n, k, i);
         }
+        read_block(qdot, count, n, k, rates);
+        read_block(qddot, count, n, k, more);
         differentiate_tool(n, columns, rates, more, in_tool_axes, slopes, by_q, by_qdot);
         for (long i = 0; i < n; i++) {
             write_twist(slopes[i], velocity_q, count, n, k, i);
@@ -68,11 +63,9 @@ void brachis_tool_sizes(
         twist columns[n], by_q[n], by_qdot[n], slopes[n];
         twist V = {0};
         vec tangential = {0};
-        for (long i = 0; i < n; i++) {
-            posture[i] = gather(q, count, n, k, i);
-            rates[i] = gather(qdot, count, n, k, i);
-            more[i] = gather(qddot, count, n, k, i);
-        }
+        read_block(q, count, n, k, posture);
+        read_block(qdot, count, n, k, rates);
+        read_block(qddot, count, n, k, more);
         place_tool(arm, posture, 0, columns);
         for (long i = 0; i < n; i++) {
             V = add_twists(V, scale_twist(columns[i], rates[i]));
@@ -80,10 +73,9 @@ void brachis_tool_sizes(
         }
         vec motions[3] = {V.v, V.w, add(tangential, bias_of(n, columns, rates, 0).v)};
         vec direction = motions[quantity];
-        pack size = dot(direction, direction);
+        pack size = roots(dot(direction, direction));
         pack inverse;
         for (int lane = 0; lane < LANES; lane++) {
-            size[lane] = sqrt(size[lane]);
             inverse[lane] = size[lane] > 0.0 ? 1.0 / size[lane] : 0.0;
         }
         scatter(size, sizes, count, 1, k, 0);

@@ -15,27 +15,35 @@ typedef struct {
     double sign; /* of yaw about the world's third axis */
 } prescribed;
 
-/* Parts of the tool's motion that are prescribed, and their signs; returns how many they are. */
-static inline long rows_of(const prescribed *asked, long *used, double *signs)
-{
-    long count = asked->is_pose ? 6 : asked->rows;
-    for (long i = 0; i < count; i++) {
-        used[i] = asked->is_pose ? i : asked->axes[i];
-        signs[i] = 1.0;
-    }
-    if (!asked->is_pose && asked->tool_axis >= 0) {
-        used[count] = 6 - asked->axes[0] - asked->axes[1];
-        signs[count] = asked->sign;
-        count++;
-    }
-    return count;
-}
-
 /* A part of a motion: linear along three axes, then angular about them. */
 static inline pack part_of(const twist *a, long part)
 {
     const pack parts[6] = {a->v.x, a->v.y, a->v.z, a->w.x, a->w.y, a->w.z};
     return parts[part];
+}
+
+/* Parts of the tool's motion that are prescribed, and their signs. */
+typedef struct {
+    long count, parts[6];
+    double signs[6];
+} selection;
+
+static inline selection select_parts(const prescribed *asked)
+{
+    selection chosen = {asked->is_pose ? 6 : asked->rows, {0}, {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}};
+    for (long i = 0; i < chosen.count; i++) {
+        chosen.parts[i] = asked->is_pose ? i : asked->axes[i];
+    }
+    if (!asked->is_pose && asked->tool_axis >= 0) {
+        chosen.parts[chosen.count] = 6 - asked->axes[0] - asked->axes[1];
+        chosen.signs[chosen.count++] = asked->sign;
+    }
+    return chosen;
+}
+
+static inline pack chosen_part(const twist *a, const selection *chosen, long row)
+{
+    return chosen->signs[row] * part_of(a, chosen->parts[row]);
 }
 
 /* Placement: position, and columns of the rotation. */

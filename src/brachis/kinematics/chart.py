@@ -22,7 +22,7 @@ import numpy as np
 from brachis.common.arrays import LastCall, apply_each
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton, null_spaces
-from brachis.kernel import Conditions, Spline
+from brachis.kernel import Spline
 from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -113,15 +113,12 @@ class ChartRows:
         rows, offset = self.at(s)
         return apply_each(rows, q) - offset
 
-    def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
-        """Return rows, and how they change along the path, in postures (K, n) at path coordinates (K,)."""
+    def tables(self, s: np.ndarray) -> dict[str, np.ndarray]:
+        """Return [C, p] at path coordinates (K,), and three derivatives by s, as the kernel takes them."""
         if self.is_constant:
-            return Conditions(self.coefficients[0, :, :-1])
-        rows, _ = self.at(s)
-        orders = self._orders_at(s)[1:]
-        turning = orders[..., :-1]
-        drift = (turning @ q[:, :, None])[..., 0] - orders[..., -1]
-        return Conditions(rows, turning[:2], drift)
+            return {"rows": self.coefficients[0]}
+        orders = self._orders_at(s)
+        return {"rows": orders[0], "turning": orders[1:]}
 
 
 class ChartMap(PathMap):
@@ -141,7 +138,10 @@ class ChartMap(PathMap):
     """
 
     branch_label = CHART
-    no_posture = "the chart has no posture there"
+    faults = {  # noqa: RUF012
+        "no posture": "the chart has no posture there",
+        "singular": "the motion leaves the chart: det J_aug changes its sign",
+    }
 
     def __init__(
         self,
@@ -166,12 +166,13 @@ class ChartMap(PathMap):
         table = np.column_stack([reference, sigma, self_motion.reshape(len(s), -1)])
         self._lines = Spline.through(s, table, 1)
         self._reference_at = LastCall(self._between)
+        n = self.robot.n
         even = np.linspace(0.0, 1.0, 33)
-        augmented = self._augmented_at(even, self._between(even)[0])
+        augmented = self._augmented_at(even, self._between(even)[:, :n])
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
         self._typical = max(float(np.median(least)), _SINGULAR)
         self._start_margin = float(least[0]) / self._typical
-        self._side = float(np.sign(np.linalg.det(augmented[0])))
+        self.side = float(np.sign(np.linalg.det(augmented[0])))
 
     def _augmented_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
         """J_aug, (K, n, n), in postures (K, n) at path coordinates (K,)."""
@@ -179,12 +180,9 @@ class ChartMap(PathMap):
             [self._newton.task_coordinates(q)[1], self.rows.at(s)[0]], axis=1
         )
 
-    def _between(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Postures (K, n), sigma (K, r) and dq/dsigma (K, n, r) of the reference, by straight lines in between."""
-        n = self.robot.n
-        table = self._lines(s.clip(self.s[0], self.s[-1]))
-        q, sigma, self_motion = np.split(table, [n, n + self.r], axis=1)
-        return q, sigma, self_motion.reshape(len(s), n, self.r)
+    def _between(self, s: np.ndarray) -> np.ndarray:
+        """Postures, sigma and dq/dsigma of the reference, (K, n + r + n r), by straight lines in between."""
+        return self._lines(s.clip(self.s[0], self.s[-1]))
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN where that is NaN."""
@@ -194,37 +192,11 @@ class ChartMap(PathMap):
         """Values of y, (K, 1 + r), in postures (K, n) at path coordinates (K,)."""
         return np.column_stack([s, self.rows.values(s, q)])
 
-    def postures(
-        self,
-        y: np.ndarray,
-        sample: PathSample | None = None,
-        *,
-        near: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Joint positions, (K, n), at any times; without `near` the search begins at the reference."""
+    def place(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
+        """Return targets, rows, and the reference, from which Newton's method sets out."""
         s = y[:, 0]
-        targets = (sample or self.path.sample(s)).target
-        rows, offset = self.rows.at(s)
-        wanted = y[:, 1:] + offset
-        if near is not None:
-            return self._newton.solve(targets, near, rows, wanted)
-        reference, sigma, self_motion = self._reference_at(s)
-        aside = apply_each(self_motion, y[:, 1:] - sigma)
-        # Within 0.8 rad or m the reference's own self-motion says where a posture is.
-        near_enough = np.abs(aside).max(axis=1, initial=0.0) < 0.8
-        guess = np.where(near_enough[:, None], reference + aside, reference)
-        return self._newton.solve(targets, guess, rows, wanted)
-
-    def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
-        """Return the rows, and how they change along the path."""
-        return self.rows.conditions(s, q)
-
-    def check_regular(self, determinants: np.ndarray) -> None:
-        """Refuse J_aug where its determinant has another sign than along the reference."""
-        if (np.sign(determinants) != self._side).any():
-            raise UnreachableError(
-                "the motion leaves the chart: det J_aug changes its sign"
-            )
+        found = {"targets": sample.target, "reference": self._reference_at(s)}
+        return found | self.rows.tables(s)
 
     def start_margins(self) -> np.ndarray:
         """Margin of the reference at its beginning."""

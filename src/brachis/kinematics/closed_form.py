@@ -15,16 +15,18 @@ Rows of redundant joints are constant: their derivatives vanish.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Self
+
 import numpy as np
 
-from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
-from brachis.kernel import Conditions, PathMotion, follow_turns, pick_nearest, set_turns
+from brachis.kernel import Branch, FormulaQuantity, PathMotion
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-from brachis.robot.joints import complement, in_turn_of
+from brachis.robot.joints import complement
 
 
 class ClosedFormMap(PathMap):
@@ -44,7 +46,12 @@ class ClosedFormMap(PathMap):
         Start posture; turns of its angles by 2 pi are chosen to begin nearest to it.
     """
 
-    no_posture = "the target is out of the branch's reach"
+    branch_of: Branch
+    faults = {  # noqa: RUF012
+        "no posture": "the target is out of the branch's reach",
+        "singular": "the Jacobian of the non-redundant joints is singular",
+        "turns too far": "a joint turns too far between collocation points to count its turns",
+    }
 
     def __init__(
         self,
@@ -64,12 +71,27 @@ class ClosedFormMap(PathMap):
         self.redundant_joints = tuple(robot.joint_names[i] for i in redundant)
         self.branch = branch
         self.branch_label = solver.branches[branch]
-        self._conditions = Conditions(np.eye(robot.n)[self.redundant])
-        self._turning = robot.revolute[self.nonredundant].astype(float)
-        self._turns = np.isin(np.arange(robot.n), self.nonredundant) & robot.revolute
+        self._rows = np.eye(robot.n, robot.n + 1)[self.redundant]
+        turns = np.isin(np.arange(robot.n), self.nonredundant) & robot.revolute
         limits = robot.limits
         ends = limits.position_lower, limits.position_upper
-        self._ranged = self._turns & np.isfinite(ends).any(axis=0)
+        coordinates = task_map.prescribed.coordinates
+        formula = solver.branch_formula(branch, coordinates, self.r)
+        self.branch_of = Branch(
+            np.array(self.redundant, dtype=int),
+            np.array(self.nonredundant),
+            turns,
+            turns & np.isfinite(ends).any(axis=0),
+            start,
+            solver.alternatives,
+            formula,
+        )
+
+    def along(self, path: Path, start: np.ndarray) -> Self:
+        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        part = super().along(path, start)
+        part.branch_of = replace(self.branch_of, start=start)
+        return part
 
     def branch_margins(self, q: np.ndarray) -> np.ndarray:
         """Margins of the branch, (K, b), in postures (K, n)."""
@@ -87,60 +109,21 @@ class ClosedFormMap(PathMap):
         """Differentiate the margins of the branch; they do not depend on s."""
         return self.solver.margin_gradient(state.q, self.branch), None
 
+    def margin_quantity(self) -> FormulaQuantity | None:
+        """Return the margins as the kernel takes them."""
+        return self.solver.margin_formulas(self.branch, self.robot.n)
+
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""
         return np.append(s, q[self.redundant])
 
-    def postures(
-        self,
-        y: np.ndarray,
-        sample: PathSample | None = None,
-        *,
-        near: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Joint positions at K successive times, continuous from the start posture on.
+    def place(self, _y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
+        """Return targets, and rows that each select a redundant joint."""
+        return {"targets": sample.target, "rows": self._rows}
 
-        Of the alternatives in the branch the one nearest to its predecessor is taken, or to `near` if that is given.
-        Redundant joints are never NaN.
-        """
-        sample = sample or self.path.sample(y[:, 0])
-        answers = self.solver.solve_branch(sample.target, y[:, 1:], self.branch)
-        if self.solver.alternatives == 1:
-            answers = answers[:, 0]
-        else:
-            reference = self.start[None] if near is None else near
-            answers = pick_nearest(
-                answers,
-                self._turning,
-                reference[:, self.nonredundant],
-                follows=near is None,
-            )
-        q = np.empty((len(y), self.robot.n))
-        q[:, self.redundant] = y[:, 1:]
-        q[:, self.nonredundant] = answers
-        follow_turns(q, self._turns, self.start)
-        return q
-
-    def conditions(self, _s: np.ndarray, _q: np.ndarray) -> Conditions:
-        """Return rows that each select a redundant joint."""
-        return self._conditions
-
-    def choose_turns(
-        self,
-        q: np.ndarray,
-        motion: PathMotion,
-        t: np.ndarray | None,
-        near: np.ndarray | None,
-    ) -> np.ndarray:
-        """Choose turns that follow `near`, or the angles' own velocities; the quintic's rule predicts each step."""
-        if near is not None:
-            return in_turn_of(q, near, self._turns)
-        if t is None or not self._ranged.any():
-            return q  # no limit asks which turn an angle is in
-        masks = self._turns, self._ranged
-        rates = motion.qdot, motion.qddot
-        if not set_turns(q, rates, t, self.start, *masks):
-            raise UnreachableError(
-                "a joint turns too far between collocation points to count its turns"
-            )
-        return q
+    def give_answers(self, motion: PathMotion) -> None:
+        """Write the answers of a closed form that is no formula."""
+        if self.branch_of.answers_of is None:
+            targets = motion.given["targets"]
+            q_r = motion.given["y"][:, 1:]
+            motion.answers[:] = self.solver.solve_branch(targets, q_r, self.branch)

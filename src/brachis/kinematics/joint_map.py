@@ -27,7 +27,7 @@ from typing import Any, Self
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
-from brachis.kernel import MotionSlopes
+from brachis.kernel import FormulaQuantity, MotionSlopes, ValueGroups
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
@@ -80,6 +80,14 @@ class JointState(SharedTorques):
         """The exact derivatives as the kernel takes them, but for those of the jerk."""
         own = self.derivatives
         return MotionSlopes(self.gradient, own.qdot_y, own.qddot_y, own.qddot_ydot)
+
+    def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
+        """Compute values of limits, (K, size) of each group; nothing is set where a group has partials."""
+        states = [self.q, self.qdot, self.qddot]
+        if groups.has_jerk:
+            states.append(self.qdddot)
+        torque = None if groups.chain is None else self.torque_of(groups.chain)
+        return groups.values(states, torque)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
@@ -160,6 +168,7 @@ class JointMap(ABC):
         *,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
+        groups: ValueGroups | None = None,
     ) -> JointState:
         """Joint motion at K times.
 
@@ -170,6 +179,8 @@ class JointMap(ABC):
             The times, ascending from the start on, s; by them turns are counted.
         near : (K, n) ndarray, optional
             Postures known to be near, which decide about turns; the times may then be any.
+        groups : ValueGroups, optional
+            Values that will be asked for; a map may compute them with the motion.
 
         Raises
         ------
@@ -195,6 +206,10 @@ class JointMap(ABC):
     def margins(self, state: Any) -> np.ndarray:
         """Margins, (K, b), of a state that this map gave; see `start_margins`."""
         return np.empty((len(state.q), 0))
+
+    def margin_quantity(self) -> FormulaQuantity | None:
+        """Return the margins as the kernel computes them by itself; None where it does not."""
+        return None
 
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
@@ -244,7 +259,7 @@ class JointSpaceMap(JointMap):
         ydot: np.ndarray,
         yddot: np.ndarray,
         ydddot: np.ndarray,
-        **_turns: object,
+        **_others: object,
     ) -> JointSpaceState:
         """Return the motion along the path; in which turns joints are, it says itself."""
         path = self.path.sample(y[:, 0])
@@ -293,7 +308,7 @@ class DirectJointMap(JointMap):
         ydot: np.ndarray,
         yddot: np.ndarray,
         ydddot: np.ndarray,
-        **_turns: object,
+        **_others: object,
     ) -> JointState:
         """Return the curves as the motion; in which turns joints are, they say themselves."""
         gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))

@@ -28,6 +28,7 @@ G_nr = J_nr^-1 [xi, -J_r], and so on.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -37,9 +38,11 @@ import numpy as np
 from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.kernel import (
-    Conditions,
+    Branch,
+    Chain,
     MotionSlopes,
     PathMotion,
+    ValueGroups,
     find_least_singular,
 )
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
@@ -63,6 +66,19 @@ class PathState(JointState):
         """The exact derivatives, which the kernel computes when it needs them."""
         return MotionSlopes(self.gradient, *self.motion.slopes, path_motion=self.motion)
 
+    def torque_of(self, chain: Chain) -> np.ndarray:
+        """Joint torques of a chain, (K, n); not to be written to."""
+        groups = self.motion.groups
+        if groups is not None and groups.chain is chain:
+            return self.motion.torque
+        return super().torque_of(chain)
+
+    def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
+        """Compute values of limits, or return them where the kernel has them with the motion."""
+        if groups is self.motion.groups:
+            return self.motion.values
+        return super().values_of(groups)
+
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
         """Least singular values (K,) of J_aug, and their right singular vectors (K, n)."""
@@ -82,14 +98,20 @@ class PathMap(JointMap):
 
     Attributes
     ----------
-    no_posture : str
-        The message where a posture does not exist.
+    branch_of : Branch or None
+        What the kernel needs to know of the branch; None in a chart.
+    side : float
+        Sign that det J_aug must have; 0: either.
+    faults : dict of str to str
+        What a message says of each of `brachis.kernel.path_motion.FAULTS`.
     sample_at : LastCall
         Samples the path; over the path all iterates have the same s.
     """
 
     path: Path
-    no_posture: str
+    branch_of: Branch | None = None
+    side: float = 0.0
+    faults: Mapping[str, str]
     sample_at: LastCall[PathSample]
 
     def __init__(self, task_map: TaskMap, path: Path, start: np.ndarray) -> None:
@@ -100,20 +122,25 @@ class PathMap(JointMap):
         self.sample_at = LastCall(path.sample)
 
     @abstractmethod
-    def postures(
-        self,
-        y: np.ndarray,
-        sample: PathSample | None = None,
-        *,
-        near: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Joint positions, (K, n), where the curves are y, (K, 1 + r).
+    def place(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
+        """Return what the kernel needs to find postures; see `PathMotion`.
 
         Parameters
         ----------
         y : (K, 1 + r) ndarray
-        sample : PathSample, optional
-            The path at ``y[:, 0]`` if already known.
+        sample : PathSample
+            The path there.
+        """
+
+    def give_answers(self, motion: PathMotion) -> None:
+        """Write answers that the kernel cannot compute itself to a motion that is prepared."""
+
+    def postures(self, y: np.ndarray, *, near: np.ndarray | None = None) -> np.ndarray:
+        """Joint positions, (K, n), where the curves are y, (K, 1 + r), at successive times.
+
+        Parameters
+        ----------
+        y : (K, 1 + r) ndarray
         near : (K, n) ndarray, optional
             Postures known to be near; the times may then be any.
 
@@ -122,33 +149,35 @@ class PathMap(JointMap):
         (K, n) ndarray
             NaN where the curves cannot be met.
         """
+        sample = self.path.sample(y[:, 0])
+        given = {"y": y}
+        if near is not None:
+            given["near"] = near
+        return self._prepare(given, sample).find_postures().copy()
+
+    def _prepare(
+        self,
+        given: dict[str, np.ndarray],
+        sample: PathSample,
+        groups: ValueGroups | None = None,
+    ) -> PathMotion:
+        """Prepare a motion with what is given of curves, times and postures nearby."""
+        motion = PathMotion.prepare(
+            self.robot.chain,
+            self.task_map.prescribed,
+            given | self.place(given["y"], sample),
+            branch=self.branch_of,
+            side=self.side,
+            groups=groups,
+        )
+        self.give_answers(motion)
+        return motion
 
     def along(self, path: Path, start: np.ndarray) -> Self:
         """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
         part = super().along(path, start)
         part.sample_at = LastCall(path.sample)
         return part
-
-    @abstractmethod
-    def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
-        """Return C, and how it changes along the path, in postures (K, n) at path coordinates (K,)."""
-
-    def check_regular(self, determinants: np.ndarray) -> None:
-        """Raise UnreachableError where J_aug is singular, by its determinants, (K,)."""
-        if not determinants.all():
-            raise UnreachableError(
-                "the Jacobian of the non-redundant joints is singular"
-            )
-
-    def choose_turns(
-        self,
-        q: np.ndarray,
-        motion: PathMotion,
-        t: np.ndarray | None,
-        near: np.ndarray | None,
-    ) -> np.ndarray:
-        """Return postures (K, n) with their angles in the turns that they should be in; see `JointMap.state`."""
-        return q
 
     def state(
         self,
@@ -159,28 +188,31 @@ class PathMap(JointMap):
         *,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
+        groups: ValueGroups | None = None,
     ) -> PathState:
         """Joint motion at K times; see `JointMap.state` and the module's formulas.
 
         Without `t` and `near`, successive times must be so close that no joint turns by pi in between.
         """
-        s = y[:, 0]
-        sample = self.sample_at(s)
-        q = self.postures(y, sample, near=near)
-        if not np.isfinite(q).all():
-            raise UnreachableError(self.no_posture)
-        conditions = self.conditions(s, q)
-        motion = PathMotion.of(
-            self.robot.chain,
-            self.task_map.prescribed,
-            q,
-            (sample.xi, sample.xi_ds, sample.xi_dds),
-            conditions,
-            (ydot, yddot),
-        )
-        self.check_regular(motion.determinants)
-        q = self.choose_turns(q, motion, t, near)
-        found = (q, motion.qdot, motion.qddot, motion.gradient)
+        sample = self.sample_at(y[:, 0])
+        given = {
+            "y": y,
+            "ydot": ydot,
+            "yddot": yddot,
+            "xi": sample.xi,
+            "xi_ds": sample.xi_ds,
+            "xi_dds": sample.xi_dds,
+        }
+        branch = self.branch_of
+        if near is not None:
+            given["near"] = near
+        elif t is not None and branch is not None and branch.counts_turns:
+            given["t"] = t
+        motion = self._prepare(given, sample, groups)
+        fault = motion.evaluate()
+        if fault:
+            raise UnreachableError(self.faults[fault])
+        found = (motion.q, motion.qdot, motion.qddot, motion.gradient)
         return PathState(self, y, ydot, yddot, ydddot, *found, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:

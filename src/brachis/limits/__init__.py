@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Sequence
 from brachis.limits.checks import build_user_limits
 from brachis.limits.clearance import build_clearance
 from brachis.limits.drives import build_torque_speed, build_total_power
-from brachis.limits.joint import JOINT_LIMITS, to_scaled_quantity
+from brachis.limits.joint import JOINT_LIMITS
 from brachis.limits.margins import build_joint_ends, build_singularity
 from brachis.limits.protocol import (
     Bound,
@@ -134,5 +134,4 @@ __all__ = [
     "describe_guarantees",
     "joint_limits_of",
     "limits_of",
-    "to_scaled_quantity",
 ]

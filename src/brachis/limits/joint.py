@@ -120,8 +120,8 @@ class JointLimit(Limit):
         own = self._of_joints(self.quantity(motion))
         return (own - self._middle) * self._scale
 
-    def scaled_quantity(self, chain: Chain) -> ScaledQuantity | None:
-        """Describe the values as a quantity of the kernel; see `to_scaled_quantity`."""
+    def kernel_quantity(self, chain: Chain) -> ScaledQuantity | None:
+        """Describe the values; nothing for subclasses, which may have values of their own."""
         name = _QUANTITIES.get(type(self))
         if name is None or self._robot.chain is not chain:
             return None
@@ -356,17 +356,6 @@ _QUANTITIES: dict[type[Limit], str] = {TorqueLimit: "torque"} | {
     for limit in (PositionLimit, VelocityLimit, AccelerationLimit, JerkLimit)
 }
 """Limits whose values are a quantity of the kernel, less an offset, times a factor."""
-
-
-def to_scaled_quantity(limit: Limit, chain: Chain) -> ScaledQuantity | None:
-    """Describe the values of a limit as a quantity of the kernel.
-
-    Returns
-    -------
-    ScaledQuantity or None
-        None for all other limits, for those of another chain, and for subclasses, which may have values of their own.
-    """
-    return limit.scaled_quantity(chain) if isinstance(limit, JointLimit) else None
 
 
 def reciprocals_near(

@@ -22,6 +22,7 @@ from typing import Any, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 
+from brachis.kernel import Chain, Quantity
 from brachis.robot import Robot
 from brachis.robot.custom_limits import name_failures
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
@@ -341,6 +342,10 @@ class Limit(Description, ABC):
     @abstractmethod
     def partials(self, motion: JointStates) -> Partials:
         """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
+
+    def kernel_quantity(self, chain: Chain) -> Quantity | None:
+        """Describe the values as what the kernel computes by itself, of a chain; None where it does not."""
+        return None
 
     def restrict_to(self, q: np.ndarray) -> Limit | None:
         """Return what matters of it while the motion stays close to postures, (K, n); None where nothing does."""

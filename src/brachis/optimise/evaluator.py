@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from brachis.kernel import ValueGroups, VariableSlopes
+from brachis.kernel import ValueGroups, VariableSlopes, differentiate
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Partials, to_scaled_quantity
+from brachis.limits import Limit, Partials
 
 
 class Evaluator:
@@ -44,7 +44,7 @@ class Evaluator:
         means = [limit.guarantee.is_mean for limit in self.limits]
         self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
         chain = joint_map.robot.chain
-        quantities = [to_scaled_quantity(limit, chain) for limit in self.limits]
+        quantities = [limit.kernel_quantity(chain) for limit in self.limits]
         self._groups = ValueGroups(quantities, counts)
 
     def evaluate(
@@ -73,7 +73,9 @@ class Evaluator:
         UnreachableError
             The joint map has no posture at one of the times.
         """
-        motion = self.joint_map.state(y, ydot, yddot, ydddot, t=t, near=near)
+        groups = None if self._groups.has_jerk else self._groups
+        turns = {"t": t, "near": near}
+        motion = self.joint_map.state(y, ydot, yddot, ydddot, **turns, groups=groups)
         return Evaluation(self.limits, motion, self._groups)
 
 
@@ -99,12 +101,7 @@ class Evaluation:
     def by_limit(self) -> tuple[np.ndarray, ...]:
         """Values of every limit, (K, its own c)."""
         motion = self.motion
-        states = [motion.q, motion.qdot, motion.qddot]
-        if self.groups.has_jerk:
-            states.append(motion.qdddot)
-        chain = self.groups.chain
-        torque = None if chain is None else motion.torque_of(chain)
-        found = self.groups.values(states, torque)
+        found = motion.values_of(self.groups)
         for number in self.groups.with_partials:
             found[number] = self.limits[number].values(motion)
         return tuple(found)
@@ -117,7 +114,7 @@ class Evaluation:
     def differentiate(
         self, variables: VariableSlopes | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate `values`; see `ValueGroups.differentiate`.
+        """Differentiate `values`; see `brachis.kernel.differentiate`.
 
         Returns
         -------
@@ -147,7 +144,7 @@ class Evaluation:
             slopes = replace(slopes, qdddot_y=motion.qdddot_y)
         states = (motion.q, motion.qdot, motion.qddot)
         given = [(own.by_joints, own.s) for own in partials]
-        return groups.differentiate(slopes, states, given, variables)
+        return differentiate(groups, slopes, states, given, variables)
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
         """How far the limits that count are violated, (K, their c); negative inside."""

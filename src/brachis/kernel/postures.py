@@ -1,0 +1,102 @@
+"""Which postures belong to the curves along a path: those of a branch of a closed form, or of a chart."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from brachis.kernel.formula import Formula
+from brachis.kernel.library import address, as_doubles
+
+
+class _Branch(ctypes.Structure):
+    """`branch` of motion.h."""
+
+    _fields_ = [
+        ("answers_of", ctypes.c_void_p),
+        ("alternatives", ctypes.c_long),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("redundant", "others", "turns", "ranged", "start")
+        ),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A branch of a closed form, by which m of n joints follow from target and redundant joints.
+
+    Of several answers the one is taken that is nearest, modulo turns, to the posture before. Angles get the turns
+    nearest to the posture before, or those to which their velocities lead.
+
+    Attributes
+    ----------
+    redundant, others : (r,), (m,) int ndarray
+        Indices of the joints.
+    turns : (n,) bool ndarray
+        Joints whose turns are counted.
+    ranged : (n,) bool ndarray
+        Those with a finite range: their turns must be certain.
+    start : (n,) ndarray
+        The first posture gets the turns nearest to this one.
+    alternatives : int
+        Number of answers, A; those that do not exist are not finite.
+    answers_of : Formula or None
+        Of target and redundant joints, with (A, m) results; None where the answers are given.
+    """
+
+    redundant: np.ndarray
+    others: np.ndarray
+    turns: np.ndarray
+    ranged: np.ndarray
+    start: np.ndarray
+    alternatives: int = 1
+    answers_of: Formula | None = None
+
+    @property
+    def counts_turns(self) -> bool:
+        """Whether it matters which turn an angle is in."""
+        return bool(self.ranged.any())
+
+    @property
+    def room(self) -> int:
+        """Numbers of the formula; see `Formula.room`."""
+        return 0 if self.answers_of is None else self.answers_of.room
+
+    @cached_property
+    def _numbers(self) -> list[np.ndarray]:
+        """What the library reads: contiguous, and kept as long as this object."""
+        n = len(self.start)
+        joints = np.concatenate([self.redundant, self.others])
+        if not np.array_equal(np.sort(joints), np.arange(n)):
+            raise ValueError("redundant and other joints are not all joints, once each")
+        if self.alternatives < 1:
+            raise ValueError("no answers to choose from")
+        tables = [
+            as_doubles(own, (n,)) for own in (self.turns, self.ranged, self.start)
+        ]
+        return [self.redundant.astype("l"), self.others.astype("l"), *tables]
+
+    @cached_property
+    def _structure(self) -> _Branch:
+        formula = None
+        if self.answers_of is not None:
+            formula = self.answers_of.address
+            needed = (self.alternatives, len(self.others))
+            if self.answers_of.shape != needed:
+                raise ValueError(
+                    f"the answers have the shape {self.answers_of.shape}; needed: {needed}"
+                )
+        return _Branch(formula, self.alternatives, *map(address, self._numbers))
+
+    @property
+    def address(self) -> int:
+        """Where the library finds the branch."""
+        return ctypes.addressof(self._structure)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave addresses behind."""
+        return {name: value for name, value in vars(self).items() if name[0] != "_"}

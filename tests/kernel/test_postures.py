@@ -1,0 +1,140 @@
+"""Postures along a path: which answer of a closed form goes on with a motion, and the turns of angles."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from brachis.kernel import Branch, Formula, PathMotion, Prescribed
+from brachis.robot.chain import chain_of
+from support.random_chains import random_model
+
+TURN = 2.0 * np.pi
+N = 3
+ASKED = Prescribed((0, 1))
+REDUNDANT, OTHERS = np.array([1]), np.array([0, 2])
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(4)
+
+
+def prepare(answers, q_r, *, turns=(1, 0, 1), ranged=(0, 0, 0), start, **given):
+    """A motion of three joints, of which joint 1 is redundant, with answers (K, A, 2)."""
+    count = len(answers)
+    masks = np.array(turns, dtype=bool), np.array(ranged, dtype=bool)
+    alternatives = answers.shape[1]
+    branch = Branch(REDUNDANT, OTHERS, *masks, np.array(start), alternatives)
+    zeros = np.zeros((count, 2))
+    given = dict.fromkeys(("xi", "xi_ds", "xi_dds", "ydot", "yddot"), zeros) | given
+    given |= {"y": np.column_stack([zeros[:, 0], q_r]), "rows": np.eye(N, N + 1)[[1]]}
+    chain = chain_of(*random_model(N, 1))
+    motion = PathMotion.prepare(chain, ASKED, given, branch=branch)
+    motion.answers[:] = answers
+    return motion
+
+
+def test_angles_follow_their_turns(rng):
+    smooth = np.cumsum(rng.uniform(-2.0, 2.0, (50, N)), axis=0)
+    wrapped = np.remainder(smooth, TURN)
+    start = smooth[0] + 3.0 * TURN
+    turns = (1, 0, 0)
+    motion = prepare(wrapped[:, None, OTHERS], smooth[:, 1], turns=turns, start=start)
+    found = motion.find_postures()
+    known = np.unwrap(np.vstack([start, wrapped]), axis=0)[1:]
+    np.testing.assert_allclose(found[:, 0], known[:, 0], atol=1e-12)
+    np.testing.assert_array_equal(found[:, 1], smooth[:, 1])
+    np.testing.assert_array_equal(found[:, 2], wrapped[:, 2])
+
+
+def test_turns_stay_where_an_answer_is_missing():
+    answers = np.array([[[0.0, 7.0]], [[np.nan, 7.0]]])
+    motion = prepare(answers, np.zeros(2), start=np.zeros(N))
+    np.testing.assert_array_equal(motion.find_postures()[:, OTHERS], answers[:, 0])
+
+
+def test_known_postures_decide_about_turns(rng):
+    near = rng.uniform(-20.0, 20.0, (9, N))
+    answers = np.remainder(near[:, None, OTHERS], TURN)
+    motion = prepare(answers, near[:, 1], start=np.zeros(N), near=near)
+    np.testing.assert_allclose(motion.find_postures(), near, atol=1e-12)
+
+
+def test_the_answer_nearest_to_a_known_posture_is_taken(rng):
+    answers = rng.uniform(-np.pi, np.pi, (20, 5, 2))
+    answers[3, 1] = np.nan
+    answers[7] = np.nan
+    near = rng.uniform(-np.pi, np.pi, (20, N))
+    gap = np.remainder(answers - near[:, None, OTHERS] + np.pi, TURN) - np.pi
+    distance = np.nan_to_num(np.linalg.norm(gap, axis=2), nan=np.inf)
+    known = answers[np.arange(20), distance.argmin(axis=1)]
+    motion = prepare(answers, near[:, 1], start=np.zeros(N), near=near)
+    found = motion.find_postures()[:, OTHERS]
+    turned = np.remainder(found - known + np.pi, TURN) - np.pi
+    kept = np.arange(20) != 7
+    np.testing.assert_allclose(turned[kept], 0.0, atol=1e-12)
+    assert np.isnan(found[7]).all()
+
+
+def test_each_answer_follows_the_one_before(rng):
+    path = np.cumsum(rng.uniform(-0.1, 0.1, (30, 2)), axis=0)
+    away = path[:, None] + np.array([0.0, 2.0, -2.5])[None, :, None]
+    answers = np.take(away, [2, 0, 1], axis=1)
+    answers[12] = np.nan  # one is missing
+    start = np.array([path[0, 0], 0.0, path[0, 1]])
+    motion = prepare(answers, np.zeros(30), turns=(0, 0, 0), start=start)
+    found = motion.find_postures()[:, OTHERS]
+    kept = np.arange(30) != 12
+    np.testing.assert_array_equal(found[kept], path[kept])
+    assert np.isnan(found[12]).all()
+
+
+def fast_motion(steps):
+    """Times, angle, velocity and acceleration of a joint that turns several times, up to 9.4 rad a step of nine."""
+    t = np.linspace(0.0, 1.0, steps)
+    return t, 40.0 * t**2 + 1.0, 80.0 * t, np.full(steps, 80.0)
+
+
+def turning(q, ranged):
+    """A motion of joint 1 alone, the redundant one, whose turns are counted."""
+    t, _, qdot, qddot = fast_motion(len(q))
+    rates = {"ydot": np.column_stack([0.0 * t, qdot])}
+    rates["yddot"] = np.column_stack([0.0 * t, qddot])
+    still = np.full((len(q), 1, 2), 0.3)
+    masks = {"turns": (0, 1, 0), "ranged": (0, ranged, 0), "start": (0.3, q[0], 0.3)}
+    return prepare(still, np.remainder(q, TURN), **masks, t=t, **rates)
+
+
+def test_turns_are_counted_by_velocities():
+    _, q, _, _ = fast_motion(9)
+    motion = turning(q, ranged=1)
+    assert not motion.evaluate()
+    np.testing.assert_allclose(motion.qdot[:, 1], fast_motion(9)[2], atol=1e-9)
+    np.testing.assert_allclose(motion.q[:, 1], q, atol=1e-12)
+
+
+@pytest.mark.parametrize(("ranged", "fault"), [(1, "turns too far"), (0, "")])
+def test_turns_that_are_not_certain(ranged, fault):
+    _, q, _, _ = fast_motion(9)
+    q[4:] += 0.4 * TURN
+    assert turning(q, ranged).evaluate() == fault
+
+
+def test_a_branch_comes_back_from_another_process():
+    mask = np.ones(N, dtype=bool)
+    branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
+    assert branch.address
+    again = pickle.loads(pickle.dumps(branch))  # noqa: S301  (our own)
+    np.testing.assert_array_equal(again.others, OTHERS)
+
+
+def test_what_does_not_fit_is_refused():
+    mask = np.ones(N, dtype=bool)
+    with pytest.raises(ValueError, match="not all joints"):
+        _ = Branch(REDUNDANT, REDUNDANT, mask, mask, np.zeros(N)).address
+    with pytest.raises(ValueError, match="no answers"):
+        _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 0).address
+    formula = Formula.of(lambda a, b: np.stack([a[:, 0], b[:, 0]], axis=1), 2, 1)
+    with pytest.raises(ValueError, match=r"the answers have the shape \(2,\)"):
+        _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula).address
