@@ -3,48 +3,52 @@
 
 #include "motion.h"
 
-/* Invert a matrix, (n, n), in place by elimination with pivots (Gauss, Jordan); returns its determinant, and infinite
-numbers where it is singular. */
-static double invert(long n, double *A)
+static inline void swap_lane(pack *a, pack *b, int lane)
 {
-    long swaps[n];
-    double determinant = 1.0;
+    double kept = (*a)[lane];
+    (*a)[lane] = (*b)[lane];
+    (*b)[lane] = kept;
+}
+
+/* Invert matrices, (n, n), in place by elimination with pivots (Gauss, Jordan); returns their determinants, 0 or NaN where they
+are singular. */
+static pack invert(long n, pack *A)
+{
+    long swaps[n * LANES];
+    pack determinants = all(1.0);
     for (long i = 0; i < n; i++) {
-        long pivot = i;
-        for (long row = i + 1; row < n; row++) {
-            pivot = fabs(A[row * n + i]) > fabs(A[pivot * n + i]) ? row : pivot;
+        for (int lane = 0; lane < LANES; lane++) {
+            long pivot = i;
+            for (long row = i + 1; row < n; row++) {
+                pivot = fabs(A[row * n + i][lane]) > fabs(A[pivot * n + i][lane]) ? row : pivot;
+            }
+            swaps[i * LANES + lane] = pivot;
+            determinants[lane] *= pivot == i ? 1.0 : -1.0;
+            for (long j = 0; j < n && pivot != i; j++) {
+                swap_lane(&A[i * n + j], &A[pivot * n + j], lane);
+            }
         }
-        swaps[i] = pivot;
-        determinant *= pivot == i ? A[pivot * n + i] : -A[pivot * n + i];
-        for (long j = 0; j < n && pivot != i; j++) {
-            double kept = A[i * n + j];
-            A[i * n + j] = A[pivot * n + j];
-            A[pivot * n + j] = kept;
-        }
-        double inverse = 1.0 / A[i * n + i];
-        A[i * n + i] = 1.0;
+        determinants *= A[i * n + i];
+        pack inverse = 1.0 / A[i * n + i];
+        A[i * n + i] = all(1.0);
         for (long j = 0; j < n; j++) {
             A[i * n + j] *= inverse;
         }
         for (long row = 0; row < n; row++) {
-            double factor = A[row * n + i];
-            if (row == i || factor == 0.0) {
-                continue;
-            }
-            A[row * n + i] = 0.0;
-            for (long j = 0; j < n; j++) {
-                A[row * n + j] -= factor * A[i * n + j];
+            pack factor = A[row * n + i];
+            for (long j = 0; j < n && row != i; j++) {
+                A[row * n + j] = (j == i ? all(0.0) : A[row * n + j]) - factor * A[i * n + j];
             }
         }
     }
     for (long i = n - 1; i >= 0; i--) {
-        for (long row = 0; row < n && swaps[i] != i; row++) {
-            double kept = A[row * n + i];
-            A[row * n + i] = A[row * n + swaps[i]];
-            A[row * n + swaps[i]] = kept;
+        for (int lane = 0; lane < LANES; lane++) {
+            for (long row = 0; row < n && swaps[i * LANES + lane] != i; row++) {
+                swap_lane(&A[row * n + i], &A[row * n + swaps[i * LANES + lane]], lane);
+            }
         }
     }
-    return determinant;
+    return determinants;
 }
 
 static void set_zero(pack *values, long count)
@@ -75,14 +79,14 @@ void brachis_path_motion(path_motion *own)
     long c = 1 + r;
     for (long k = 0; k < count; k += LANES) {
         twist columns[n];
-        pack posture[n], J[n * n], inverse[n * n], G[n * c], rate[n], more[n], right[n], ydot[c], yddot[c];
+        pack posture[n], inverse[n * n], G[n * c], rate[n], more[n], right[n], ydot[c], yddot[c];
         read_block(own->q, count, n, k, posture);
         read_block(own->ydot, count, c, k, ydot);
         read_block(own->yddot, count, c, k, yddot);
         place_tool(arm, posture, asked->is_pose != 0, columns);
         for (long i = 0; i < r * n; i++) {
             long at = i + i / n;
-            J[m * n + i] = own->rows_step ? gather(own->rows, count, own->rows_step, k, at) : all(own->rows[at]);
+            inverse[m * n + i] = own->rows_step ? gather(own->rows, count, own->rows_step, k, at) : all(own->rows[at]);
         }
         /* e = C' q - p', e' = C'' q - p'', and so on */
         for (long i = 0; i < 3 * r && own->turning; i++) {
@@ -97,20 +101,11 @@ void brachis_path_motion(path_motion *own)
         for (long i = 0; i < n; i++) {
             write_twist(columns[i], own->twists, count, n, k, i);
             for (long row = 0; row < m; row++) {
-                J[row * n + i] = chosen_part(&columns[i], &chosen, row);
+                inverse[row * n + i] = chosen_part(&columns[i], &chosen, row);
             }
         }
-        for (int lane = 0; lane < LANES && k + lane < count; lane++) {
-            double matrix[n * n];
-            for (long i = 0; i < n * n; i++) {
-                matrix[i] = J[i][lane];
-            }
-            own->determinants[k + lane] = invert(n, matrix);
-            for (long i = 0; i < n * n; i++) {
-                own->inverses[(k + lane) * n * n + i] = matrix[i];
-            }
-        }
-        read_block(own->inverses, count, n * n, k, inverse);
+        scatter(invert(n, inverse), own->determinants, count, 1, k, 0);
+        write_block(inverse, own->inverses, count, n * n, k);
 
         /* G = J_aug^-1 [xi, 0; -e, 1] */
         read_block(own->xi, count, m, k, right);

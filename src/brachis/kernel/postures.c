@@ -163,7 +163,7 @@ int brachis_evaluate(
     brachis_path_motion(own);
     for (long k = 0; k < own->count; k++) {
         double determinant = own->determinants[k];
-        if (determinant == 0.0 || (own->side != 0.0 && !(determinant * own->side > 0.0))) {
+        if (!(determinant * (own->side != 0.0 ? own->side : determinant) > 0.0)) {
             return SINGULAR;
         }
     }

@@ -84,8 +84,10 @@ class Progress:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian, (z,)."""
-        by_duration = sum_powers(self.given, x[0], slope=True)
         part = self.part
+        if len(self.given) == 1:
+            return part.weight
+        by_duration = sum_powers(self.given, x[0], slope=True)
         return np.where(part.variable == 0, by_duration[part.point], part.weight)
 
 

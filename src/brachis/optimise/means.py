@@ -61,9 +61,11 @@ class Means:
 
     def slopes(self, parts: Parts) -> np.ndarray:
         """Slopes of the values by all variables, (m, v)."""
+        if not self.limits:
+            return np.empty((0, sum(len(x) for _, x in parts)))
         total = self.values(parts)
-        columns = [np.empty((len(self), 0))]
-        for phase, x in parts if self.limits else ():
+        columns = []
+        for phase, x in parts:
             own = x[0] * _mean_slopes_of(phase, x)
             own[:, 0] += _means_of(phase, x) - total
             if phase.pause:

@@ -36,6 +36,7 @@ from brachis.optimise.grid import FixedGrid, FreeGrid
 from brachis.optimise.layout import RowLayout, VariableLayout
 from brachis.optimise.motion import Motion, per_second, sample_law
 
+_EACH_ORDER = np.arange(ORDERS)
 _is_checked = attrgetter("is_checked_at_points")
 
 
@@ -471,7 +472,7 @@ class Phase:
 
     def _by_duration(self, x: np.ndarray) -> np.ndarray:
         """Slopes of the curves and their time derivatives by T, (4, K, c): a longer time slows them down."""
-        rates = -np.arange(ORDERS) / x[0]
+        rates = -_EACH_ORDER / x[0]
         slower = np.array(self.state(x).curves) * rates[:, None, None]
         given = self._layout.given
         if len(given) == 1:
@@ -485,4 +486,4 @@ class Phase:
         basis = self.grid.basis(self._h(x))
         if self._entries is None or self._entries[0] is not basis:
             self._entries = (basis, self._layout.sparsity.entries(basis.values))
-        return np.array(per_second(self._entries[1], x[0]))
+        return self._entries[1] / (x[0] ** _EACH_ORDER)[:, None]
