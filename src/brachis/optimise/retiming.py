@@ -129,7 +129,6 @@ FINE = PathEffort(
         time_limit=np.inf,
         progress=2e-4,
         patience=4,
-        first_step=0.1,
         widening=1e-6,
     ),
 )
