@@ -282,11 +282,8 @@ def _worst_ratio(program: Program, x: np.ndarray) -> float:
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
-_LARGE_PROGRAM = 600
-"""Variables of a program over the path above which an interior-point method is as fast as others, or faster.
-
-Of 50 programs with 250 to 600 variables Uno solves most in a third of the time; above, now and then one takes it ten
-seconds."""
+_LARGE_PROGRAM = 250
+"""Variables of a program over the path above which an interior-point method is as fast as others, or faster."""
 _NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
 """`SolverOptions` from a motion that is nearly as fast as possible. Very many rows are near their bounds there, and a
 small subproblem takes half as long."""
