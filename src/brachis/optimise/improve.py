@@ -403,7 +403,7 @@ class SolverSession:
 
         is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM
         if is_large and self.for_large not in (None, self.backend):
-            report = solve_with(self.for_large, program, x)
+            report = self._accept(solve_with(self.for_large, program, x))
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)
@@ -416,6 +416,10 @@ class SolverSession:
         )
         if self.pull > 0.0:
             report = replace(report, objective=objective_at(program, report.x))
+        return self._accept(report)
+
+    def _accept(self, report: SolverReport) -> SolverReport:
+        """Take an answer that violates rows by little, however the solve ended."""
         if report.status.usable or report.violation > self.acceptable:
             return report
         return replace(report, status=SolveStatus.ACCEPTABLE)
