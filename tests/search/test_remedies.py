@@ -145,6 +145,25 @@ def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
     assert brachis.plan(task).verified
 
 
+@pytest.mark.parametrize("more", ["scene", "margins"])
+def test_a_payload_is_no_advice_where_the_posture_alone_is_wrong(more):
+    q = [0.0, 0.3, 0.0, -1.2, 0.0, 0.8, 0.0]
+    keys = {
+        "scene": {"scene": [brachis.HalfSpace([0, 0, 1], offset=0.5, name="floor")]},
+        "margins": {"margins": {"joint_ends": 0.35}},
+    }[more]
+    with pytest.raises(brachis.errors.StartError) as caught:
+        brachis.plan(
+            "iiwa14",
+            start=q,
+            task_space="pose",
+            path=brachis.Line(by=[0.1, 0.0, 0.0]),
+            payload={"mass": 3.0},
+            **keys,
+        )
+    assert "payload" not in caught.value.hint
+
+
 @pytest.mark.parametrize("way", ["plan", "plan_many", "sweep"])
 def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
     trials = []

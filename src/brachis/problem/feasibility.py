@@ -183,7 +183,10 @@ def _check_at_rest(
 def load_remedies(
     robot: Robot, limit: Limit, column: int, ratio: float
 ) -> list[Remedy]:
-    """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload."""
+    """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload.
+
+    A payload changes nothing in a limit of postures alone.
+    """
     label = limit.labels[column]
     scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
     remedies = []
@@ -194,7 +197,7 @@ def load_remedies(
             enough = 1.05 * ratio * figure
             remedies.append(Remedy(label.key, figure, enough, label.unit))
     payload = robot.settings.payload
-    if payload is not None and payload.mass:
+    if payload is not None and payload.mass and not limit.is_of_postures:
         mass = payload.mass
         remedies.append(Remedy("robot.payload.mass", mass, mass / ratio, "kg"))
     return remedies
