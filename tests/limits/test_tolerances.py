@@ -236,17 +236,25 @@ def test_if_the_time_is_up_the_motion_without_tolerances_is_not_lost(
     assert found.t_end == pytest.approx(plain.t_end, rel=1e-9)
 
 
-def test_tolerances_that_gain_nothing_leave_the_tool_on_the_path():
+@pytest.fixture(scope="module", params=["auto", ["joint_1"]], ids=["chart", "joint"])
+def useless(request):
+    """A line of the iiwa, without and with a tolerance that gains nothing."""
     line = {
         "path": [brachis.Line(by=[0.0, 0.5, 0.0])],
         "start": [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0],
         "task_space": "pose",
+        "redundant_joints": request.param,
         "intervals": 8,
         "effort": "single",
     }
-    plain = brachis.plan("iiwa14", **line)
     tiny = {"orientation": {"roll": 1e-4}}
-    result = brachis.plan("iiwa14", tolerances=tiny, **line)
+    return [
+        brachis.plan("iiwa14", **line, **more) for more in ({}, {"tolerances": tiny})
+    ]
+
+
+def test_tolerances_that_gain_nothing_leave_the_tool_on_the_path(useless):
+    plain, result = useless
     assert result.verified
     assert result.t_end == pytest.approx(plain.t_end, rel=1e-9)
     assert result.candidate.origin == "without tolerances"
@@ -255,6 +263,23 @@ def test_tolerances_that_gain_nothing_leave_the_tool_on_the_path():
     assert not result.trajectory.position([0.0, 0.3])[:, -1].any()
     keys = {check.name for check in result.verification.checks}
     assert "tool range ratio" in keys
+
+
+def test_limits_of_a_tool_that_stays_on_the_path_cost_what_they_do_without_tolerances(
+    useless, tmp_path
+):
+    plain, result = useless
+    result.save(tmp_path / "motion.npz")
+    expected = plain.bottleneck()
+    for motion in (result, tmp_path / "motion.npz"):
+        found = brachis.bottleneck.report(motion)
+        assert found.t_end == pytest.approx(expected.t_end, rel=1e-9)
+        for own, other in zip(
+            found.sensitivities.limits, expected.sensitivities.limits, strict=True
+        ):
+            assert own.label == other.label
+            assert own.derivative == pytest.approx(other.derivative, rel=1e-2, abs=1e-6)
+        assert len(found.saturations) == len(expected.saturations)
 
 
 def test_a_path_that_needs_its_tolerances_is_searched():

@@ -27,10 +27,12 @@ from brachis.optimise.backends import solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, PathMap
 from brachis.optimise.least_motion import LeastMotion
 from brachis.problem.problem import Decomposition, Problem
+from brachis.robot import Robot, bind
 from brachis.robot.task_map import JointSpace
 from brachis.search.candidates import SELECTABLE
 from brachis.search.schedule import has_charts
 from brachis.search.starts import FAMILY, bring_onto_path
+from brachis.task import Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
@@ -129,6 +131,38 @@ def with_tolerances(planned: Planned, problem: Problem) -> Planned:
     )
     verification = verify_trajectory(motion, own_limits=problem.user_limits)
     return dataclasses.replace(planned, trajectory=motion, verification=verification)
+
+
+def without_tolerances(motion: Trajectory) -> Trajectory:
+    """Undo `with_tolerances`: the motion as one of its task without tolerances, of which it is an optimum.
+
+    A motion that has curves for the virtual joints of its tolerances stays as it is.
+    """
+    task = motion.task
+    wider = motion.robot
+    _, task_map = bind(wider, task.task_space, task.tolerances)
+    spline = motion.phase_splines[0]
+    is_timed = motion.phases[0].speed is None
+    curves = len(spline.control_points) - (1 if is_timed else 0)
+    if task.tolerances == Tolerances() or curves == wider.n - task_map.m:
+        return motion
+    task = task.model_copy(update={"tolerances": Tolerances()})
+    robot = Robot.from_settings(wider.settings, wider.source, wider.urdf)
+    robot, _ = bind(robot, task.task_space)
+    columns = [wider.joint_names.index(name) for name in robot.joint_names]
+    rows = motion.chart_rows
+    if rows.size:
+        rows = rows[..., [*columns, wider.n]]
+    return dataclasses.replace(
+        motion,
+        task=task,
+        robot=robot,
+        q=motion.q[:, columns],
+        qdot=motion.qdot[:, columns],
+        qddot=motion.qddot[:, columns],
+        qddot_before=motion.qddot_before[:, columns],
+        chart_rows=rows,
+    )
 
 
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
