@@ -151,3 +151,19 @@ def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():
     assert 4.99 < mean.max() < 5.001
     for own in (motion.q, motion.qdot, motion.qddot):
         np.testing.assert_allclose(own[-1], own[0], atol=1e-9 * np.abs(own).max())
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.1])
+def test_a_recorded_motion_is_checked_on_the_part_alone(factor, tmp_path):
+    result = brachis.plan(task(PART, rest="full"))
+    file = tmp_path / "motion.csv"
+    brachis.export.write(result.trajectory, file, dt=0.002)
+    asked = task({**PART, "speed": factor * SPEED})
+    found = brachis.import_motion(file, task=asked)
+    verification = brachis.verify_trajectory(found)
+    checks = {check.name: check for check in verification.checks}
+    assert checks["process speed"].value == pytest.approx(
+        abs(1.0 / factor - 1.0), abs=1e-6
+    )
+    assert checks["process speed"].passed == (factor == 1.0)
+    assert "s where process speeds begin and end" not in checks

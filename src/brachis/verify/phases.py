@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from brachis.path.legs import Leg
@@ -87,21 +89,24 @@ def times_of_stops(given: Given) -> np.ndarray:
 
 
 def check_process_speed(given: Given) -> list[Check]:
-    """Check that the tool has the given speed wherever it has one, and that a phase passes each such part."""
+    """Check that the tool has the given speed wherever it has one, and that a phase passes each such part.
+
+    The phases of a recorded motion are only those between its stops.
+    """
     legs = [leg for leg in given.legs if leg.speed is not None]
     if not legs:
         return []
     found = [_worst_deviation(given, leg) for leg in legs]
     worst = found[int(np.argmax([each.ratio for each in found]))]  # NaN too
     speed = (worst.ratio, _SPEED, "relative", worst.subject, worst.time, worst.remark)
+    check = Check("process speed", *speed)
+    if given.trajectory.recovered is not None:
+        return [check]
     title = "s where process speeds begin and end"
     misses = [_distance(_nearest_phase(given, leg), leg) for leg in legs]
     subjects = [each.subject for each in found]
     tolerance = given.options.progress_tolerance
-    return [
-        Check("process speed", *speed),
-        _check_worst(title, misses, tolerance, "-", subjects),
-    ]
+    return [check, _check_worst(title, misses, tolerance, "-", subjects)]
 
 
 def _worst_deviation(given: Given, leg: Leg) -> Worst:
@@ -113,9 +118,22 @@ def _worst_deviation(given: Given, leg: Leg) -> Worst:
         return np.abs(speeds / leg.speed - 1.0)[:, None] / _RESOLUTION
 
     phase = _nearest_phase(given, leg)
+    if given.trajectory.recovered is not None:
+        begin, end = _rows_within(given, leg)
+        phase = replace(phase, begin=begin, end=end)
     subject = f"tool, s = {leg.begin:g} to {leg.end:g}"
     worst = worst_between(given, deviations, (subject,), given.during(phase))
     return worst._replace(ratio=worst.ratio * _RESOLUTION)
+
+
+def _rows_within(given: Given, leg: Leg) -> tuple[float, float]:
+    """Return the times of the first and the last row of a recorded motion that lie in a leg, s."""
+    times = given.pieces.times
+    begin, end = given.pieces.times_of(np.array([leg.begin, leg.end]))
+    inside = times[(times >= begin) & (times <= end)]
+    if len(inside) < 2:
+        return float(begin), float(end)
+    return float(inside[0]), float(inside[-1])
 
 
 def _nearest_phase(given: Given, leg: Leg) -> MotionPhase:
