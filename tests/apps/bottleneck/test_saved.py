@@ -79,6 +79,15 @@ def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
     assert "report(motion, own_limits=[...])" in str(caught.value)
 
 
+def test_a_time_limit_that_is_too_short_is_no_other_optimum(slide, tmp_path):
+    trajectory = loaded(slide(intervals=10, rest="full"), tmp_path)
+    search = trajectory.task.search.model_copy(update={"time_limit": 1e-4})
+    task = trajectory.task.model_copy(update={"search": search})
+    with pytest.raises(PlanningError, match="the time was up before") as caught:
+        brachis.bottleneck.report(dataclasses.replace(trajectory, task=task))
+    assert "larger search.time_limit" in caught.value.hint
+
+
 def test_a_motion_of_another_branch_is_refused(scara, tmp_path):
     trajectory = loaded(scara("j3"), tmp_path)
     with pytest.raises(InputError, match="branch"):

@@ -70,7 +70,8 @@ def solve_again(
     InputError
         The closed form or the branch is not known here; see `brachis.plan`.
     PlanningError
-        The motion is not an optimum of its problem: no solver of the task came back to it.
+        The motion is not an optimum of its problem: no solver of the task came back to it; or the task's time limit
+        was too short for that.
     """
     task = trajectory.task
     deadline = Deadline.after(task.search.time_limit)
@@ -111,6 +112,14 @@ def solve_again(
             if -longest <= slower <= task.search.slower + 1e-3:
                 return refined
             ends.append(f"t_E = {refined.t_end:.6g} s by {refined.report.solver}")
+    if deadline.passed:
+        raise PlanningError(
+            f"the time was up before the saved motion (t_E = {trajectory.t_end:.6g} s) was solved again: its "
+            "sensitivities are unknown",
+            where="search.time_limit",
+            found=f"{task.search.time_limit:g} s",
+            hint="Run brachis bottleneck on the task file with a larger search.time_limit: it plans again",
+        )
     what = "a different optimum" if ends else "no optimum"
     raise PlanningError(
         f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
