@@ -16,7 +16,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from operator import attrgetter
 from types import NoneType
 from typing import (
     TYPE_CHECKING,
@@ -42,6 +41,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     Strict,
     Tag,
+    model_validator,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 from pydantic_core.core_schema import no_info_before_validator_function
@@ -89,22 +89,6 @@ class Model(BaseModel):
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
-    def check(self, *rules: tuple[object, str, str, str], at: str = "") -> Self:
-        """Return the model, unless its keys contradict each other.
-
-        Parameters
-        ----------
-        *rules : tuple of object, str, str, str
-            Whether the rule is broken; the key to blame, such as ``"spline.knots"``; what is wrong; what is allowed.
-        at : str, optional
-            Where the model is in the one that is validated, such as ``"path[2]."``.
-        """
-        for broken, key, problem, allowed in rules:
-            if broken:
-                found = attrgetter(key)(self)
-                raise refuse(problem, key=at + key, found=found, allowed=allowed)
-        return self
-
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
         return [
@@ -116,6 +100,27 @@ class Model(BaseModel):
     def __str__(self) -> str:
         """Show it as `repr` does."""
         return repr(self)
+
+
+Mistake = tuple[str, str, str]
+"""The key to blame, such as ``spline.knots`` or ``path[2].blend``; what is wrong; what is allowed."""
+
+
+class CheckedModel(Model):
+    """A model whose keys may contradict each other."""
+
+    def _mistakes(self) -> Iterator[Mistake]:
+        """Yield what is wrong with the keys together; the first mistake is the one that is reported."""
+        yield from ()
+
+    @model_validator(mode="after")
+    def _refuse_mistakes(self) -> Self:
+        for key, problem, allowed in self._mistakes():
+            found: Any = self
+            for part in re.findall(r"\w+", key):
+                found = found[int(part)] if part.isdecimal() else getattr(found, part)
+            raise refuse(problem, key=key, found=found, allowed=allowed)
+        return self
 
 
 def describe_fields(model: type) -> dict[str, str]:

@@ -12,16 +12,14 @@ Limits on the motion of the tool.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, make_dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Unpack
 
 import numpy as np
 from pydantic import (
     BeforeValidator,
     Field,
-    field_validator,
-    model_validator,
 )
 
 from brachis.common.words import write_count
@@ -30,6 +28,8 @@ from brachis.task.fields import (
     LARGEST,
     LEAST,
     ByForm,
+    CheckedModel,
+    Mistake,
     Model,
     Name,
     NonEmpty,
@@ -38,7 +38,6 @@ from brachis.task.fields import (
     Positive,
     must,
     plain,
-    refuse,
 )
 from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
 
@@ -229,7 +228,7 @@ _PathCoordinates = Annotated[
 ]
 
 
-class SpeedTable(Model):
+class SpeedTable(CheckedModel):
     """Largest speed of the tool along the path: linear between places, and as at the nearest one beyond them.
 
     A step is two speeds at the same place; at the place itself the lower one of them holds.
@@ -240,31 +239,27 @@ class SpeedTable(Model):
     speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
     """Largest speed at each path coordinate, m/s."""
 
-    @model_validator(mode="after")
-    def _is_a_table(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         for row, (before, place) in enumerate(itertools.pairwise(self.s), 1):
             if place < before:
-                raise refuse(
+                yield (
+                    f"s[{row}]",
                     "the path coordinates do not increase",
-                    key=f"s[{row}]",
-                    found=place,
-                    allowed=f">= {before:g}",
+                    f">= {before:g}",
                 )
-        thrice = [a for a, b in zip(self.s, self.s[2:], strict=False) if a == b]
-        return self.check(
-            (
-                len(self.speed) != len(self.s),
+        if len(self.speed) != len(self.s):
+            yield (
                 "speed",
                 "the numbers of path coordinates and speeds differ",
                 write_count(len(self.s), "speed"),
-            ),
-            (
-                thrice,
-                "s",
-                f"there are more than two speeds at s = {', '.join(f'{s:g}' for s in thrice[:1])}",
-                "each path coordinate once, or twice for a step",
-            ),
-        )
+            )
+        for place, after in zip(self.s, self.s[2:], strict=False):
+            if place == after:
+                yield (
+                    "s",
+                    f"there are more than two speeds at s = {place:g}",
+                    "each path coordinate once, or twice for a step",
+                )
 
 
 def _as_sequence(value: object) -> object:
@@ -294,7 +289,7 @@ class ProcessSpeed(Model):
     periodic. A stop needs room beside it."""
 
 
-class ToolLimits(Model):
+class ToolLimits(CheckedModel):
     """Limits on the motion of the tool itself, also where tolerances let it leave its path."""
 
     speed: Annotated[
@@ -315,34 +310,25 @@ class ToolLimits(Model):
     """Parts of the path with a constant speed: {speed, s}, or a list of these in order. Between two parts
     there must be a gap in which the speed can change."""
 
-    @field_validator("process_speed")
-    @classmethod
-    def _apart(cls, parts: tuple[ProcessSpeed, ...]) -> tuple[ProcessSpeed, ...]:
-        for number, (before, part) in enumerate(itertools.pairwise(parts), 1):
+    def _mistakes(self) -> Iterator[Mistake]:
+        for number, (before, part) in enumerate(
+            itertools.pairwise(self.process_speed), 1
+        ):
             end = before.s[1]
-            part.check(
-                (
-                    part.s[0] <= end,
-                    "s",
+            if part.s[0] <= end:
+                yield (
+                    f"process_speed[{number}].s",
                     "the parts of the path overlap, meet or are out of order",
                     f"a begin above {end:g}, the end of the part before; the speed changes in the gap",
-                ),
-                at=f"[{number}].",
-            )
-        return parts
-
-    @model_validator(mode="after")
-    def _speeds_agree(self) -> Self:
+                )
         for number, part in enumerate(self.process_speed):
             cap = _least_between(self.speed, part.s)
             if cap is not None and cap < part.speed:
-                raise refuse(
+                yield (
+                    f"process_speed[{number}].speed",
                     "the tool's largest speed is below the process speed",
-                    key=f"process_speed[{number}].speed",
-                    found=part.speed,
-                    allowed=f"at most {cap:g} m/s there, or a higher tool_limits.speed",
+                    f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )
-        return self
 
 
 def _least_between(

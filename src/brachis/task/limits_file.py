@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError
 
 from brachis.common.files import check_kind, locate_urdf, read_text
 from brachis.errors import TaskError, check_names
 from brachis.task.fields import (
+    CheckedModel,
     Flag,
+    Mistake,
     Model,
     Name,
     NonEmpty,
@@ -34,7 +36,7 @@ from brachis.task.settings import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
 
-class LimitsFile(Model):
+class LimitsFile(CheckedModel):
     """What a limits file says."""
 
     brachis_limits: Version
@@ -47,16 +49,13 @@ class LimitsFile(Model):
     """Limits as in robot.limits, without scale. A list is in the order of `joints`; one number holds for all of them.
     """
 
-    @model_validator(mode="after")
-    def _without_factors(self) -> Self:
-        return self.check(
-            (
-                self.limits.scale != LimitScale(),
+    def _mistakes(self) -> Iterator[Mistake]:
+        if self.limits.scale != LimitScale():
+            yield (
                 "limits.scale",
                 "a limits file cannot contain factors on limits",
                 "robot.limits.scale in the task",
             )
-        )
 
     def by_kind(self, where: str) -> dict[str, Any]:
         """Return the limits by kind and joint, and the one of all joints together; `where` names the file."""
@@ -81,7 +80,7 @@ _UR_JOINTS = {"shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "w
 _SUFFIX = "_joint"
 
 
-class RosJointLimits(Model):
+class RosJointLimits(CheckedModel):
     """Limits of one joint as ROS writes them, in SI units; a kind without figures and ``has_...`` is not stated."""
 
     has_position_limits: Flag | None = None
@@ -97,22 +96,18 @@ class RosJointLimits(Model):
     max_effort: Number | None = None
     angle_wraparound: Flag = False
 
-    @model_validator(mode="after")
-    def _figures_fit(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         for kind, (_, keys) in _ROS_KINDS.items():
             switch = f"has_{kind}_limits"
             has = getattr(self, switch)
-            figures = [getattr(self, key) for key in keys]
-            if has is False or (has is None and set(figures) == {None}):
-                continue
-            for key, figure in zip(keys, figures, strict=True):
-                small = kind != "position" and figure is not None and figure <= 0.0
-                missing = "this figure is missing"
-                self.check(
-                    (figure is None, key, missing, f"or {switch}: false"),
-                    (small, key, "out of range", f"> 0, or {switch}: false"),
-                )
-        return self
+            figures = {key: getattr(self, key) for key in keys}
+            if has is None:
+                has = set(figures.values()) != {None}
+            for key, figure in figures.items() if has else ():
+                if figure is None:
+                    yield key, "this figure is missing", f"or {switch}: false"
+                elif kind != "position" and figure <= 0.0:
+                    yield key, "out of range", f"> 0, or {switch}: false"
 
     def by_kind(self) -> dict[str, Any]:
         """Return the limits by our kinds: None where one is switched off; without those that are not stated."""

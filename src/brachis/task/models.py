@@ -6,9 +6,9 @@ and answers mistakes with a `brachis.errors.TaskError` that names the key.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from operator import attrgetter
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import (
     AfterValidator,
@@ -22,6 +22,8 @@ from pydantic import (
 from brachis.task.fields import (
     POSITION,
     ByForm,
+    CheckedModel,
+    Mistake,
     Model,
     Name,
     NonEmpty,
@@ -142,7 +144,7 @@ def _add_forms_of_paths(schema: dict[str, Any]) -> None:
     schema["anyOf"].append(in_frame)
 
 
-class Task(Model):
+class Task(CheckedModel):
     """A task: a robot, a path for its tool, and how to plan.
 
     Constructed directly it raises pydantic's own errors; `brachis.task.load_task` puts them in plain words.
@@ -295,150 +297,139 @@ class Task(Model):
             return f"[{', '.join(self.task_space)}]"
         return "a list of all joints"
 
-    @model_validator(mode="after")
-    def _start_fits(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
+        yield from self._mistakes_at_the_start()
+        yield from self._mistakes_in_the_path()
+        yield from self._mistakes_in_tolerances()
+        yield from self._mistakes_in_splines()
+
+    def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]
-        unread = isinstance(first, CsvSegment) and not first.csv.relative
-        free = self.start == "free"
-        open_start = free and self.path_start is None and self.start_place is None
-        joints = self.task_space == "joints"
-        given = self.path_start is not None
-        of_pose = isinstance(self.path_start, ToolPose)
-        return self.check(
-            (
-                open_start and joints and not unread,
-                "start",
-                "a path of joints that does not begin with a waypoint needs a start posture",
-                "{joints: [...]}",
-            ),
-            (
-                open_start and not unread,
+        is_unread = isinstance(first, CsvSegment) and not first.csv.relative
+        is_free = self.start == "free"
+        is_given = self.path_start is not None
+        is_pose = isinstance(self.path_start, ToolPose)
+        if is_free and not (is_given or is_unread) and self.start_place is None:
+            if self.task_space == "joints":
+                yield (
+                    "start",
+                    "a path of joints that does not begin with a waypoint needs a start posture",
+                    "{joints: [...]}",
+                )
+            yield (
                 "path_start",
                 "with a free start posture, the start of the path is missing",
                 self._start_forms,
-            ),
-            (
-                free and self.search.guesses == "numeric",
+            )
+        if is_free and self.search.guesses == "numeric":
+            yield (
                 "search.guesses",
                 "numeric inverse kinematics needs a posture to begin with, and start is free",
                 "lattice",
-            ),
-            (
-                given and self.of_poses and not of_pose,
+            )
+        if is_given and self.of_poses and not is_pose:
+            yield (
                 "path_start",
                 "a list does not state its convention, such as whether w of a quaternion is first or last",
                 self._start_forms,
-            ),
-            (
-                of_pose and not self.of_poses,
+            )
+        if is_pose and not self.of_poses:
+            yield (
                 "path_start",
                 "a position with an orientation needs a task space of poses",
                 self._start_forms,
-            ),
-        )
+            )
 
-    @model_validator(mode="after")
-    def _path_fits(self) -> Self:
-        name = self.path_frame
-        frame = f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} in the task"
-        joints = self.task_space == "joints"
-        no_choice = "a path of joints leaves no choice of postures"
+    def _mistakes_in_the_path(self) -> Iterator[Mistake]:
         last = self.path[-1]
-        last.check(
-            (
-                last.blend is not None,
-                "blend",
+        at = f"path[{len(self.path) - 1}]."
+        if last.blend is not None:
+            yield (
+                f"{at}blend",
                 "the last segment has no corner to blend",
                 "no blend on the last segment",
-            ),
-            (
-                last.stop,
-                "dwell" if last.dwell else "stop",
+            )
+        if last.stop:
+            yield (
+                f"{at}dwell" if last.dwell else f"{at}stop",
                 "the last segment cannot stop: the path ends there, and the motion with it",
                 "no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
-            ),
-            at=f"path[{len(self.path) - 1}].",
-        )
-        return self.check(
-            (
-                name is not None and name not in self.frames,
+            )
+        name = self.path_frame
+        if name is not None and name not in self.frames:
+            yield (
                 "path_frame",
                 "this frame is not defined in frames",
-                ", ".join(self.frames) or frame,
-            ),
-            (
-                name is not None and joints,
+                ", ".join(self.frames)
+                or f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} in the task",
+            )
+        if self.task_space != "joints":
+            return
+        if name is not None:
+            yield (
                 "path_frame",
                 "a path of joints cannot be in a frame",
                 "null, with task_space: joints",
-            ),
-            *(
-                (
-                    joints and attrgetter(key)(self) != default,
+            )
+        for key, default in (
+            ("redundant_joints", "auto"),
+            ("branch", "auto"),
+            ("search.guesses", "lattice"),
+            ("margins.singularity", None),
+        ):
+            if attrgetter(key)(self) != default:
+                yield (
                     key,
-                    no_choice,
+                    "a path of joints leaves no choice of postures",
                     f"{default}, with task_space: joints",
                 )
-                for key, default in (
-                    ("redundant_joints", "auto"),
-                    ("branch", "auto"),
-                    ("search.guesses", "lattice"),
-                    ("margins.singularity", None),
-                )
-            ),
-        )
 
-    @model_validator(mode="after")
-    def _tolerances_fit(self) -> Self:
+    def _mistakes_in_tolerances(self) -> Iterator[Mistake]:
         asked = self.tolerances
         of_places = self.of_poses or self.task_space == POSITION
-        return self.check(
-            (
-                asked.orientation != OrientationTolerance() and not self.of_poses,
+        if asked.orientation != OrientationTolerance() and not self.of_poses:
+            yield (
                 "tolerances.orientation",
                 "the path does not prescribe the orientation",
                 "tolerances of the orientation with task_space: pose",
-            ),
-            (
-                asked.position != PositionTolerance() and not of_places,
+            )
+        if asked.position != PositionTolerance() and not of_places:
+            yield (
                 "tolerances.position",
                 "the path does not prescribe the whole position",
                 "tolerances of the position with task_space: position or pose",
-            ),
-            (
-                asked.orientation.roll is not None and self.task_space != "pose",
+            )
+        if asked.orientation.roll is not None and self.task_space != "pose":
+            yield (
                 "tolerances.orientation.roll",
                 "the roll is free in this task space",
                 "task_space: pose with it",
-            ),
-        )
+            )
 
-    @model_validator(mode="after")
-    def _splines_fit(self) -> Self:
+    def _mistakes_in_splines(self) -> Iterator[Mistake]:
         spline = self.spline
-        # Both ends fix a value and the derivatives that vanish.
-        least = 2 * spline.vanishing + 3 - spline.degree
-        few = spline.intervals != "auto" and spline.intervals < least
-        return self.check(
-            (
-                self.boundary.in_motion and spline.knots == "free",
+        if self.boundary.in_motion and spline.knots == "free":
+            yield (
                 "spline.knots",
                 "free knots need a motion that begins and ends at rest",
                 "uniform, or a boundary at rest",
-            ),
-            (
-                self.boundary.periodic and self.end != "free",
-                "end",
-                "the end posture of a periodic motion is its start posture",
-                "free",
-            ),
-            (
-                few and not self.boundary.periodic,
+            )
+        if self.boundary.periodic:
+            if self.end != "free":
+                yield (
+                    "end",
+                    "the end posture of a periodic motion is its start posture",
+                    "free",
+                )
+            return
+        # Both ends fix a value and the derivatives that vanish.
+        least = 2 * spline.vanishing + 3 - spline.degree
+        if spline.intervals != "auto" and spline.intervals < least:
+            yield (
                 "spline.intervals",
                 f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals",
                 f">= {least}, or auto",
-            ),
-        )
+            )
 
     @property
     def collision_mode(self) -> str:

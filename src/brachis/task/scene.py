@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from brachis.common.files import absolute_path, read_text
 from brachis.errors import TaskError
 from brachis.task.fields import (
+    CheckedModel,
     Flag,
+    Mistake,
     Model,
     Name,
     NonNegative,
@@ -48,7 +50,7 @@ class HalfSpaceShape(Model):
     """Distance of the plane from the origin along the normal, m."""
 
 
-class SceneBody(Model):
+class SceneBody(CheckedModel):
     """A body that the robot keeps clear of, fixed to the world or to one of the robot's links; it has one shape."""
 
     name: Name | None = None
@@ -96,8 +98,7 @@ class SceneBody(Model):
         """Where it is in the world, or in the link's frame."""
         return Placement(xyz=self.position, rpy_deg=self.rpy_deg)
 
-    @model_validator(mode="after")
-    def _has_one_shape(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         given = [key for key in SHAPES if getattr(self, key) is not None]
         if len(given) != 1:
             raise refuse(
@@ -105,15 +106,17 @@ class SceneBody(Model):
                 found=given or "none",
                 allowed=f"one of {', '.join(SHAPES)}",
             )
-        is_plane = self.half_space is not None
-        allowed = "normal and offset in half_space"
-        fixed = "a half-space is fixed to the world"
-        stands = "a half-space has no other place than its plane"
-        return self.check(
-            (is_plane and self.link is not None, "link", fixed, "null"),
-            (is_plane and any(self.position), "position", stands, allowed),
-            (is_plane and any(self.rpy_deg), "rpy_deg", stands, allowed),
-        )
+        if self.half_space is None:
+            return
+        if self.link is not None:
+            yield "link", "a half-space is fixed to the world", "null"
+        for key in ("position", "rpy_deg"):
+            if any(getattr(self, key)):
+                yield (
+                    key,
+                    "a half-space has no other place than its plane",
+                    "normal and offset in half_space",
+                )
 
 
 class CollisionSettings(Model):

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     BeforeValidator,
@@ -25,8 +25,10 @@ from pydantic import (
 from brachis.task.fields import (
     POSITION,
     ByKey,
+    CheckedModel,
     Count,
     Flag,
+    Mistake,
     Model,
     Name,
     NonEmpty,
@@ -57,7 +59,7 @@ SMOOTHNESS = 3
 """Derivatives that a path must have."""
 
 
-class BSplineCurve(Model):
+class BSplineCurve(CheckedModel):
     """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
 
     degree: Annotated[Count, Field(ge=SMOOTHNESS + 1, le=15)] = 5
@@ -82,8 +84,7 @@ class BSplineCurve(Model):
         """Whether the control points say how the tool turns."""
         return len(self.control_points[0]) == 7
 
-    @model_validator(mode="after")
-    def _knots_fit(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         knots = self.knots
         outer = self.degree + 1
         needed = len(self.control_points) + outer
@@ -94,34 +95,32 @@ class BSplineCurve(Model):
                 found=len(knots),
                 allowed=f"{needed}: control points + degree + 1",
             )
+        if len({len(point) for point in self.control_points}) > 1:
+            yield (
+                "control_points",
+                "control points differ in their number of coordinates",
+                "one",
+            )
         ends = (knots[0], knots[-1])
         clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
+        if not clamped or list(knots) != sorted(knots):
+            yield (
+                "knots",
+                "the B-spline is not clamped",
+                "ascending knots, the first and the last one degree + 1 times",
+            )
         allowed = self.degree - SMOOTHNESS
         often = [
             count
             for knot, count in Counter(knots).items()
             if count > (outer if knot in ends else allowed)
         ]
-        return self.check(
-            (
-                len({len(point) for point in self.control_points}) > 1,
-                "control_points",
-                "control points differ in their number of coordinates",
-                "one",
-            ),
-            (
-                not clamped or list(knots) != sorted(knots),
+        if often:
+            yield (
                 "knots",
-                "the B-spline is not clamped",
-                "ascending knots, the first and the last one degree + 1 times",
-            ),
-            (
-                often,
-                "knots",
-                f"a knot occurs {max(often, default=0)} times, so often that a derivative up to the third jumps",
+                f"a knot occurs {max(often)} times, so often that a derivative up to the third jumps",
                 f"{allowed} times at most",
-            ),
-        )
+            )
 
 
 Yaw = Annotated[
@@ -220,7 +219,7 @@ class HelixTurns(Model):
     """Axis of rotation, right-hand rule; any length except zero."""
 
 
-class SplineThrough(Model):
+class SplineThrough(CheckedModel):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
     through: NonEmpty[Coordinates]
@@ -257,8 +256,7 @@ class SplineThrough(Model):
         places, turns = zip(*poses, strict=True)
         return {**content, "through": places, "orientations": turns}
 
-    @model_validator(mode="after")
-    def _orientations_fit(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         count = len(self.through)
         if self.orientations is not None and len(self.orientations) != count:
             raise refuse(
@@ -267,14 +265,12 @@ class SplineThrough(Model):
                 found=len(self.orientations),
                 allowed=f"{count}, as there are waypoints in through",
             )
-        return self.check(
-            (
-                self.orientations is None and self.starts_oriented is not None,
+        if self.orientations is None and self.starts_oriented is not None:
+            yield (
                 "starts_oriented",
                 "an orientation at the start needs orientations at the waypoints",
                 "orientations as well",
             )
-        )
 
 
 def are_matrices(values: Any) -> bool:
@@ -292,7 +288,7 @@ ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its f
 _Start = tuple[tuple[float, ...], Attitude | None]
 
 
-class SegmentModel(Model):
+class SegmentModel(CheckedModel):
     """What all segments share."""
 
     blend: Positive | None = None
@@ -311,28 +307,21 @@ class SegmentModel(Model):
             return {"stop": True, **content}
         return content
 
-    @model_validator(mode="after")
-    def _stop_fits(self) -> Self:
-        return self.check(
-            (
-                0.0 < self.dwell < 1e-3,
+    def _mistakes(self) -> Iterator[Mistake]:
+        if 0.0 < self.dwell < 1e-3:
+            yield (
                 "dwell",
                 "the dwell is shorter than a cycle of a robot's controller",
                 "0, or 0.001 s and more",
-            ),
-            (
-                self.dwell and not self.stop,
-                "stop",
-                "a dwell needs a stop",
-                "true, or no dwell",
-            ),
-            (
-                self.stop and self.blend is not None,
+            )
+        if self.dwell and not self.stop:
+            yield "stop", "a dwell needs a stop", "true, or no dwell"
+        if self.stop and self.blend is not None:
+            yield (
                 "blend",
                 "the tool stops at the end of this segment, so its corner is not rounded",
                 "either blend, or stop (or dwell)",
-            ),
-        )
+            )
 
     def __add__(
         self, other: SegmentModel | tuple[SegmentModel, ...]
@@ -376,17 +365,15 @@ class MovingSegment(SegmentModel):
     """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
     Null: the `orientations` of a spline, else fixed."""
 
-    @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
+        yield from super()._mistakes()
         has_own = getattr(self.shape, "has_orientations", False)
-        return self.check(
-            (
-                self.orientation is not None and has_own,
+        if self.orientation is not None and has_own:
+            yield (
                 "orientation",
                 f"the {self.kind} already has orientations",
                 f"orientation, or the orientations of the {self.kind} itself, not both",
             )
-        )
 
 
 class LineSegment(MovingSegment):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from brachis.task.fields import (
     ByForm,
+    CheckedModel,
     Count,
     Flag,
+    Mistake,
     Model,
     Name,
     NonEmpty,
@@ -185,7 +188,7 @@ Intervals = Annotated[
 ]
 
 
-class SplineSettings(Model):
+class SplineSettings(CheckedModel):
     """The B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(default=3, ge=2, le=7)
@@ -213,25 +216,21 @@ class SplineSettings(Model):
         """How many derivatives of the joint positions vanish at both ends and at stops."""
         return _VANISHING[self.rest]
 
-    @model_validator(mode="after")
-    def _keys_agree(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         order = self.vanishing
-        most = min(order, self.degree)
-        lower = [word for word, level in _VANISHING.items() if level < most]
-        return self.check(
-            (
-                order > 1 and self.degree <= order,
+        if order > 1 and self.degree <= order:
+            lower = [word for word, level in _VANISHING.items() if level < self.degree]
+            yield (
                 "degree",
                 f"rest: {self.rest} needs {order} continuous derivatives, zero at the ends: the degree is too low",
                 f">= {order + 1}, or rest: {' or '.join(lower)}",
-            ),
-            (
-                self.knots == "free" and self.intervals == "auto",
+            )
+        if self.knots == "free" and self.intervals == "auto":
+            yield (
                 "intervals",
                 "knots: free needs a number of intervals; auto is the default",
                 "a number such as 12, or knots: uniform",
-            ),
-        )
+            )
 
 
 Jobs = Annotated[
@@ -240,7 +239,7 @@ Jobs = Annotated[
 ]
 
 
-class SearchSettings(Model):
+class SearchSettings(CheckedModel):
     """The search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
@@ -264,16 +263,13 @@ class SearchSettings(Model):
     slower: Share = Field(default=0.0, ge=0.0, le=1.0)
     """How much slower the smoothest motion may be, for example 1 % or 0.01."""
 
-    @model_validator(mode="after")
-    def _slower_is_for_least_motion(self) -> Self:
-        return self.check(
-            (
-                self.slower and not self.least_motion,
+    def _mistakes(self) -> Iterator[Mistake]:
+        if self.slower and not self.least_motion:
+            yield (
                 "slower",
                 "a slower motion is possible only with least_motion: true",
                 "0, or least_motion: true",
             )
-        )
 
 
 class SolverSettings(Model):
@@ -306,7 +302,7 @@ def expand_solver_name(solver: object) -> object:
     return {"name": solver} if isinstance(solver, str) else solver
 
 
-class BoundarySettings(Model):
+class BoundarySettings(CheckedModel):
     """Speeds at both ends of the path, or a motion that goes round for ever."""
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
@@ -319,19 +315,14 @@ class BoundarySettings(Model):
     """Whether a closed path is repeated without stopping: posture, velocity and acceleration at its end equal those at
     its start. With spline.degree: 2 the acceleration jumps there."""
 
-    @model_validator(mode="after")
-    def _periodic_has_no_ends(self) -> Self:
-        return self.check(
-            *(
-                (
-                    self.periodic and getattr(self, key),
+    def _mistakes(self) -> Iterator[Mistake]:
+        for key in ("start_speed", "end_speed"):
+            if self.periodic and getattr(self, key):
+                yield (
                     key,
                     "a periodic motion has no ends, so its speed there cannot be set",
                     "0, or periodic: false",
                 )
-                for key in ("start_speed", "end_speed")
-            )
-        )
 
     @property
     def in_motion(self) -> bool:

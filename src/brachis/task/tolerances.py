@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Annotated, Literal, Self
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Literal
 
 from pydantic import (
     AfterValidator,
     Field,
-    model_validator,
 )
 
 from brachis.task.fields import (
     POSITION,
     ByForm,
+    CheckedModel,
+    Mistake,
     Model,
     Number,
     Positive,
@@ -55,21 +56,22 @@ _Roll = Annotated[_EndsOrFree, _range_within(180.0)]
 _Distance = Annotated[_Ends, _range_within(_FARTHEST)]
 
 
-def _check_within(given: Model, largest: str, ranges: Iterable[str]) -> None:
-    """Refuse ranges that lie outside the cone or sphere beside them."""
+def _ranges_outside(
+    given: Model, largest: str, ranges: Iterable[str]
+) -> Iterator[Mistake]:
+    """Yield the ranges that lie outside the cone or sphere beside them."""
     reach = getattr(given, largest)
     for key in ranges:
         ends = getattr(given, key)
         if reach is not None and ends is not None and min(-ends[0], ends[1]) <= -reach:
-            raise refuse(
+            yield (
+                key,
                 f"the range lies outside {largest}: {reach:g}",
-                key=key,
-                found=ends,
-                allowed=f"a range of which a part is within {reach:g} of zero",
+                f"a range of which a part is within {reach:g} of zero",
             )
 
 
-class OrientationTolerance(Model):
+class OrientationTolerance(CheckedModel):
     """How far the tool may turn away from the orientation of the path, about the axes of the tool frame."""
 
     tilt: Annotated[Positive, Field(le=80.0)] | None = None
@@ -82,13 +84,11 @@ class OrientationTolerance(Model):
     roll: _Roll = None
     """Angle by which the tool turns about its own z axis, degrees: a number, [low, high], or free."""
 
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
-        _check_within(self, "tilt", ("lead", "side"))
-        return self
+    def _mistakes(self) -> Iterator[Mistake]:
+        return _ranges_outside(self, "tilt", ("lead", "side"))
 
 
-class PositionTolerance(Model):
+class PositionTolerance(CheckedModel):
     """How far the tool may be from the position that the path states."""
 
     sphere: Annotated[Positive, Field(le=_FARTHEST)] | None = None
@@ -103,18 +103,15 @@ class PositionTolerance(Model):
     axes: Literal["tool", "world"] = "tool"
     """Axes of x, y and z: those of the path's orientation, or those of the world."""
 
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _mistakes(self) -> Iterator[Mistake]:
         given = [axis for axis in POSITION if getattr(self, axis) is not None]
-        _check_within(self, "sphere", given)
-        return self.check(
-            (
-                self.axes == "world" and len(given) < len(POSITION),
+        yield from _ranges_outside(self, "sphere", given)
+        if self.axes == "world" and len(given) < len(POSITION):
+            yield (
                 "axes",
                 "a box along the world's axes needs all three lengths",
                 f"x, y and z with it (there is {' and '.join(given) or 'none'}), or axes: tool",
             )
-        )
 
 
 class Tolerances(Model):
