@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -30,6 +31,8 @@ class TorqueDerivatives:
 class SharedTorques:
     """A joint motion whose torques, and their derivatives, are computed once for all who ask.
 
+    What the methods return is not to be written to.
+
     Attributes
     ----------
     q, qdot, qddot : (K, n) ndarray
@@ -40,29 +43,26 @@ class SharedTorques:
     qddot: np.ndarray
 
     @cached_property
-    def _known(self) -> dict[tuple[str, Chain], Any]:
+    def _known(self) -> dict[Callable[..., Any], Any]:
         return {}
 
+    def _compute_once(self, function: Callable[..., Any]) -> Any:
+        """Return a function of position, velocity and acceleration for this motion."""
+        if function not in self._known:
+            self._known[function] = function(self.q, self.qdot, self.qddot)
+        return self._known[function]
+
     def torque(self, robot: Robot) -> np.ndarray:
-        """Joint torques, (K, n); not to be written to."""
+        """Joint torques, (K, n)."""
         return self.torque_of(robot.chain)
 
     def torque_of(self, chain: Chain) -> np.ndarray:
-        """Joint torques of a chain, (K, n); not to be written to."""
-        key = "torque", chain
-        if key not in self._known:
-            self._known[key] = chain.torques(self.q, self.qdot, self.qddot)
-        found: np.ndarray = self._known[key]
-        return found
+        """Joint torques of a chain, (K, n)."""
+        return np.asarray(self._compute_once(chain.torques))
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
-        """Return the derivatives of the joint torques; not to be written to."""
-        key = "derivatives", robot.chain
-        if key not in self._known:
-            states = self.q, self.qdot, self.qddot
-            self._known[key] = torque_derivatives(robot, *states)
-        found: TorqueDerivatives = self._known[key]
-        return found
+        """Return the derivatives of the joint torques."""
+        return TorqueDerivatives(*self._compute_once(robot.chain.torque_derivatives))
 
 
 def torque(
