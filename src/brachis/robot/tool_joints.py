@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from brachis.task import Tolerances
-from brachis.task.tolerances import OrientationTolerance, PositionTolerance
+from brachis.task.fields import POSITION
 
 FREE_ROLL = "pose_free_roll"
 """The task space of poses whose roll about the tool axis is free."""
@@ -84,50 +84,33 @@ def tool_joints_of(
     not asked for are a little wider, so that the cone, sphere or box itself is the limit.
     """
     given = tolerances or Tolerances()
-    ranges = _angles(given.orientation) | _lengths(given.position)
+    ranges: dict[str, _Range] = {}
+    for way in _DIRECTIONS:
+        part = "orientation" if way in _TURNING else "position"
+        ends = getattr(getattr(given, part), way)
+        if ends == "free":
+            ranges[way] = _FREE
+        elif ends is not None:
+            low, high = map(math.radians, ends) if way in _TURNING else ends
+            ranges[way] = (low, high, f"tolerances.{part}.{way}")
+    if given.position.axes == "world":
+        reach = math.hypot(*(max(map(abs, ranges[axis][:2])) for axis in POSITION))
+        for axis in POSITION:
+            ranges[axis] = _within(None, reach, ranges[axis][2])
+    cone = math.radians(given.orientation.tilt or math.inf)
+    for reach, key, ways in (
+        (cone, "tolerances.orientation.tilt", ("lead", "side")),
+        (given.position.sphere or math.inf, "tolerances.position.sphere", POSITION),
+    ):
+        for way in ways if reach < math.inf else ():
+            ranges[way] = _within(ranges.get(way), reach, key)
     if space == FREE_ROLL:
         ranges["roll"] = _FREE
     return tuple(ToolJoint(way, *ranges[way]) for way in _DIRECTIONS if way in ranges)
 
 
-def _angles(given: OrientationTolerance) -> dict[str, _Range]:
-    """Return the ranges of the joints that turn."""
-    ranges: dict[str, _Range] = {}
-    for way in _TURNING:
-        ends = getattr(given, way)
-        if ends == "free":
-            ranges[way] = _FREE
-        elif ends is not None:
-            low, high = map(math.radians, ends)
-            ranges[way] = (low, high, f"tolerances.orientation.{way}")
-    if given.tilt is not None:
-        key = "tolerances.orientation.tilt"
-        for way in ("lead", "side"):
-            ranges[way] = _within(ranges.get(way), math.radians(given.tilt), key)
-    return ranges
-
-
-def _lengths(given: PositionTolerance) -> dict[str, _Range]:
-    """Return the ranges of the joints that slide."""
-    box = {way: getattr(given, way) for way in "xyz"}
-    ranges: dict[str, _Range] = {
-        way: (*ends, f"tolerances.position.{way}")
-        for way, ends in box.items()
-        if ends is not None
-    }
-    if given.axes == "world":
-        reach = math.hypot(*(max(map(abs, ends)) for ends in box.values()))
-        for way, (*_, key) in ranges.items():
-            ranges[way] = _within(None, reach, key)
-    if given.sphere is not None:
-        key = "tolerances.position.sphere"
-        for way in box:
-            ranges[way] = _within(ranges.get(way), given.sphere, key)
-    return ranges
-
-
 def _within(given: _Range | None, reach: float, key: str) -> _Range:
     """Cut a range down to a little more than both sides of zero; without one, `key` is what sets it."""
-    wide = 1.01 * reach  # so that the cone, sphere or box itself is the limit
+    wide = 1.01 * reach
     low, high, own_key = given or (-wide, wide, key)
     return max(low, -wide), min(high, wide), own_key
