@@ -13,7 +13,6 @@ from brachis.path.rotations import (
     hat,
     product,
     quaternion_derivatives,
-    rotation_from,
     rotation_of,
     sine_cosine,
     unit,
@@ -119,8 +118,8 @@ def test_orientations_of_a_task():
         (Attitude(quaternion_wxyz=tuple(quaternion)), 1e-15),
         (Attitude(quaternion_wxyz=tuple(np.round(quaternion, 3))), 2e-3),
     ):
-        assert (rotation_from(attitude).inv() * expected).magnitude() < tolerance
-        assert np.linalg.norm(quaternions_of(rotation_from(attitude))) == pytest.approx(
+        assert (attitude.rotation.inv() * expected).magnitude() < tolerance
+        assert np.linalg.norm(quaternions_of(attitude.rotation)) == pytest.approx(
             1.0, abs=1e-15
         )
 

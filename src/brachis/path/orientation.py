@@ -19,7 +19,6 @@ from brachis.path.protocol import Array, Curve, Orientation
 from brachis.path.rotations import (
     hat,
     product,
-    rotation_from,
     rotation_of,
     sine_cosine,
     unit,
@@ -102,7 +101,7 @@ def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
         angle = float(np.deg2rad(rotate.angle_deg))
         return Turn(start, axis, angle, rotate.profile == "smooth")
     smooth = turning.to.profile == "smooth"
-    return turn_between(start, rotation_from(turning.to), f"{key}.to", smooth=smooth)
+    return turn_between(start, turning.to.rotation, f"{key}.to", smooth=smooth)
 
 
 def turn_between(

@@ -17,8 +17,7 @@ import numpy as np
 
 from brachis.kernel import body_twists
 from brachis.path.protocol import Array
-from brachis.task import Attitude
-from brachis.task.points.units import quaternions_of, rotation_by
+from brachis.task.points.units import quaternions_of
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -94,12 +93,6 @@ def rotation_of(matrix: Array) -> Rotation:
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(matrix)
-
-
-def rotation_from(attitude: Attitude) -> Rotation:
-    """Return an orientation as a task gives it."""
-    convention, values = attitude.convention_and_numbers
-    return rotation_by(convention, np.array(values))
 
 
 def quaternion_product(one: Array, other: Array) -> Array:

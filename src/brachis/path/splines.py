@@ -22,7 +22,6 @@ from brachis.path.pose import (
 from brachis.path.protocol import Array, MappedCurve
 from brachis.path.rotations import (
     quaternion_product,
-    rotation_from,
     rotation_of,
 )
 from brachis.robot.plausibility import place_hint, turn_hint
@@ -123,10 +122,10 @@ def _rotations(
 ) -> Rotation:
     """Return the n rotations at the start and the waypoints."""
     start = rotation_of(matrix)
-    given = [rotation_from(attitude) for attitude in shape.orientations or ()]
+    given = [attitude.rotation for attitude in shape.orientations or ()]
     expected = start
     if shape.starts_oriented is not None:
-        expected = rotation_from(shape.starts_oriented)
+        expected = shape.starts_oriented.rotation
         angle = (start.inv() * expected).magnitude()
         if not shape.relative and angle > START_TOLERANCE:
             raise _starts_elsewhere(

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     ConfigDict,
@@ -22,7 +23,10 @@ from pydantic import (
 )
 
 from brachis.task.fields import ByForm, ByKey, Model, Number, must, refuse
-from brachis.task.points.units import CONVENTIONS, choices
+from brachis.task.points.units import CONVENTIONS, choices, rotation_by
+
+if TYPE_CHECKING:
+    from scipy.spatial import transform
 
 Vector3 = tuple[Number, Number, Number]
 
@@ -112,13 +116,13 @@ class Attitude(Model):
         return {key: value for key, value in dump(self).items() if value is not None}
 
     @property
-    def convention_and_numbers(self) -> tuple[str, tuple[float, ...]]:
-        """Name of the convention in `brachis.task.points.units`, and the numbers: quaternions, or angles in rad."""
+    def rotation(self) -> transform.Rotation:
+        """The orientation as SciPy's rotation."""
         stated = self.model_dump(include=set(Attitude.model_fields))
         ((key, values),) = stated.items()
         if key.endswith(_DEGREES):
-            return key.removesuffix(_DEGREES), tuple(map(math.radians, values))
-        return key, values
+            values = np.radians(values)
+        return rotation_by(key.removesuffix(_DEGREES), np.asarray(values))
 
 
 _ONE_OF: list[JsonValue] = [{"required": [key]} for key in Attitude.model_fields]

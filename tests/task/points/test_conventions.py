@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.path.rotations import rotation_from
 from brachis.task.orientation import Attitude
 from brachis.task.points.units import CONVENTIONS, rotation_by
 
@@ -43,7 +42,7 @@ QUARTERS = {
 def test_angles_are_turns_about_single_axes(name):
     assert (rotation_by(name, ANGLES).inv() * EXPECTED[name]).magnitude() < 1e-15
     attitude = Attitude.model_validate({f"{name}_deg": np.degrees(ANGLES).tolist()})
-    assert (rotation_from(attitude).inv() * EXPECTED[name]).magnitude() < 1e-14
+    assert (attitude.rotation.inv() * EXPECTED[name]).magnitude() < 1e-14
 
 
 @pytest.mark.parametrize("name", QUARTERS)

@@ -14,7 +14,6 @@ from brachis.kernel import Prescribed, rotation_vectors
 from brachis.robot.joints import principal
 from brachis.robot.task_map.protocol import POSE_ROWS, TaskMap
 from brachis.task import ToolPose
-from brachis.task.points.units import rotation_by
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,9 +41,8 @@ class Pose(TaskMap):
                 found=list(stated),
                 allowed="a position with an orientation (ToolPose)",
             )
-        convention, values = stated.convention_and_numbers
-        rotation = rotation_by(convention, np.array(values))
-        return np.concatenate([stated.position, rotation.as_matrix().ravel()])
+        rotation = stated.rotation.as_matrix()
+        return np.concatenate([stated.position, rotation.ravel()])
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return positions and rotation matrices row by row, (K, 12)."""
