@@ -18,11 +18,11 @@ from brachis.errors import PathError
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN, UNITS
 from brachis.robot.plausibility import (
-    Check,
     Issue,
+    angle_issue,
     distance_hint,
-    find_issues,
     find_locked_in_degrees,
+    issue_above,
     link_lengths,
     reach,
 )
@@ -91,10 +91,12 @@ Some of the largest figures are ratios to the robot's own measure.
 """
 
 
-def _figure(key: str, value: float, scale: float = 1.0, where: str = "") -> Check:
+def _figure(
+    key: str, value: float, scale: float = 1.0, where: str = ""
+) -> Iterator[Issue]:
     """Compare a value with `scale` times the largest usual one."""
     message, largest, unit, aside = USUAL[key]
-    return Check(where or key, message, value, largest * scale, unit, aside)
+    return issue_above(where or key, message, value, largest * scale, unit, aside)
 
 
 def of_task(task: Task) -> tuple[Issue, ...]:
@@ -109,19 +111,18 @@ def of_task(task: Task) -> tuple[Issue, ...]:
         for fit in task.fits
         if fit.doubt
     ]
-    figures = [*_tool(task), *_bodies(task)]
-    return (*find_issues(figures), *_angles(task), *of_points)
+    return (*_tool(task), *_bodies(task), *_angles(task), *of_points)
 
 
-def _bodies(task: Task) -> Iterator[Check]:
+def _bodies(task: Task) -> Iterator[Issue]:
     """Compare sizes and places of a scene's bodies, and what keeps clear of them, with a large cell."""
     for body in task.scene:
         largest = max(body.size, *map(abs, body.position))
-        yield _figure("scene", largest, where=f"scene: {body.name}")
+        yield from _figure("scene", largest, where=f"scene: {body.name}")
     settings = task.collisions
-    yield _figure("collisions", settings.clearance, where="collisions.clearance")
+    yield from _figure("collisions", settings.clearance, where="collisions.clearance")
     for link, more in settings.padding.items():
-        yield _figure("collisions", more, where=f"collisions.padding.{link}")
+        yield from _figure("collisions", more, where=f"collisions.padding.{link}")
 
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
@@ -129,25 +130,25 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
     task_map = problem.task_map
     along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
     of_joints = isinstance(task_map, JointSpace)
-    figures: list[Check] = []
+    issues: list[Issue] = []
     for key, given in (
         ("start.joints", problem.start),
         ("path", along if of_joints else None),
         ("end.joints", problem.end),
     ):
         if given is not None:
-            figures += _positions(task_map.robot, key, given, may_wind=of_joints)
+            issues += _positions(task_map.robot, key, given, may_wind=of_joints)
     if YAW in task_map.rows:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
         turn = float(np.ptp(along[:, -1]))
-        figures += [_figure("path_start", begins), _figure("path", turn)]
-    return tuple(find_issues(figures))
+        issues += [*_figure("path_start", begins), *_figure("path", turn)]
+    return tuple(issues)
 
 
 def _positions(
     robot: Robot, key: str, postures: np.ndarray, *, may_wind: bool
-) -> Iterator[Check]:
+) -> Iterator[Issue]:
     """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
@@ -157,24 +158,14 @@ def _positions(
         # Along a path a joint without a range may wind up five times.
         turns = 5.0 if may_wind else 1.0
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
-        shown = f"{value:.6g}"
-        advice = f"{shown} degrees are {math.radians(value):.6g} rad"
-        if key in {"start.joints", "end.joints"}:
-            advice += f"; in a task file: !degrees {shown}"
-        yield Check(
-            f"{key}.{robot.joint_names[i]}",
-            "the position looks like degrees",
-            abs(value),
-            usual,
-            "rad",
-            shown=shown,
-            advice=advice,
-        )
+        of_posture = key in {"start.joints", "end.joints"}
+        more = f"; in a task file: !degrees {value:.6g}" if of_posture else ""
+        yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
 
 
 def of_posture(robot: Robot, key: str, q: np.ndarray) -> tuple[Issue, ...]:
     """Look at a posture, (n,)."""
-    return tuple(find_issues(_positions(robot, key, q, may_wind=False)))
+    return tuple(_positions(robot, key, q, may_wind=False))
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
@@ -188,7 +179,7 @@ def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
     return (Issue("t_end", message, f"{t_end:.6g} s", usual),)
 
 
-def _tool(task: Task) -> Iterator[Check]:
+def _tool(task: Task) -> Iterator[Issue]:
     """Look at the largest of every kind of limit, and at dwells; feed rates have units of their own."""
     limits = task.tool_limits
     speed = limits.speed
@@ -199,15 +190,15 @@ def _tool(task: Task) -> Iterator[Check]:
         "angular_speed": [limits.angular_speed],
     }
     for key, given in values.items():
-        yield _figure(f"tool_limits.{key}", _largest(given))
+        yield from _figure(f"tool_limits.{key}", _largest(given))
     meant = "degrees per second" if task.task_space == "joints" else "mm/s"
     message = f"the speed looks like {meant}"
     for key in ("start_speed", "end_speed"):
         value = _largest([getattr(task.boundary, key)])
-        yield Check(f"boundary.{key}", message, value, 50.0, task.speed_unit)
+        yield from issue_above(f"boundary.{key}", message, value, 50.0, task.speed_unit)
 
     for i, segment in enumerate(task.path):
-        yield _figure("path.dwell", segment.dwell, where=f"path[{i}].dwell")
+        yield from _figure("path.dwell", segment.dwell, where=f"path[{i}].dwell")
 
 
 def _largest(values: Iterable[float | None]) -> float:
@@ -251,7 +242,9 @@ def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
 def of_robot(robot: Robot) -> tuple[Issue, ...]:
     """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
-    figures = (
+    return (
+        *_scales(robot),
+        *_friction(robot),
         *_magnitudes(bare),
         *_ranges(bare),
         *_curves(bare),
@@ -260,7 +253,6 @@ def of_robot(robot: Robot) -> tuple[Issue, ...]:
         *_payload(robot, bare),
         *find_locked_in_degrees(robot),
     )
-    return (*_scales(robot), *_friction(robot), *find_issues(figures))
 
 
 def _scales(robot: Robot) -> Iterator[Issue]:
@@ -287,20 +279,20 @@ def _friction(robot: Robot) -> Iterator[Issue]:
             yield Issue(where, message, f"{damping:.6g} {unit}", usual)
 
 
-def _lengths(robot: Robot) -> Iterator[Check]:
+def _lengths(robot: Robot) -> Iterator[Issue]:
     """Look at the way from joint to joint, tool offset, mounting and gravity."""
     *links, last = link_lengths(robot)
     settings = robot.settings
     offset = math.hypot(*settings.tool_offset.xyz)
     names = (*robot.joint_names[1:], robot.tool_frame)
     for name, length in zip(names, (*links, last - offset), strict=True):
-        yield _figure("link", length, where=f"URDF origin of {name}")
-    yield _figure("robot.tool_offset.xyz", offset, max(1.0, sum(links)))
-    yield _figure("robot.mounting.xyz", math.hypot(*settings.mounting.xyz))
-    yield _figure("robot.gravity", math.hypot(*settings.gravity))
+        yield from _figure("link", length, where=f"URDF origin of {name}")
+    yield from _figure("robot.tool_offset.xyz", offset, max(1.0, sum(links)))
+    yield from _figure("robot.mounting.xyz", math.hypot(*settings.mounting.xyz))
+    yield from _figure("robot.gravity", math.hypot(*settings.gravity))
 
 
-def _payload(robot: Robot, bare: Robot) -> Iterator[Check]:
+def _payload(robot: Robot, bare: Robot) -> Iterator[Issue]:
     """Look at what the tool carries."""
     payload = robot.settings.payload
     if payload is None:
@@ -311,19 +303,19 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Check]:
     heaviest = (3.0 * moved or math.inf) / USUAL["robot.payload.mass"][1]
     inertia = payload.inertia
     moment = max(inertia.ixx, inertia.iyy, inertia.izz) if inertia else 0.0
-    yield _figure("robot.payload.mass", payload.mass, min(size**2, heaviest))
-    yield _figure("robot.payload.com", math.hypot(*payload.com), size)
-    yield _figure("robot.payload.inertia", moment, payload.mass * size**2)
+    yield from _figure("robot.payload.mass", payload.mass, min(size**2, heaviest))
+    yield from _figure("robot.payload.com", math.hypot(*payload.com), size)
+    yield from _figure("robot.payload.inertia", moment, payload.mass * size**2)
 
 
-def _masses(robot: Robot) -> Iterator[Check]:
+def _masses(robot: Robot) -> Iterator[Issue]:
     size = max(1.0, reach(robot))
     bodies = list(robot.model.inertias)[1:]
     for name, body in zip(robot.joint_names, bodies, strict=True):
         where = f"URDF inertials that joint {name} moves"
         moment = float(np.linalg.eigvalsh(body.inertia)[-1])
-        yield _figure("body mass", body.mass, size**2, where)
-        yield _figure("body inertia", moment, body.mass, where)
+        yield from _figure("body mass", body.mass, size**2, where)
+        yield from _figure("body inertia", moment, body.mass, where)
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
@@ -366,7 +358,7 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
     )
 
 
-def _magnitudes(robot: Robot) -> Iterator[Check]:
+def _magnitudes(robot: Robot) -> Iterator[Issue]:
     """Look at the limits around zero of a robot without payload."""
     for kind, row in LIMIT_KINDS.items():
         usual = row.usual
@@ -389,7 +381,7 @@ def _magnitudes(robot: Robot) -> Iterator[Check]:
             if is_placeholder:
                 continue
             unit = robot.position_units[i]
-            yield Check(
+            yield from issue_above(
                 f"robot.limits.{kind}.{robot.joint_names[i]}",
                 f"the {row.name.replace('_', ' ')} limit looks like {usual.mistaken_unit[unit]}",
                 value,
@@ -420,7 +412,7 @@ def _largest_usual(robot: Robot, usual: UsualLimit, joint: int) -> float:
     return float(min(most))
 
 
-def _ranges(robot: Robot) -> Iterator[Check]:
+def _ranges(robot: Robot) -> Iterator[Issue]:
     """Look at position ranges: joints with cables make a dozen turns at most."""
     limits = robot.limits
     columns = zip(
@@ -434,16 +426,13 @@ def _ranges(robot: Robot) -> Iterator[Check]:
     for name, unit, lower, upper, known in columns:
         # In degrees, few ranges are narrower than 120; few rails are longer than 30 m.
         usual = 120.0 if unit == "rad" else 50.0
-        if (
-            known.lower is not None
-            and known.upper is not None
-            and known.upper > known.lower
-        ):
+        stated = (known.upper or 0.0) - (known.lower or 0.0)
+        if stated > 0.0:
             least = 4.0 * math.pi if unit == "rad" else 5.0
-            usual = min(usual, max(5.0 * (known.upper - known.lower), least))
+            usual = min(usual, max(5.0 * stated, least))
         # An end beyond this is written for "no limit": in degrees, ranges end at 720.
         if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
-            yield Check(
+            yield from issue_above(
                 f"robot.limits.position.{name}",
                 f"the position range looks like {'degrees' if unit == 'rad' else 'mm'}",
                 upper - lower,
@@ -454,7 +443,7 @@ def _ranges(robot: Robot) -> Iterator[Check]:
             )
 
 
-def _curves(robot: Robot) -> Iterator[Check]:
+def _curves(robot: Robot) -> Iterator[Issue]:
     """Look at the torques and the speeds of torque-speed curves."""
     scale = robot.settings.limits.scale.torque
     usual_torque = LIMIT_KINDS["torque"].usual
@@ -469,7 +458,7 @@ def _curves(robot: Robot) -> Iterator[Check]:
             continue
         key = f"robot.limits.torque_speed.{name}"
         meant = {"rad": "rpm", "m": "mm per second"}[unit]
-        yield Check(
+        yield from issue_above(
             key,
             f"the last speed of the curve looks like {meant}",
             curve[-1][0],
@@ -477,7 +466,7 @@ def _curves(robot: Robot) -> Iterator[Check]:
             UNITS["velocity"][unit],
             "; at the joint, behind its gear",
         )
-        yield Check(
+        yield from issue_above(
             key,
             f"the torque of the curve looks like {usual_torque.mistaken_unit[unit]}",
             curve[0][1] / scale,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -122,61 +122,56 @@ def refuse_issues(
     return joined
 
 
-@dataclass(frozen=True)
-class Check:
-    """A figure, and the largest one that is usual.
+def issue_above(
+    where: str,
+    message: str,
+    value: float,
+    usual: float,
+    unit: str,
+    aside: str = "",
+    shown: str = "",
+    advice: str = "",
+) -> Iterator[Issue]:
+    """Yield an issue if a figure is larger than usual.
 
-    Attributes
+    Parameters
     ----------
-    where : str
-        Task key, or joint or link of the robot.
-    message : str
-        What it looks like if it is larger.
+    where, message, advice : str
+        See `Issue`.
     value, usual : float
-        In `unit`; a NaN passes.
+        The figure and the largest usual one, in `unit`; a NaN passes.
     unit : str
-    aside : str
+    aside : str, optional
         Text after the usual figure: for which robot or limit.
-    shown : str
+    shown : str, optional
         The figure in words, if it is more than one number.
-    advice : str
-        What else to write.
     """
-
-    where: str
-    message: str
-    value: float
-    usual: float
-    unit: str
-    aside: str = ""
-    shown: str = ""
-    advice: str = ""
+    if value > usual:
+        found = f"{shown or f'{value:.6g}'} {unit}"
+        allowed = f"below {usual:.3g} {unit}{aside}"
+        yield Issue(where, message, found, allowed, advice)
 
 
-def find_issues(checks: Iterable[Check]) -> Iterator[Issue]:
-    """Yield an issue for every figure that is larger than usual."""
-    for check in checks:
-        if check.value > check.usual:
-            found = check.shown or f"{check.value:.6g}"
-            usual = f"below {check.usual:.3g} {check.unit}{check.aside}"
-            found = f"{found} {check.unit}"
-            yield Issue(check.where, check.message, found, usual, check.advice)
+def angle_issue(
+    where: str, value: float, usual: float, more_advice: str = ""
+) -> Iterator[Issue]:
+    """Yield an issue if the position of a revolute joint, rad, looks like degrees."""
+    shown = f"{value:.6g}"
+    advice = f"{shown} degrees are {math.radians(value):.6g} rad{more_advice}"
+    message = "the position looks like degrees"
+    return issue_above(
+        where, message, abs(value), usual, "rad", shown=shown, advice=advice
+    )
 
 
-def find_locked_in_degrees(robot: Robot) -> Iterator[Check]:
+def find_locked_in_degrees(robot: Robot) -> Iterator[Issue]:
     """Look at the angles at which joints are locked."""
     locked = robot.settings.locked_joints
     joints = read_tree(robot.urdf, robot.source).joints if locked else {}
     for name, value in locked.items():
         if joints[name].get("type") != "prismatic":
-            yield Check(
-                f"robot.locked_joints.{name}",
-                "the position looks like degrees",
-                abs(value),
-                2.0 * TURN + 1e-3,
-                "rad",
-                shown=f"{value:.6g}",
-                advice=f"{value:.6g} degrees are {math.radians(value):.6g} rad",
+            yield from angle_issue(
+                f"robot.locked_joints.{name}", value, 2.0 * TURN + 1e-3
             )
 
 
