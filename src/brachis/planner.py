@@ -252,7 +252,7 @@ def _open_search(
     decompositions = Decompositions(problem, families)
     task_map = problem.task_map
     if has_charts(problem, decompositions) and not lacks_a_direction(task_map):
-        check_regular(task_map, problem.start, problem.end)
+        check_regular(task_map, problem.given_postures)
     else:
         # Faulty decompositions are reported before the path is checked.
         decompositions.find()

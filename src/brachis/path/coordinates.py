@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import PathError, UnknownNameError
+from brachis.errors import PathError, check_names
 from brachis.path.blends import blend_poses, blend_rows
 from brachis.path.context import SegmentContext
 from brachis.path.curves import (
@@ -132,9 +132,7 @@ class JointCoordinates(RowCoordinates):
             return super().curve(segment, index, start)
         own = joints_of(self.rows)
         where = f"path[{index}].{segment.kind}.joints"
-        for name in names:
-            if name not in own:
-                raise UnknownNameError("joint", name, own, where=where)
+        check_names("joint", names, own, where)
         if len(names) != len(own):
             raise PathError(
                 "joints are missing",

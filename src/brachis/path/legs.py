@@ -72,11 +72,9 @@ def _check_task_space(task_map: TaskMap) -> None:
     """Refuse a task space that leaves the tool free to move otherwise than along the path."""
     if isinstance(task_map, JointSpace):
         return
-    robot = task_map.robot
-    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (8, robot.n))
-    position = task_map_of(robot, "position")
-    jacobian = position.jacobian(position.twists(postures))
-    moves = np.abs(jacobian).max(axis=(0, 2)) > tolerances.COORDINATE
+    position = task_map_of(task_map.robot, "position")
+    jacobians = position.sample_jacobians()
+    moves = np.abs(jacobians).max(axis=(0, 2)) > tolerances.COORDINATE
     free = [axis for i, axis in enumerate(AXES) if moves[i] and i not in task_map.axes]
     if free:
         raise PathError(

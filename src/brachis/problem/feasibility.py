@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -33,8 +33,7 @@ _MOVE_BODIES = (
 def check_postures(
     task_map: TaskMap,
     limits: Sequence[Limit],
-    start: np.ndarray | None,
-    end: np.ndarray | None,
+    postures: Mapping[str, np.ndarray],
     path: Path,
     tolerance: float,
 ) -> tuple[Limit, ...]:
@@ -44,8 +43,8 @@ def check_postures(
     ----------
     task_map : TaskMap
     limits : sequence of Limit
-    start, end : (n,) ndarray or None
-        None where free.
+    postures : mapping of str to (n,) ndarray
+        Those of ``start`` and ``end`` that are given.
     path : Path
     tolerance : float
         By which limits may be exceeded anywhere: ``refinement.tolerance``.
@@ -60,13 +59,13 @@ def check_postures(
     StartError
     """
     robot = task_map.robot
-    for name, posture in (("start", start), ("end", end)):
-        if posture is not None:
-            _check_range(robot, posture[None], f"{name}.joints", tolerance)
-            _check_at_rest(robot, limits, posture, name, tolerance)
-            limits = [_widen(limit, posture[None], tolerance) for limit in limits]
-    if end is not None:
-        check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
+    for name, posture in postures.items():
+        _check_range(robot, posture[None], f"{name}.joints", tolerance)
+        _check_at_rest(robot, limits, posture, name, tolerance)
+        limits = [_widen(limit, posture[None], tolerance) for limit in limits]
+    if "end" in postures:
+        (last,) = path.sample([1.0]).target
+        check_on_path(task_map, postures["end"], last, "end")
     if isinstance(task_map, JointSpace):
         along = path.sample(np.linspace(0.0, 1.0, 401)).target
         _check_range(robot, along, "path", tolerance)
@@ -245,19 +244,16 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     return found, f"{word} {figures[0]}"
 
 
-def check_regular(
-    task_map: TaskMap, start: np.ndarray | None, end: np.ndarray | None
-) -> None:
-    """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
+def check_regular(task_map: TaskMap, postures: Mapping[str, np.ndarray]) -> None:
+    """Refuse a posture, start or end, that is a singularity of the arm: no coordinates describe motions from there.
 
     Raises
     ------
     StartError
     """
-    for name, posture in (("start", start), ("end", end)):
-        if posture is None:
-            continue
-        if _least_singular_values(task_map, posture[None])[0] < _REGULAR:
+    for name, posture in postures.items():
+        jacobian = task_map.jacobian(task_map.twists(posture[None]))
+        if _least_singular_values(jacobian)[0] < _REGULAR:
             raise StartError(
                 f"the {name} posture is singular",
                 where=f"{name}.joints",
@@ -269,8 +265,7 @@ def check_regular(
 
 def lacks_a_direction(task_map: TaskMap) -> bool:
     """Tell whether the arm can nowhere move its tool in all directions of the task space."""
-    sizes = _least_singular_values(task_map, _some_postures(task_map))
-    return bool(sizes.max() < _REGULAR)
+    return bool(_least_singular_values(task_map.sample_jacobians()).max() < _REGULAR)
 
 
 def check_movable(task_map: TaskMap) -> None:
@@ -280,8 +275,7 @@ def check_movable(task_map: TaskMap) -> None:
     ------
     InputError
     """
-    jacobian = task_map.jacobian(task_map.twists(_some_postures(task_map)))
-    moves = np.abs(jacobian).max(axis=(0, 2)) > _REGULAR
+    moves = np.abs(task_map.sample_jacobians()).max(axis=(0, 2)) > _REGULAR
     if moves.all():
         return
     rows = np.array(task_map.rows)
@@ -296,15 +290,9 @@ def check_movable(task_map: TaskMap) -> None:
     )
 
 
-def _some_postures(task_map: TaskMap) -> np.ndarray:
-    """Draw postures from -1 to 1 rad or m, (20, n), the same ones each time."""
-    return np.random.default_rng(0).uniform(-1.0, 1.0, (20, task_map.robot.n))
-
-
-def _least_singular_values(task_map: TaskMap, postures: np.ndarray) -> np.ndarray:
-    """Least singular values of the task Jacobian, (K,), in postures (K, n)."""
-    jacobian = task_map.jacobian(task_map.twists(postures))
-    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
+def _least_singular_values(jacobians: np.ndarray) -> np.ndarray:
+    """Least singular values, (K,), of Jacobians, (K, m, n)."""
+    return np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, -1])
 
 
 def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 from brachis import ik
 from brachis.common.summary import Summary
-from brachis.errors import DecompositionError, StartError, UnknownNameError
+from brachis.errors import DecompositionError, StartError, UnknownNameError, check_names
 from brachis.kinematics import ClosedFormMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.path import (
@@ -94,35 +94,43 @@ class Problem(Summary):
             for a limit.
         """
         robot, task_map = bind(robot, task.task_space, task.tolerances)
-        start, end = (
-            None if given == "free" else robot.posture(given.joints, f"{key}.joints")
+        postures = {
+            key: robot.posture(given.joints, f"{key}.joints")
             for key, given in (("start", task.start), ("end", task.end))
-        )
+            if given != "free"
+        }
         path = path_of(task_map, task)
         task = with_feed_rates(task, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
-            end = start
+            if "start" in postures:
+                postures["end"] = postures["start"]
         legs = legs_of(task, task_map, path)
         time_laws = tuple(time_law_of(leg, task_map, path) for leg in legs)
         limits = limits_of(robot, task, user_limits)
         check_smoothness(limits, task.spline)
         tolerance = task.refinement.tolerance
-        limits = check_postures(task_map, limits, start, end, path, tolerance)
-        if end is not None and not task.boundary.periodic:
-            end = _on_path(task_map, end, path)
+        limits = check_postures(task_map, limits, postures, path, tolerance)
+        if "end" in postures and not task.boundary.periodic:
+            postures["end"] = _on_path(task_map, postures["end"], path)
         return cls(
             task,
             robot,
             task_map,
             path,
-            start,
-            end,
+            postures.get("start"),
+            postures.get("end"),
             limits,
             legs,
             time_laws,
             tuple(user_limits),
         )
+
+    @property
+    def given_postures(self) -> dict[str, np.ndarray]:
+        """Postures of ``start`` and ``end``, without those that are free."""
+        both = {"start": self.start, "end": self.end}
+        return {name: posture for name, posture in both.items() if posture is not None}
 
     @cached_property
     def leg_paths(self) -> tuple[Path, ...]:
@@ -337,7 +345,7 @@ def decompositions_of(
     if refusals and not allowed and (asked or robot.n == task_map.m):
         raise refusals[0]
     if not allowed:
-        check_regular(task_map, problem.start, problem.end)
+        check_regular(task_map, problem.given_postures)
     return sorted(allowed, key=lambda decomposition: -decomposition.clearance)
 
 
@@ -356,12 +364,10 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     redundant = tuple(names.index(name) for name in match.redundant_joints)
     wanted = problem.task.branch
     labels = match.solver.branches
-    if wanted != "auto" and wanted not in labels:
-        raise UnknownNameError("branch", wanted, labels, where="branch")
+    if wanted != "auto":
+        check_names("branch", [wanted], labels, "branch")
     branches = tuple(i for i, label in enumerate(labels) if wanted in ("auto", label))
-    for name, posture in (("start", problem.start), ("end", problem.end)):
-        if posture is None:
-            continue
+    for name, posture in problem.given_postures.items():
         branch = branch_of(task_map, match, posture, name)
         if branch not in branches:
             other = "start posture" if wanted == "auto" else "task's branch"

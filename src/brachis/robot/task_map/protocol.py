@@ -162,6 +162,11 @@ class TaskMap(Summary, ABC):
         """Task Jacobian J (K, m, n) from the `twists` at K postures."""
         return np.moveaxis(self.rates(twists), 0, 1)
 
+    def sample_jacobians(self) -> np.ndarray:
+        """Task Jacobians J (20, m, n) at random postures, the same ones each time, from -1 to 1 rad or m."""
+        postures = np.random.default_rng(0).uniform(-1.0, 1.0, (20, self.robot.n))
+        return self.jacobian(self.twists(postures))
+
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
