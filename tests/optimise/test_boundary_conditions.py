@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from brachis.optimise.boundary import BoundarySpline, EndCondition, greville
+from brachis.common.arrays import greville
+from brachis.optimise.boundary import BoundarySpline, EndCondition
 from brachis.optimise.bspline import clamped_uniform_knots
 from support.phases import CASES, phase_of, reachable_points
 

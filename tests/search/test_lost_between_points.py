@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.common.arrays import greville
 from brachis.common.deadline import NEVER
 from brachis.errors import UnreachableError
 from brachis.kernel import PathMotion
 from brachis.kinematics import ClosedFormMap
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
-from brachis.optimise.boundary import greville
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.refine import add_points_where_lost

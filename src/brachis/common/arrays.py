@@ -180,3 +180,9 @@ def with_like_signs(quaternions: np.ndarray) -> np.ndarray:
     unit = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
     signs = np.cumprod(np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0))
     return np.concatenate([unit[:1], signs[:, None] * unit[1:]])
+
+
+def greville(knots: np.ndarray, degree: int) -> np.ndarray:
+    """Greville abscissae (N + d,) of a clamped knot vector: the times to which control points belong."""
+    windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
+    return np.asarray(windows.mean(axis=1))

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from brachis.common.arrays import greville
 from brachis.kernel import Basis
 from brachis.optimise.bspline import ORDERS, local_basis
 from brachis.path.time_law import TimeLaw
@@ -205,12 +206,6 @@ def sum_powers(
     if slope:
         return (powers[1:] * duration ** powers[:-1]) @ terms[1:]
     return duration**powers @ terms
-
-
-def greville(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Greville abscissae (N + d,) of a clamped knot vector: the times to which control points belong."""
-    windows = sliding_window_view(knots[1:-1], degree)
-    return windows.mean(axis=1)
 
 
 def _blossoms(knots: np.ndarray, degree: int, anchor: int, most: int) -> np.ndarray:

@@ -11,9 +11,8 @@ from functools import partial
 
 import numpy as np
 
-from brachis.common.arrays import interpolate_columns, spread
+from brachis.common.arrays import greville, interpolate_columns, spread
 from brachis.errors import UnreachableError
-from brachis.optimise.boundary import greville
 from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import bisect, drop_near, spread
+from brachis.common.arrays import bisect, drop_near, greville, spread
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
-from brachis.optimise.boundary import LocalBasis, greville
+from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import ORDERS, clamped_knots, insert_knots, local_basis
 from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline

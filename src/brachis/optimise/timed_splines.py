@@ -12,8 +12,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis import kernel
 from brachis.common import tolerances
+from brachis.common.arrays import greville
 from brachis.kernel import Spline, collocation
-from brachis.optimise.boundary import greville
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.motion import Motion
 from brachis.timing import TimedCourse, Timing

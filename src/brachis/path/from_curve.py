@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.common.arrays import greville
 from brachis.errors import InputError
 from brachis.path.protocol import Array
 from brachis.path.sequence import Path
@@ -166,8 +167,7 @@ def _interpolate(
     times = np.full(len(breaks), multiplicity or degree - SMOOTHNESS)
     times[[0, -1]] = degree + 1
     knots = np.repeat(breaks, times)
-    windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
-    abscissae = windows.mean(axis=1).clip(breaks[0], breaks[-1])
+    abscissae = greville(knots, degree).clip(breaks[0], breaks[-1])
     return make_interp_spline(abscissae, values(abscissae), k=degree, t=knots)
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import spread
+from brachis.common.arrays import greville, spread
 from brachis.errors import PathError
 from brachis.path.legs import Leg
 from brachis.path.protocol import Array
@@ -164,10 +164,9 @@ def _interpolate(
     often = np.where(is_double, 2, 1)
     often[[0, -1]] = DEGREE + 1
     knots = np.repeat(breaks, often)
-    windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], DEGREE)
-    abscissae = windows.mean(axis=1)
     # Two rates at each end take the places of the abscissae nearest to it.
-    sites = np.concatenate([breaks[:1], abscissae[3:-3], breaks[-1:]])
+    inner = greville(knots, DEGREE)[3:-3]
+    sites = np.concatenate([breaks[:1], inner, breaks[-1:]])
     every = np.union1d(breaks, sites)
     times = tool.times(every)
     at_knots = times[np.searchsorted(every, knots)]
