@@ -84,29 +84,23 @@ def read_dynamics(
     tool : str
         Link at the chain's end.
     """
-    carriers: dict[str, str | None] = {tree.root: None}  # joints of the chain
-    placements = {
-        tree.root: np.eye(4)
-    }  # of links, in the child links of their carriers
+    carried = {tree.root: (0, np.eye(4))}  # see UrdfDynamics.links
     befores = {}  # placements of joints of the chain
     for link in tree.downward[1:]:
         name = tree.above[link]
         joint = tree.joints[name]
-        parent = end_of(joint, "parent")
-        placement = placements[parent] @ origin_of(joint, "origin")
+        number, parent = carried[end_of(joint, "parent")]
+        placement = parent @ origin_of(joint, "origin")
         if name in chain:
-            carriers[link] = name
-            placements[link] = np.eye(4)
             befores[name] = placement
+            carried[link] = (chain.index(name) + 1, np.eye(4))
         else:
             held = _displacement(joint, locked.get(name, 0.0))
-            carriers[link] = carriers[parent]
-            placements[link] = placement @ held
+            carried[link] = (number, placement @ held)
+    in_order = {link: carried[link] for link in tree.links}
     bodies = []
-    for name in chain:
-        links = {
-            link: placements[link] for link in tree.links if carriers[link] == name
-        }
+    for i, name in enumerate(chain, 1):
+        links = {link: placed for link, (own, placed) in in_order.items() if own == i}
         bodies.append(_read_body(tree, name, befores[name], links))
     friction = {
         kind: np.array(
@@ -114,9 +108,7 @@ def read_dynamics(
         )
         for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
     }
-    numbers = {None: 0} | {name: i for i, name in enumerate(chain, 1)}
-    carried = {link: (numbers[carriers[link]], placements[link]) for link in tree.links}
-    return UrdfDynamics(tuple(bodies), placements[tool], friction, carried)
+    return UrdfDynamics(tuple(bodies), carried[tool][1], friction, in_order)
 
 
 def _read_body(
