@@ -17,6 +17,7 @@ from brachis.path.sequence import Path, PathFrame, Piece
 from brachis.robot import Robot, TaskMap
 from brachis.robot.plausibility import (
     distance_hint,
+    distances_from_base,
     place_hint,
     position_hint,
     reach,
@@ -200,9 +201,8 @@ def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str
     hint = place_hint(place[:axes], target[:axes], task_map.rows)
     if axes:
         robot = task_map.robot
-        base = np.array(robot.model.jointPlacements[1].translation)[list(task_map.axes)]
-        away = float(np.linalg.norm(target[:axes] - base))
-        hint = hint or distance_hint(away, reach(robot))
+        away = distances_from_base(robot, task_map.axes, target[:axes])
+        hint = hint or distance_hint(float(away), reach(robot))
     if len(target) == axes + 9:
         turned, wanted = (one[axes:].reshape(3, 3) for one in (place, target))
         hint = hint or turn_hint(turned, wanted)

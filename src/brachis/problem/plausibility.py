@@ -21,6 +21,7 @@ from brachis.robot.plausibility import (
     Issue,
     angle_issue,
     distance_hint,
+    distances_from_base,
     find_locked_in_degrees,
     issue_above,
     link_lengths,
@@ -30,6 +31,7 @@ from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
 from brachis.task import LIMIT_KINDS, SpeedTable, Task
 from brachis.task.limit_kinds import FASTEST, UsualLimit
+from brachis.task.points.points import steps_of
 
 if TYPE_CHECKING:
     from brachis.path import Path
@@ -324,7 +326,7 @@ def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
         return ""
     places = path.sample(np.append(np.linspace(0.0, s, 201), np.linspace(s, 1.0, 201)))
     positions = places.target[:, : len(task_map.axes)]
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    steps = steps_of(positions)
     return f", after {steps[:200].sum():.3g} m of {steps.sum():.3g} m"
 
 
@@ -339,9 +341,8 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
         return
     s = np.linspace(0.0, 1.0, 401)
     robot = task_map.robot
-    axes = list(task_map.axes)
-    base = np.array(robot.model.jointPlacements[1].translation)[axes]
-    away = np.linalg.norm(path.sample(s).target[:, : len(axes)] - base, axis=1)
+    positions = path.sample(s).target[:, : len(task_map.axes)]
+    away = distances_from_base(robot, task_map.axes, positions)
     far = reach(robot)
     furthest = float(away.max())
     if not furthest > far * (1.0 + 1e-3):

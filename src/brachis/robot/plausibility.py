@@ -195,6 +195,14 @@ def reach(robot: Robot) -> float:
     return sum(link_lengths(robot)) + sum(slides)
 
 
+def distances_from_base(
+    robot: Robot, axes: Sequence[int], positions: np.ndarray
+) -> np.ndarray:
+    """Distances of positions, (..., p), from the first joint, (...), m, along p axes of the world."""
+    base = np.array(robot.model.jointPlacements[1].translation)[list(axes)]
+    return np.linalg.norm(positions - base, axis=-1)
+
+
 _ROUNDED = 1e-3
 """m, or entries of a rotation matrix: positions are given to the millimetre."""
 

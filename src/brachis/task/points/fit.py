@@ -246,8 +246,7 @@ def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
 
 def _first_breaks(points: Points, sigma: Array) -> Array:
     """Return the knots to begin with: as many intervals as the path is longer than what it extends over."""
-    extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
-    count = max(1, min(int(sigma[-1] / extent), len(points) // _NOISY_POINTS))
+    count = max(1, min(int(sigma[-1] / points.extent), len(points) // _NOISY_POINTS))
     return np.linspace(0.0, float(sigma[-1]), count + 1)
 
 
