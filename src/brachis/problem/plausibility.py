@@ -213,15 +213,16 @@ def _angles(task: Task) -> Iterator[Issue]:
 
     They are written with two decimals: 3.14 is half a turn, 5.5 is not seven eighths.
     """
-    robot = {
-        key: getattr(task.robot, key).model_dump()
-        for key in ("mounting", "tool_offset")
-    }
-    numbers = {"path": {"__all__": {"bspline", "spline"}}}
     content = task.model_dump(
-        include={"path_start", "path", "frames", "scene"}, exclude=numbers
+        include={
+            "path_start": True,
+            "path": True,
+            "frames": True,
+            "scene": True,
+            "robot": {"mounting", "tool_offset"},
+        },
+        exclude={"path": {"__all__": {"bspline", "spline"}}},
     )
-    content["robot"] = robot
     for key, degrees in _in_degrees("", content):
         eighths = round(degrees / (0.125 * TURN))
         if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * TURN * eighths) < 2e-3:

@@ -68,16 +68,12 @@ _DEGREES = "_deg"
 def _about(name: str) -> Any:
     """Return the field of a convention, with its meaning."""
     convention = CONVENTIONS[name]
-    unit = (
-        ", degrees"
-        if convention.euler
-        else ", rad"
-        if name == "rotation_vector"
-        else " (length 1, to 1 %)"
-    )
+    unit = ", rad" if name == "rotation_vector" else " (length 1, to 1 %)"
+    if convention.euler:
+        unit = ", degrees"
+    meaning = convention.meaning[0].upper() + convention.meaning[1:]
     return Field(
-        default=None,
-        description=f"{convention.meaning[0].upper()}{convention.meaning[1:]}{unit}. Used by {convention.makers}.",
+        default=None, description=f"{meaning}{unit}. Used by {convention.makers}."
     )
 
 
