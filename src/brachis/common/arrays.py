@@ -136,6 +136,18 @@ def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.einsum("kij,kj->ki", matrices, vectors)
 
 
+def extrapolate(
+    motion: Sequence[np.ndarray] | np.ndarray, step: np.ndarray | float
+) -> list[np.ndarray]:
+    """Value and two time derivatives, a time after a value and three derivatives, of which the last stays constant."""
+    x, xdot, xddot, xdddot = motion
+    return [
+        x + step * (xdot + step / 2.0 * (xddot + step / 3.0 * xdddot)),
+        xdot + step * (xddot + step / 2.0 * xdddot),
+        xddot + step * xdddot,
+    ]
+
+
 def rates(
     parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
@@ -153,22 +165,15 @@ def rates(
     list of (K, ...) ndarray
         Per second.
     """
-    x, *derivatives = motion
     speeds = [
         np.abs(part).max(axis=1, initial=0.0) ** (1.0 / order)
-        for order, part in enumerate(derivatives, 1)
+        for order, part in enumerate(motion[1:], 1)
     ]
     # The error of central differences is of the order of the square of the step, in units of the coordinates.
     h = 3e-5 / np.maximum(np.max(speeds, axis=0), 1.0)
     step = np.concatenate([h, -h])[:, None]
-    xdot, xddot, xdddot = (np.tile(part, (2, 1)) for part in derivatives)
-    moved = (
-        np.tile(x, (2, 1)) + step * (xdot + step / 2.0 * (xddot + step / 3.0 * xdddot)),
-        xdot + step * (xddot + step / 2.0 * xdddot),
-        xddot + step * xdddot,
-        xdddot,
-    )
-    sides = (np.split(part, 2) for part in parts(*moved))
+    both = [np.tile(part, (2, 1)) for part in motion]
+    sides = (np.split(part, 2) for part in parts(*extrapolate(both, step), both[3]))
     return [
         (ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1)))
         for ahead, behind in sides

@@ -27,6 +27,7 @@ import numpy as np
 
 from brachis.apps.recording.recording import FEWEST_ROWS, Recording
 from brachis.common import tolerances
+from brachis.common.arrays import extrapolate
 from brachis.common.words import write_count
 from brachis.trajectory.pieces import piece_coefficients
 
@@ -336,8 +337,8 @@ def _place_jump(
     def gap(place: Any, order: int) -> Any:
         """Difference of both sides' derivatives at parts of the period, as parts of `scale`."""
         t = np.asarray(place)[..., None] * h
-        difference = _extrapolate(right, t - h) - _extrapolate(left, t)
-        return difference[order] / scale
+        difference = extrapolate(right, t - h)[order] - extrapolate(left, t)[order]
+        return difference / scale
 
     places = np.linspace(1.5 * _NARROWEST, 1.0 - 1.5 * _NARROWEST, 401)
     place = places[np.argmin((gap(places, 1) ** 2).sum(axis=1))]
@@ -351,27 +352,15 @@ def _place_jump(
     width = h * share
     first = place * h - 0.5 * width
     last = place * h + 0.5 * width
-    begin = _extrapolate(left, first)
-    end = _extrapolate(right, last - h)
+    begin = extrapolate(left, first)
+    end = extrapolate(right, last - h)
     # The node nearer to its row is exact; from it the acceleration changes at constant jerk to that of the other.
     jerk = (end[2] - begin[2]) / width
     if place <= 0.5:
-        end = _extrapolate(np.stack([*begin, jerk]), width)
+        end = extrapolate([*begin, jerk], width)
     else:
-        begin = _extrapolate(np.stack([*end, jerk]), -width)
+        begin = extrapolate([*end, jerk], -width)
     return np.array([first, last]), np.stack([begin, end], axis=1)
-
-
-def _extrapolate(state: np.ndarray, t: np.ndarray | float) -> np.ndarray:
-    """Position, velocity and acceleration a time t after a state (4, n), at constant jerk."""
-    q, qdot, qddot, jerk = state
-    return np.stack(
-        [
-            q + t * (qdot + t / 2.0 * (qddot + t / 3.0 * jerk)),
-            qdot + t * (qddot + t / 2.0 * jerk),
-            qddot + t * jerk,
-        ]
-    )
 
 
 def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
