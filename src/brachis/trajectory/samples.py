@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -67,6 +67,14 @@ class Samples(Summary):
         """Return the number of times, K."""
         return len(self.t)
 
+    def joint_columns(self, joint_names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint."""
+        columns: dict[str, np.ndarray] = {}
+        for prefix, quantity in COLUMNS.items():
+            names = [f"{prefix}_{joint}" for joint in joint_names]
+            columns |= zip(names, getattr(self, quantity).T, strict=True)
+        return columns
+
     def to_dataframe(self, joint_names: tuple[str, ...]) -> pd.DataFrame:
         """Return a pandas table, a row for each time; see `Trajectory.to_dataframe`.
 
@@ -79,10 +87,7 @@ class Samples(Summary):
             import pandas as pd
         except ImportError:
             raise NotInstalledError("a table", "pandas", "pandas") from None
-        columns = {"t": self.t, "s": self.s}
-        for prefix, name in COLUMNS.items():
-            names = [f"{prefix}_{joint}" for joint in joint_names]
-            columns |= zip(names, getattr(self, name).T, strict=True)
+        columns = {"t": self.t, "s": self.s, **self.joint_columns(joint_names)}
         names = [f"tool_{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
         pose = np.hstack([self.tool_position, self.tool_quaternion])
         columns |= zip(names, pose.T, strict=True)

@@ -24,12 +24,13 @@ def message_of(rows: JointRows) -> dict[str, Any]:
     effort. Times are whole nanoseconds.
     """
     points = []
-    for k, t in enumerate(rows.t.tolist()):
+    samples = rows.samples
+    for k, t in enumerate(samples.t.tolist()):
         seconds, nanoseconds = divmod(round(t * 1e9), 10**9)
         point = {
-            "positions": rows.q[k].tolist(),
-            "velocities": rows.qdot[k].tolist(),
-            "accelerations": rows.qddot[k].tolist(),
+            "positions": samples.q[k].tolist(),
+            "velocities": samples.qdot[k].tolist(),
+            "accelerations": samples.qddot[k].tolist(),
             "effort": [],
             "time_from_start": {"sec": seconds, "nanosec": nanoseconds},
         }
@@ -113,8 +114,10 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
             allowed="six revolute joints, from the base on",
             hint="List only the arm's six joints in joints, and write the others, such as a rail, in another format",
         )
-    first, *postures = (f"[{', '.join(map(repr, row))}]" for row in rows.q.tolist())
-    periods = np.diff(rows.t).round(12).tolist()
+    first, *postures = (
+        f"[{', '.join(map(repr, row))}]" for row in rows.samples.q.tolist()
+    )
+    periods = np.diff(rows.samples.t).round(12).tolist()
     moves = "".join(
         f"  servoj({posture}, 0, 0, {period!r}, {_SERVOJ})\n"
         for posture, period in zip(postures, periods, strict=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
@@ -16,7 +16,7 @@ from brachis.errors import (
     NotInstalledError,
     check_names,
 )
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Samples, Trajectory
 from brachis.trajectory.samples import COLUMNS
 
 
@@ -38,10 +38,8 @@ class JointRows:
         A sentence for every joint that moves and is not among `joints`.
     t_end, dt : float
         End time and period, s.
-    t, s : (K,) ndarray
-        s; path coordinate, dimensionless.
-    q, qdot, qddot, tau : (K, joints) ndarray
-        Position (rad or m), velocity, acceleration, torque (Nm) or force (N).
+    samples : Samples
+        The motion of these joints, and of the tool.
     """
 
     joints: tuple[str, ...]
@@ -49,22 +47,11 @@ class JointRows:
     left_out: tuple[str, ...]
     t_end: float
     dt: float
-    t: np.ndarray
-    s: np.ndarray
-    q: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
-    tau: np.ndarray
+    samples: Samples
 
-    def columns(self) -> Iterator[tuple[str, np.ndarray]]:
-        """Yield names and values, (K,), of a table: ``t``, then ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint."""
-        yield "t", self.t
-        for prefix, quantity in COLUMNS.items():
-            yield from zip(
-                (f"{prefix}_{joint}" for joint in self.joints),
-                getattr(self, quantity).T,
-                strict=True,
-            )
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the columns, (K,), of a table by name: ``t``, then those of every joint."""
+        return {"t": self.samples.t, **self.samples.joint_columns(self.joints)}
 
 
 def rows_of(
@@ -119,15 +106,14 @@ def rows_of(
     if left_out:
         hint = "Move the missing joints with their own controller at the same time, or write all joints"
         warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=3)
+    own = {name: getattr(samples, name)[:, index] for name in COLUMNS.values()}
     return JointRows(
         tuple(chosen),
         tuple(units[each] for each in index),
         tuple(left_out),
         trajectory.t_end,
         dt,
-        samples.t,
-        samples.s,
-        *(getattr(samples, quantity)[:, index] for quantity in COLUMNS.values()),
+        replace(samples, **own),
     )
 
 

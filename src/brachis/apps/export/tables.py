@@ -26,13 +26,13 @@ def write_csv(rows: JointRows, stream: BinaryIO) -> None:
     s, rad (m), rad/s (m/s), rad/s^2 (m/s^2) and Nm (N). If a joint that moves is left out, a line that begins with
     ``#`` stands before the header.
     """
-    names, values = zip(*rows.columns(), strict=True)
+    columns = rows.columns()
     text = io.StringIO()
     text.writelines(f"# brachis: {sentence}\n" for sentence in rows.left_out)
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
+    writer.writerow(columns)
     # Floats are written as repr: the shortest text that reads back the same.
-    writer.writerows(np.column_stack(values).tolist())
+    writer.writerows(np.column_stack([*columns.values()]).tolist())
     stream.write(text.getvalue().encode())
 
 
@@ -46,7 +46,7 @@ def write_parquet(rows: JointRows, stream: BinaryIO) -> None:
     parquet = require_library("pyarrow.parquet", "a Parquet file")
     units = dict(zip(rows.joints, rows.units, strict=True))
     about = {"joints": units, "t_end_s": rows.t_end, "left_out": rows.left_out}
-    table = pyarrow.table(dict(rows.columns()))
+    table = pyarrow.table(rows.columns())
     metadata = {"brachis": json.dumps(about)}
     parquet.write_table(table.replace_schema_metadata(metadata), stream)
 
@@ -105,7 +105,7 @@ def write_json(rows: JointRows, stream: BinaryIO) -> None:
         "t_end": rows.t_end,
         "dt": rows.dt,
         "warnings": rows.left_out,
-        "samples": {name: getattr(rows, name).tolist() for name in names},
+        "samples": {name: getattr(rows.samples, name).tolist() for name in names},
     }
     lines = (
         f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}"
