@@ -11,7 +11,13 @@ from functools import partial
 import numpy as np
 
 from brachis.robot import Robot
-from brachis.verify.limits.protocol import LimitCheck, Worst, largest, worst_between
+from brachis.verify.limits.protocol import (
+    LimitCheck,
+    Worst,
+    largest,
+    worst_between,
+    worst_size,
+)
 from brachis.verify.mechanics import torque_rates
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import POSITION_SCALE
@@ -91,15 +97,12 @@ def _worst_rms_torque(given: Given) -> Worst | None:
 
 def _worst_total_power(given: Given) -> Worst | None:
     """Find the largest ratio of the sum of all joints' powers."""
-    limit = given.robot.limits.total_power
-    if not np.isfinite(limit):
-        return None
 
-    def ratios(states: MotionStates) -> np.ndarray:
-        """Return the total power over its limit, (K, 1)."""
-        return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))[:, None] / limit
+    def powers(states: MotionStates) -> np.ndarray:
+        """Return the sizes of the total power, (K,)."""
+        return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))
 
-    return worst_between(given, ratios, ("all joints",))
+    return worst_size(given, given.robot.limits.total_power, powers, "all joints")
 
 
 def _worst_torque_at_speed(given: Given) -> Worst | None:

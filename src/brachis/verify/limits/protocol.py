@@ -85,6 +85,23 @@ def worst_between(
     return Worst(ratio[k, column], subjects[column], states.t[k])
 
 
+def worst_size(
+    given: Given,
+    largest: float | None,
+    sizes: Callable[[MotionStates], np.ndarray],
+    subject: str = "tool",
+) -> Worst | None:
+    """Find the largest ratio of a size, (K,), to the largest that is allowed; None if it is not limited."""
+    if largest is None or np.isinf(largest):
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        """Return the sizes over the largest one, (K, 1)."""
+        return sizes(states)[:, None] / largest
+
+    return worst_between(given, ratios, (subject,))
+
+
 def _may_hold_more(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,6 @@ and its third column z, the tool's axis there:
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from brachis.common.arrays import apply_each
 from brachis.robot import Robot
 from brachis.task import SpeedTable
-from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
+from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between, worst_size
 from brachis.verify.mechanics import (
     joint_placements,
     real_tool_placements,
@@ -39,24 +38,10 @@ def tool_sizes(robot: Robot, states: MotionStates, quantity: str) -> np.ndarray:
     return np.linalg.norm(vectors, axis=0)
 
 
-def _worst_size(
-    given: Given, largest: float | None, sizes: Callable[[MotionStates], np.ndarray]
-) -> Worst | None:
-    """Find the largest ratio of a size of the tool's, (K,), to the largest that is allowed; None without one."""
-    if largest is None:
-        return None
-
-    def ratios(states: MotionStates) -> np.ndarray:
-        """Return the sizes over the largest one, (K, 1)."""
-        return sizes(states)[:, None] / largest
-
-    return worst_between(given, ratios, ("tool",))
-
-
 def _worst_motion(quantity: str, given: Given) -> Worst | None:
     """Find the largest ratio to one of the task's tool limits, at the states and between them."""
     largest = getattr(given.task.tool_limits, quantity)
-    return _worst_size(
+    return worst_size(
         given, largest, lambda states: tool_sizes(given.robot, states, quantity)
     )
 
@@ -69,7 +54,7 @@ def _worst_speed(given: Given) -> Worst | None:
         return _worst_motion("speed", given)
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the speeds over the lowest limit at each s, (K, 1)."""
+        """Return the speeds over the lowest limit at each s, (K,)."""
         s = states.s
         constant = limits.speed if isinstance(limits.speed, float) else np.inf
         limit = np.full(len(s), constant)
@@ -78,9 +63,9 @@ def _worst_speed(given: Given) -> Worst | None:
             within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
             holds = within | (table is limits.speed)
             limit = np.minimum(limit, np.where(holds, _speed_limit(table, s), np.inf))
-        return (tool_sizes(given.robot, states, "speed") / limit)[:, None]
+        return tool_sizes(given.robot, states, "speed") / limit
 
-    return worst_between(given, ratios, ("tool",))
+    return worst_size(given, 1.0, ratios)
 
 
 def _speed_limit(table: SpeedTable, s: np.ndarray) -> np.ndarray:
@@ -96,7 +81,7 @@ def _worst_deviation(name: str, given: Given) -> Worst | None:
     tolerances = given.task.tolerances
     is_tilt = name == "tilt"
     largest = tolerances.orientation.tilt if is_tilt else tolerances.position.sphere
-    return _worst_size(given, largest, lambda states: _deviations(given, states)[name])
+    return worst_size(given, largest, lambda states: _deviations(given, states)[name])
 
 
 def _worst_range(given: Given) -> Worst | None:
