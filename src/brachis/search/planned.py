@@ -23,6 +23,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def describe_motion(
+    trajectory: Trajectory, verification: Verification
+) -> dict[str, Any]:
+    """Return the figures of a verified motion as plain data for JSON."""
+    return {
+        "t_end": trajectory.t_end,
+        "redundant_joints": list(trajectory.redundant_joints),
+        "branch": trajectory.branch,
+        "phases": [phase.to_dict() for phase in trajectory.phases],
+        "joint_names": list(trajectory.joint_names),
+        "verified": verification.passed,
+        "worst_ratio": verification.worst_ratio,
+        "path_error": verification.path_error,
+    }
+
+
 @dataclass(frozen=True, repr=False)
 class PlannedMotion(Summary):
     """What a plan gives, without what is done with it: see `brachis.Result`."""
@@ -102,10 +118,7 @@ class PlannedMotion(Summary):
         trajectory = self.trajectory
         start, end = clear_rounding(trajectory.position([0.0, self.t_end])).tolist()
         return {
-            "t_end": self.t_end,
-            "redundant_joints": list(trajectory.redundant_joints),
-            "branch": trajectory.branch,
-            "phases": [phase.to_dict() for phase in trajectory.phases],
+            **describe_motion(trajectory, self.verification),
             "start_posture": start,
             "end_posture": end,
             "position_units": list(trajectory.robot.position_units),
@@ -126,10 +139,6 @@ class PlannedMotion(Summary):
             "warnings": [remark.to_dict() for remark in self.warnings],
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,
-            "verified": self.verified,
             "timing_gap": self.timing_gap and self.timing_gap.to_dict(),
-            "worst_ratio": self.verification.worst_ratio,
             "margins": [asdict(margin) for margin in self.verification.margins],
-            "path_error": self.verification.path_error,
-            "joint_names": list(trajectory.joint_names),
         }

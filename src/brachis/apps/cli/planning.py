@@ -208,6 +208,7 @@ def bottleneck(
     brachis bottleneck task.yaml --set search.effort=single
     """
     from brachis.optimise.candidate import describe_coordinates
+    from brachis.search.planned import describe_motion
 
     result = None
     with output_folder(out, _BOTTLENECK, (task, urdf)), show_progress() as listener:
@@ -216,7 +217,8 @@ def bottleneck(
             given = {"--urdf": urdf, "--set": changes, "--strict": strict}
             refuse_options(given, "a saved motion", "a task file")
             trajectory = brachis.Trajectory.load(source)
-            data = _verify_again(trajectory)
+            verification = brachis.verify_trajectory(trajectory)
+            data = describe_motion(trajectory, verification)
         else:
             result = _plan_task(task, urdf, changes, strict, listener)
             trajectory = result.trajectory
@@ -243,21 +245,6 @@ def bottleneck(
         complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
-
-
-def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
-    """Verify a saved motion, and return its figures as those of a plan."""
-    verification = brachis.verify_trajectory(trajectory)
-    return {
-        "t_end": trajectory.t_end,
-        "redundant_joints": list(trajectory.redundant_joints),
-        "branch": trajectory.branch,
-        "phases": [phase.to_dict() for phase in trajectory.phases],
-        "joint_names": list(trajectory.joint_names),
-        "verified": verification.passed,
-        "worst_ratio": verification.worst_ratio,
-        "path_error": verification.path_error,
-    }
 
 
 def sweep(
