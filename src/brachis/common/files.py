@@ -32,7 +32,7 @@ COMPOSED = "<!-- brachis compose -->"
 """Second line of a composed URDF, by which it is known."""
 BEGINNINGS = {
     ".html": rb"<!doctype html>\n<!-- brachis report -->",
-    ".json": rb'\{\n  "(t_end"|\$schema": "https://json-schema\.org/draft/2020-12/schema",\n  "\$id": "urn:brachis:)',
+    ".json": rb'\{\n  "(t_end"|\$schema": "(https://json-schema[^"]+",\n  "\$id": ")?urn:brachis:)',
     ".npz": rb"PK\x03\x04.{26}meta\.npy",
     ".pdf": rb"%PDF",
     ".png": rb"\x89PNG",

@@ -9,7 +9,7 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -44,28 +44,26 @@ Drawing = Callable[[], Any]
 
 
 def check_output(
-    out: Path, suffixes: Collection[str], inputs: Iterable[Path | None]
+    out: Path, inputs: Iterable[Path | None], beginning: bytes = b""
 ) -> None:
     """Refuse what cannot be written, or should not be replaced.
 
     An output is refused whose folder does not exist, or that would replace a folder, an input of the command or a file
-    that brachis did not write in such a format.
+    of another kind.
 
     Parameters
     ----------
     out : Path
         What will be written. A new file may have any name; devices such as ``/dev/stdout`` are not checked.
-    suffixes : collection of str
-        Suffixes of the formats that may be written; an older file has to begin as one of them.
     inputs : iterable of Path or None
         Files that the command reads.
+    beginning : bytes, optional
+        Pattern of how an older file begins; for what is checked before it is written, as writing does it too.
 
     Raises
     ------
     InputError
     """
-    from brachis.apps.export.formats import FORMATS
-
     problem = "the file cannot be written"
     if is_folder(out):
         found = "a folder of this name"
@@ -85,9 +83,7 @@ def check_output(
                     found="the same file",
                     allowed="another file name",
                 )
-    exports = (form.beginning for form in FORMATS.values() if form.suffix in suffixes)
-    others = (BEGINNINGS[suffix] for suffix in suffixes if suffix in BEGINNINGS)
-    check_beginning(out, b"|".join((*exports, *others)))
+    check_beginning(out, beginning)
 
 
 def write_files(
@@ -172,11 +168,11 @@ def _write_results(
 def write_one(
     out: Path,
     write: Writer,
-    suffixes: Collection[str],
     inputs: Iterable[Path | None] = (),
+    beginning: bytes = b"",
 ) -> None:
     """Write one file, unless it would take the place of what `check_output` protects."""
-    check_output(out, suffixes, inputs)
+    check_output(out, inputs, beginning)
     with end_cleanly():
         write(out)
 
@@ -244,7 +240,7 @@ def output_folder(
         out.mkdir(parents=True, exist_ok=True)
     both = dict.fromkeys((*names, *map(_unverified, names)))
     for name in both:
-        check_output(out / name, (Path(name).suffix,), inputs)
+        check_output(out / name, inputs, BEGINNINGS[Path(name).suffix])
     try:
         yield
     except (Exception, KeyboardInterrupt):

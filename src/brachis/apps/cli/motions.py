@@ -40,7 +40,7 @@ from brachis.apps.cli.output import (
     show_progress,
 )
 from brachis.common import interrupts
-from brachis.common.files import read_file
+from brachis.common.files import BEGINNINGS, read_file
 from brachis.errors import check_names
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def export(
         joints=names,
         slower=slower,
     )
-    write_one(out, write, (settings.suffix,), _inputs(result, trajectory))
+    write_one(out, write, _inputs(result, trajectory))
     period = settings.dt if dt is None else dt
     if period > trajectory.t_end:
         print_error(
@@ -153,18 +153,17 @@ def plot(
     --------
     brachis plot out/result.npz --kind torques --out out/torques.svg
     """
-    from brachis.apps.plots import SUFFIXES, check_suffix
+    from brachis.apps.plots import check_suffix
 
     plots = brachis.plots
     check_names("figure", [kind], plots.PLOTS, "--kind")
-    check_suffix(out)
+    beginning = BEGINNINGS[f".{check_suffix(out)}"]
     result, trajectory = _load(result)
 
     write = partial(draw, partial(plots.PLOTS[kind], trajectory))
-    suffixes = [f".{suffix}" for suffix in SUFFIXES]
     with show_progress(WRITING) as listener:
         listener(f"drawing {out}")
-        write_one(out, write, suffixes, _inputs(result, trajectory))
+        write_one(out, write, _inputs(result, trajectory), beginning)
     print_lines(f"wrote {out}")
 
 
@@ -194,7 +193,7 @@ def report(
         check_report_name(out)
     result, trajectory = _load(result)
     out = out or result.with_suffix(".html")
-    check_output(out, (".html",), _inputs(result, trajectory))
+    check_output(out, _inputs(result, trajectory), BEGINNINGS[".html"])
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
     with show_progress(WRITING) as listener:
@@ -320,5 +319,6 @@ def schema(
     if out is None:
         print_json(data)
     else:
-        write_one(out, partial(write_text, json_text(data)), (".json",))
+        write = partial(write_text, json_text(data))
+        write_one(out, write, beginning=BEGINNINGS[".json"])
         print_lines(f"wrote {out}")

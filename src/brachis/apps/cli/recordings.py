@@ -61,7 +61,7 @@ def import_(
         tolerance=tolerance,
         noise=noise,
     )
-    write_one(out, trajectory.save, (".npz",), (csv, robot))
+    write_one(out, trajectory.save, (csv, robot))
     verification = brachis.verify_trajectory(trajectory)
     recovered = trajectory.recovered
     assert recovered is not None

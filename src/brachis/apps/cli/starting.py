@@ -181,7 +181,6 @@ def compose(
     write_one(
         out,
         lambda path: brachis.compose.on_rail(arm, rail, meshes=meshes, output=path),
-        (".urdf",),
         (arm,),
     )
     print_answer(
