@@ -210,11 +210,18 @@ class Trajectory(Summary):
     def at(self, t: ArrayLike) -> Samples:
         """All quantities at times `t`, (K,), s; of a number K = 1."""
         times = np.atleast_1d(numbers(t, "t", "s"))
-        return self._samples(times, self.velocity(times), self.acceleration(times))
+        return self._samples(times, self._check_times(times))
 
-    def _samples(self, t: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> Samples:
-        within = np.minimum(t, self.t_end)
+    def _samples(
+        self, t: np.ndarray, within: np.ndarray, *, stops: bool = False
+    ) -> Samples:
+        """Evaluate the motion at times within it, to be shown at times t; with `stops` the last posture is at rest."""
         q = self.position(within)
+        qdot = self.velocity(within)
+        qddot = self.acceleration(within)
+        if stops:
+            qdot[-1] = 0.0
+            qddot[-1] = 0.0
         tau = dynamics.torque(self.robot, q, qdot, qddot)
         tool = tool_motion(self.robot, q, qdot)
         return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
@@ -266,12 +273,7 @@ class Trajectory(Summary):
         if last == "exact":
             t[-1] = self.t_end
             return self.at(t)
-        within = np.minimum(t, self.t_end)
-        qdot = self.velocity(within)
-        qddot = self.acceleration(within)
-        qdot[-1] = 0.0
-        qddot[-1] = 0.0
-        return self._samples(t, qdot, qddot)
+        return self._samples(t, np.minimum(t, self.t_end), stops=True)
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds; see `sample`.
