@@ -127,10 +127,13 @@ def _rigid(
     moment = np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
         body = bodies[joint]
+        spin, gain, acceleration = motions[joint]
         for weight in _weights(robot, joint):
-            push, turn = _resistance(weight, *motions[joint])
+            com = weight.com[:, None]
+            push = weight.mass * _accelerate(com, spin, gain, acceleration)
+            turn = weight.inertia @ gain + cross(spin, weight.inertia @ spin)
             force = force + push
-            moment = moment + turn
+            moment = moment + (turn + cross(com, push))
         tau[:, joint] = body.axis @ (force if body.sliding else moment)
         position = q[:, joint]
         if body.sliding:
@@ -209,16 +212,6 @@ def _weights(robot: Robot, joint: int) -> list[Body]:
     com = rotation @ payload.com + tool[:3, 3]
     turned = rotation @ inertia @ rotation.T
     return [body, replace(body, mass=payload.mass, com=com, inertia=turned)]
-
-
-def _resistance(
-    body: Body, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Force, and moment about the joint's origin, (3, K), that a body's motion takes: w, e and a of the frame."""
-    com = body.com[:, None]
-    force = body.mass * _accelerate(com, spin, gain, acceleration)
-    moment = body.inertia @ gain + cross(spin, body.inertia @ spin)
-    return force, moment + cross(com, force)
 
 
 def _accelerate(

@@ -156,10 +156,10 @@ class MotionPieces:
         piece = np.clip(piece, 0, len(self.lengths) - 1)
         return piece, np.clip((t - self.times[piece]) / self.lengths[piece], 0.0, 1.0)
 
-    def times_of(self, s: np.ndarray) -> np.ndarray:
-        """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
+    def place_on_path(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pieces and places in them at which path coordinates, (P,), are reached; s(t) does not decrease."""
         end = np.full(len(s), self.times[-1])
-        return bisect(lambda t: self.path_coordinate(t) < s, end)
+        return self.place(bisect(lambda t: self.path_coordinate(t) < s, end))
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,12 +312,9 @@ def _all_places(given: Given) -> Places:
         They are more than `MOST_INSTANTS`.
     """
     pieces = given.pieces
-    tables = list_speed_tables(given.task)
-    ends_of_tables = np.array([s for table in tables for s in table.s])
     parts = (
         _spread(given),
-        _within_path_pieces(given),
-        pieces.place(pieces.times_of(ends_of_tables)),
+        pieces.place_on_path(_path_coordinates(given)),
         _peaks(pieces),
         _reversals(pieces),
     )
@@ -374,13 +371,13 @@ def _check_count(count: int) -> None:
         )
 
 
-def _within_path_pieces(given: Given) -> Places:
-    """Spread places over every piece of the path, however short: no small blend is stepped over."""
+def _path_coordinates(given: Given) -> np.ndarray:
+    """Spread s over every piece of the path, however short: no small blend is stepped over; and add that of tables."""
     breaks = given.path.breaks
     parts = np.linspace(0.0, 1.0, given.options.points_per_interval)
     _check_count(len(breaks) * len(parts))
     s = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
-    return given.pieces.place(given.pieces.times_of(s))
+    return np.concatenate([s, *(table.s for table in list_speed_tables(given.task))])
 
 
 def _peaks(pieces: MotionPieces) -> Places:

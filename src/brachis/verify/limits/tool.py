@@ -14,7 +14,6 @@ import numpy as np
 
 from brachis.common.arrays import apply_each
 from brachis.robot import Robot
-from brachis.task import SpeedTable
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between, worst_size
 from brachis.verify.mechanics import (
     joint_placements,
@@ -59,21 +58,17 @@ def _worst_speed(given: Given) -> Worst | None:
         constant = limits.speed if isinstance(limits.speed, float) else np.inf
         limit = np.full(len(s), constant)
         for table in tables:
-            # A table of feed rates says nothing beyond its ends.
+            # Of both sides of a step the lower one; a table of feed rates says nothing beyond its ends.
+            sides = [
+                np.interp(s + step, table.s, table.speed)
+                for step in (-_SAME_S, _SAME_S)
+            ]
             within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
             holds = within | (table is limits.speed)
-            limit = np.minimum(limit, np.where(holds, _speed_limit(table, s), np.inf))
+            limit = np.minimum(limit, np.where(holds, np.minimum(*sides), np.inf))
         return tool_sizes(given.robot, states, "speed") / limit
 
     return worst_size(given, 1.0, ratios)
-
-
-def _speed_limit(table: SpeedTable, s: np.ndarray) -> np.ndarray:
-    """Largest speeds, (K,), at path coordinates s, (K,); of both sides of a step the lower one."""
-    before, behind = (
-        np.interp(s + step, table.s, table.speed) for step in (-_SAME_S, _SAME_S)
-    )
-    return np.minimum(before, behind)
 
 
 def _worst_deviation(name: str, given: Given) -> Worst | None:
