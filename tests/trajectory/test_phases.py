@@ -60,6 +60,11 @@ def test_derivatives_of_a_phase_are_per_second():
         np.testing.assert_allclose(slope, orders[order + 1], rtol=1e-5, atol=1e-3)
 
 
+def test_times_of_path_coordinates():
+    times = SPLINES[3].times_of(np.array([0.55, 0.7, 0.85]))
+    np.testing.assert_allclose(times, [0.0, 0.5, 1.0], atol=1e-12)
+
+
 def test_a_trajectory_says_what_its_phases_are(motion):
     kinds = [phase.kind for phase in motion.phases]
     assert kinds == ["move", "dwell", "move", "given speed", "move"]

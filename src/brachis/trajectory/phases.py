@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from brachis.common.arrays import bisect
 from brachis.common.summary import Summary
 from brachis.kernel import Spline
 from brachis.task import ProcessSpeed
@@ -55,6 +56,11 @@ class PhaseSpline(Summary):
     def _spline(self) -> Spline:
         """The curves over normalised time."""
         return Spline(self.knots, self.control_points.T, self.degree)
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
+        end = np.full(len(s), self.t_end)
+        return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
 
 @dataclass(frozen=True)
