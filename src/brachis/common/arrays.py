@@ -78,6 +78,11 @@ def drop_near(values: np.ndarray, least: float) -> np.ndarray:
     return values[np.append(np.diff(values) > least, True)]
 
 
+def count_each(counts: np.ndarray) -> np.ndarray:
+    """Count from 0 on up to each of several counts, (N,), one after the other: 2 and 3 give 0, 1, 0, 1, 2."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
 def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
     """Spread numbers, such as times, evenly over every interval, with both its ends.
 
@@ -93,10 +98,8 @@ def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
     (sum of points + 1,) ndarray
     """
     steps = np.broadcast_to(points, len(breaks) - 1)
-    first = np.repeat(np.cumsum(steps) - steps, steps)
-    number = np.arange(len(first)) - first
     width = np.repeat(np.diff(breaks) / steps, steps)
-    inside = number * width + np.repeat(breaks[:-1], steps)
+    inside = count_each(steps) * width + np.repeat(breaks[:-1], steps)
     return np.append(inside, breaks[-1])
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.common.arrays import LastCall
+from brachis.common.arrays import LastCall, count_each
 from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials, Role
 from brachis.robot import Robot
 from brachis.scene import UNIT, ClosePairs, Scene, scene_of
@@ -88,8 +88,7 @@ class Clearance(Limit):
         moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
         count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
         number = np.repeat(np.arange(len(count)), count)
-        begins = np.repeat(np.cumsum(count) - count, count)
-        part = (np.arange(len(number)) - begins + 1) / (count[number] + 1)
+        part = (count_each(count) + 1) / (count[number] + 1)
         q = first[number] + part[:, None] * (last - first)[number]
         holds = self.holds_at_rest(q, slack)
         free = np.ones(len(first), dtype=bool)

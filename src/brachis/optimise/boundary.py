@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from brachis.common.arrays import greville
+from brachis.common.arrays import count_each, greville
 from brachis.kernel import Basis
 from brachis.optimise.bspline import ORDERS, local_basis
 from brachis.path.time_law import TimeLaw
@@ -407,7 +407,7 @@ class SparsityPattern:
         points = (firsts[:, None, None] + columns).ravel()
         counts = part.counts[points]
         term = np.repeat(np.arange(len(points)), counts)
-        within = np.arange(len(term)) - np.repeat(np.cumsum(counts) - counts, counts)
+        within = count_each(counts)
         entry = begins[points][term] + within
         self._weight = part.weight[entry]
         row, function = np.divmod(term, width)

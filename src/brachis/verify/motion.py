@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import bisect
+from brachis.common.arrays import bisect, count_each
 from brachis.errors import InputError
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of
@@ -348,8 +348,7 @@ def _spread(given: Given) -> Places:
     steps = np.ceil(np.clip(wanted, _LEAST_STEPS, 10_000)).astype(int)
     count = steps + 1
     _check_count(count.sum())
-    begins = np.repeat(np.cumsum(count) - count, count)
-    part = (np.arange(len(begins)) - begins) / np.repeat(steps, count)
+    part = count_each(count) / np.repeat(steps, count)
     u = (1.0 - part) * np.repeat(low, count) + part * np.repeat(high, count)
     return np.repeat(first, count), u
 
