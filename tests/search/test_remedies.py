@@ -12,6 +12,7 @@ from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, Remedy
 from brachis.robot.from_task import robot_for
 from brachis.search import remedies as module
+from brachis.search.hopeless import round_to_three_digits
 
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 IIWA = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
@@ -194,3 +195,13 @@ def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
         message = row["message"]
     assert "Raise robot.limits.torque.j1 (how far is not known)" in message
     assert bool(trials) is (way == "plan")
+
+
+@pytest.mark.parametrize(
+    ("value", "lower", "upper"),
+    [(1.2345, 1.23, 1.24), (0.0098765, 0.00987, 0.00988), (1.13, 1.13, 1.13)],
+)
+def test_numbers_of_three_digits_stay(value, lower, upper):
+    assert round_to_three_digits(value, down=True) == pytest.approx(lower, rel=1e-12)
+    assert round_to_three_digits(value, down=False) == pytest.approx(upper, rel=1e-12)
+    assert round_to_three_digits(-value, down=True) == -value

@@ -212,10 +212,10 @@ class TorqueSpeedLimit(Limit):
 
     def partials(self, motion: JointStates) -> Partials:
         """Slopes of the values by q, qdot and qddot, (K, c, n) each."""
-        exact = motion.torque_derivatives(self._robot)
         scale = (self._signs / self._at_rest)[:, None]
         by_q, by_qdot, by_qddot = (
-            part[:, self._joints] * scale for part in (exact.q, exact.qdot, exact.qddot)
+            part[:, self._joints] * scale
+            for part in motion.torque_derivatives(self._robot)
         )
         every = np.arange(len(self._joints))
         slopes = self._by_curve(RoundedCurve.slopes, motion)

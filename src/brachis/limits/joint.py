@@ -236,8 +236,7 @@ class _TorqueLimit(_DynamicLimit):
         return motion.torque(self._robot)
 
     def quantity_partials(self, motion: JointStates) -> Partials:
-        exact = motion.torque_derivatives(self._robot)
-        return Partials(exact.q, exact.qdot, exact.qddot)
+        return Partials(*motion.torque_derivatives(self._robot))
 
 
 class TorqueLimit(_TorqueLimit, HasLatticeWeights):
@@ -272,8 +271,7 @@ class TorqueRateLimit(_DynamicLimit):
 
         def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:
             """Return the derivatives of the torque by q, qdot and qddot, (2 K, n, n) each."""
-            near = dynamics.torque_derivatives(self._robot, *states[:3])
-            return near.q, near.qdot, near.qddot
+            return dynamics.torque_derivatives(self._robot, *states[:3])
 
         states = (motion.q, motion.qdot, motion.qddot, motion.qdddot)
         q, qdot, qddot = rates(slopes, states)

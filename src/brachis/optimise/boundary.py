@@ -40,6 +40,11 @@ class EndCondition:
     value: float
     derivatives: np.ndarray
 
+    @property
+    def rate(self) -> float:
+        """The first derivative, per second; zero where it is free."""
+        return float(self.derivatives[:1].sum())
+
 
 @dataclass(frozen=True, eq=False)
 class FreePart:
@@ -320,11 +325,7 @@ class Boundary:
     @property
     def rates(self) -> tuple[float, float]:
         """First derivatives of the first curve at start and end, 1/s; zero where these are free."""
-        first, last = (side.derivatives for side in (self.start[0], self.end[0]))
-        return (
-            float(first[0]) if len(first) else 0.0,
-            float(last[0]) if len(last) else 0.0,
-        )
+        return self.start[0].rate, self.end[0].rate
 
     @property
     def ahead(self) -> np.ndarray:

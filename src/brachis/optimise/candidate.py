@@ -115,10 +115,6 @@ class InitialGuess(Summary):
         """Whether the coordinates are a chart's."""
         return isinstance(self.joint_map, ChartMap)
 
-    def with_solver(self, name: str) -> InitialGuess:
-        """Return the same guess for another solver."""
-        return replace(self, solver=name)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Summary):

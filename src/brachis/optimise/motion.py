@@ -20,6 +20,8 @@ _S_MISS = 2e-13
 """Largest deviation of the spline of s from the time law."""
 _LOOKS = 5
 """Times in each interval at which they are compared."""
+_SAMPLES = 20
+"""Times for each station between which a time law is linear, where it is asked when it passes them."""
 
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
@@ -33,6 +35,16 @@ def sample_law(time_law: TimeLaw, t_norm: np.ndarray) -> np.ndarray:
     orders = time_law.at(t_norm * duration)
     scale = duration ** np.arange(ORDERS)
     return (orders * scale[:, None])[:, :, None]
+
+
+def follow_law(
+    law: TimeLaw, stations: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find when a time law passes stations, (P,), s, and ds/dt, 1/s, and d2s/dt2, 1/s^2, there."""
+    t = np.linspace(0.0, law.duration, _SAMPLES * len(stations))
+    times = np.interp(stations, law.at(t)[0], t)
+    _, rate, acceleration, _ = law.at(times)
+    return times, rate, acceleration
 
 
 @dataclass(frozen=True, repr=False)

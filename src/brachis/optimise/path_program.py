@@ -28,10 +28,10 @@ from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
+from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Link, smallest_slack
-from brachis.path.time_law import TimeLaw
 from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
@@ -133,7 +133,7 @@ class PathPhase:
         self._places = self._s[self._number + 1] - behind
         law = phase.time_law
         rates = own.course.curves(timing, np.interp(self._s, along, t))[1][:, 0]
-        squares = (rates if law is None else _follow(law, self._s)) ** 2
+        squares = (rates if law is None else follow_law(law, self._s)[1]) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
         edges = np.linspace(0.0, timing.t_end, intervals + 1)
         self.breaks = np.interp(edges, t, along)
@@ -346,19 +346,8 @@ class PathPhase:
 
     def course(self, x: np.ndarray, s: np.ndarray) -> Course:
         """Take the curves at path coordinates s, (S,)."""
-        y, y_ds, y_dds, _ = self._basis_at(s).curves(self._split(x)[1])
-        return Course(
-            s,
-            np.column_stack([s, y]),
-            np.column_stack([np.ones(len(s)), y_ds]),
-            np.column_stack([np.zeros(len(s)), y_dds]),
-        )
-
-
-def _follow(law: TimeLaw, s: np.ndarray) -> np.ndarray:
-    """Rates ds/dt, (P,), 1/s, with which a time law passes path coordinates, (P,)."""
-    t = np.linspace(0.0, law.duration, _SAMPLES * len(s))
-    return law.at(np.interp(s, law.at(t)[0], t))[1]
+        orders = self._basis_at(s).curves(self._split(x)[1])
+        return Course.over_path(s, orders[:3])
 
 
 def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:

@@ -68,13 +68,14 @@ class PhaseTiming:
         motion = phase.motion(x)
         count = max(_LEAST_PLACES, -(-PLACES // phase.intervals))
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
+
+        def course_at(t: np.ndarray) -> Course:
+            """Take the curves at times, (P,)."""
+            return Course(t, *motion.at(t)[:3])
+
         try:
-            before = phase.joint_map.state(*motion.at(t), t=t)
-            t = divide_turns(t, before.qdot)
-            y, ydot, yddot, _ = motion.at(t)
-            course = TimedCourse(
-                Course(t, y, ydot, yddot), phase.joint_map, phase.limits
-            )
+            fine = _lay_finely(phase, course_at, t)
+            course = TimedCourse(fine, phase.joint_map, phase.limits)
         except UnreachableError:
             return None
         rates = float(course.speeds[0]), float(course.speeds[-1])
@@ -125,10 +126,7 @@ class PhaseTiming:
             s: np.ndarray, estimate: tuple[np.ndarray, np.ndarray] | None = None
         ) -> tuple[TimedCourse, tuple[float, float]]:
             """Lay the course over path coordinates, (S,), and find its rates at both ends."""
-            coarse = course_at(s)
-            derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
-            state = phase.joint_map.state(*derivatives, t=s - begin)
-            course = course_at(divide_turns(s, state.qdot))
+            course = _lay_finely(phase, course_at, s)
             sdot = None if estimate is None else np.interp(course.p, *estimate)
             timed = TimedCourse(course, phase.joint_map, phase.limits, sdot)
             return timed, tuple(timed.speeds[[0, -1]] * phase.boundary.rates)
@@ -162,6 +160,14 @@ class PhaseTiming:
         begin, end = curves[[0, -1], 0]
         course_at = partial(Course.through, curves)
         return cls.along(phase, course_at, (begin, end), places, is_rough=is_rough)
+
+
+def _lay_finely(
+    phase: Phase, course_at: Callable[[np.ndarray], Course], p: np.ndarray
+) -> Course:
+    """Lay a course over stations, (P,), and others between them where the joint path turns."""
+    state = course_at(p).state(phase.joint_map)
+    return course_at(divide_turns(p, state.qdot))
 
 
 def largest_acceleration(timing: Timing) -> float:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,7 @@ from brachis.kernel import Chain
 from brachis.robot.robot import Robot
 
 
-@dataclass(frozen=True)
-class TorqueDerivatives:
+class TorqueDerivatives(NamedTuple):
     """Derivatives of the torque of K states, each (K, n, n): row joint torque, column joint.
 
     Attributes

@@ -13,9 +13,8 @@ choices of single joints are tried, and the best one is kept.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
-from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,7 +24,6 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import (
     ChartMap,
     ChartRows,
-    JointState,
     Newton,
     chart_around,
     transversality,
@@ -219,7 +217,7 @@ def _finish_over_path(
         done = plan_timing(other, whole, timings, adapted.reports, options)
     if done is not None and (done.is_settled or not other.usable):
         return done
-    other = dataclasses.replace(other, to_beat=candidate.to_beat)
+    other = replace(other, to_beat=candidate.to_beat)
     return _refine_if_fast(other, adapted, session, options)
 
 
@@ -238,10 +236,10 @@ def _finish_over_time(
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program
     spline = start.problem.task.spline
-    soon = dataclasses.replace(options, deadline=session.deadline)
+    soon = replace(options, deadline=session.deadline)
     adapted = adapt_mesh(solved, session, spline, soon, target=target)
     undone = filter(None, (candidate.not_completed, adapted.not_completed))
-    named = dataclasses.replace(candidate, not_completed="; ".join(undone))
+    named = replace(candidate, not_completed="; ".join(undone))
     return _refine_if_fast(named, adapted, session, options)
 
 
@@ -257,17 +255,17 @@ def _refine_if_fast(
     first solver refines, and the one that found the motion if that fails.
     """
     if adapted.usable:
-        candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
+        candidate = replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= candidate.to_beat:
-            return dataclasses.replace(candidate, status=SLOW)
+            return replace(candidate, status=SLOW)
     has_several = adapted.program.phases[0].joint_map.r > 1
     pull = _PULL if has_several else 0.0
-    session = dataclasses.replace(session, deadline=options.deadline, pull=pull)
+    session = replace(session, deadline=options.deadline, pull=pull)
     assert candidate.start is not None
     first = solvers_for(candidate.start.problem.task.solver.name)[0]
     done = None
     for backend in dict.fromkeys((first, session.backend)):
-        own = dataclasses.replace(session, backend=backend)
+        own = replace(session, backend=backend)
         try:
             tried = refine_and_verify(
                 candidate, adapted.program, adapted.reports, own, options
@@ -355,30 +353,27 @@ def move_to_chart(
         The same motion but for what splines of the new coordinates cannot say.
     """
     try:
-        motions = list(_densely(solved))
-        s = np.concatenate([state.s for _, _, state in motions])
-        q = np.concatenate([state.q for _, _, state in motions])
+        motions = solved.program.motions(solved.report.x)
+        dense = []
+        for phase, motion in zip(solved.program.phases, motions, strict=True):
+            t_norm = np.linspace(0.0, 1.0, 4 * len(phase.t_norm) + 1)
+            times = t_norm * motion.t_end
+            state = phase.joint_map.state(*motion.at(times), t=times)
+            dense.append((motion.t_end, t_norm, state))
+        s = np.concatenate([state.s for _, _, state in dense])
+        q = np.concatenate([state.q for _, _, state in dense])
         chart = chart_around(problem.task_map, problem.path, s, q, rows)
-        starts = np.array([state.q[0] for _, _, state in motions])
+        starts = np.array([state.q[0] for _, _, state in dense])
         maps = maps_by_leg(problem, chart, starts)
         grids = [phase.grid for phase in solved.program.phases]
         program = program_over(problem, maps, grids)
         parts = []
-        for phase, (t_end, t_norm, state) in zip(program.phases, motions, strict=True):
+        for phase, (t_end, t_norm, state) in zip(program.phases, dense, strict=True):
             curves = chart.curves(state.s, state.q)
             parts.append(fit_curves(phase, t_end, t_norm, curves))
         return program, shortest_time(program, np.concatenate(parts))
     except UnreachableError:
         return None
-
-
-def _densely(solved: SolvedProgram) -> Iterator[tuple[float, np.ndarray, JointState]]:
-    """Yield the duration of every phase, s, and the motion at many even normalised times, (K,)."""
-    motions = solved.program.motions(solved.report.x)
-    for phase, motion in zip(solved.program.phases, motions, strict=True):
-        t_norm = np.linspace(0.0, 1.0, 4 * len(phase.t_norm) + 1)
-        times = t_norm * motion.t_end
-        yield motion.t_end, t_norm, phase.joint_map.state(*motion.at(times), t=times)
 
 
 def _select_joints(solved: SolvedProgram) -> list[ChartRows]:

@@ -7,8 +7,8 @@ creeps along it. Far from it the solve is easy, and its answer is a good start f
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -53,7 +53,7 @@ def solve_within_branch(
         program = finer
         solved = solve_by_margin_continuation(program, x, session, MARGINS)
         reports = (*reports, *solved.reports)
-    return dataclasses.replace(solved, reports=reports)
+    return replace(solved, reports=reports)
 
 
 def solve_by_margin_continuation(

@@ -51,7 +51,6 @@ def explain_reach(
     given = "end" if problem.start is None else "start"
     posture = problem.end if problem.start is None else problem.start
     near = np.zeros(robot.n) if posture is None else posture
-    branch = decomposition.branches[0]
     s = np.linspace(0.0, 1.0, 101)
     found = _sample_postures(decomposition, s, near, deadline)
     if found is None:
@@ -63,39 +62,10 @@ def explain_reach(
         if wider is None:
             return _NO_TIME
         anywhere = np.concatenate([found, wider], axis=1)
-    own = found if posture is None else found[:, :, [branch]]
 
-    def check() -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
-        """Yield where along the path something is possible, (S,) bool, and, if it is not: cause, hint and remedies."""
-        yield (
-            _has_any(_exist(anywhere)),
-            "the path is out of reach from s = {first:.3g} on{far} (no posture was found)",
-            _unit_hint(problem)
-            or "Shorten or move the path, or choose another start posture",
-            (),
-        )
-        within = _has_any(_are_within(robot, found))
-        yield (
-            within,
-            "no posture within the joint ranges was found from s = {first:.3g} on"
-            + _describe_nearest(robot, anywhere[np.argmin(within)]),
-            "Shorten or move the path, or widen the joint ranges",
-            (),
-        )
-        label = decomposition.match.solver.branches[branch]
-        yield (
-            _has_any(_are_within(robot, own)),
-            f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
-            f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
-            (),
-        )
-        for limit in problem.limits:
-            if limit.at_rest == "posture" and limit.role is not Role.SCENE:
-                allowed, nearest, remedies = _check_at_rest(robot, limit, own)
-                cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
-                yield allowed, cause, "Move the path", remedies
-
-    for possible, cause, hint, remedies in check():
+    for possible, cause, hint, remedies in _find_obstacles(
+        decomposition, given, found, anywhere
+    ):
         if not possible.all():
             first, last = (float(end) for end in s[~possible][[0, -1]])
             far = say_how_far(problem.task_map, problem.path, first)
@@ -108,6 +78,48 @@ def explain_reach(
         "Every point of the path is within reach of this branch, but no joint path through them was found; "
         f"try {others}another {given} posture"
     )
+
+
+def _find_obstacles(
+    decomposition: Decomposition, given: str, found: np.ndarray, anywhere: np.ndarray
+) -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
+    """Yield where along the path something is possible, (S,) bool, and, if it is not: cause, hint and remedies.
+
+    `found` and `anywhere` are postures, (S, T, B, A, n), with redundant joints within their ranges and beyond. On the
+    branch of the `given` posture, ``start`` or ``end``, less is possible.
+    """
+    problem = decomposition.problem
+    robot = problem.robot
+    branch = decomposition.branches[0]
+    is_given = problem.start is not None or problem.end is not None
+    own = found[:, :, [branch]] if is_given else found
+    yield (
+        _has_any(_exist(anywhere)),
+        "the path is out of reach from s = {first:.3g} on{far} (no posture was found)",
+        _unit_hint(problem)
+        or "Shorten or move the path, or choose another start posture",
+        (),
+    )
+    within = _has_any(_are_within(robot, found))
+    yield (
+        within,
+        "no posture within the joint ranges was found from s = {first:.3g} on"
+        + _describe_nearest(robot, anywhere[np.argmin(within)]),
+        "Shorten or move the path, or widen the joint ranges",
+        (),
+    )
+    label = decomposition.match.solver.branches[branch]
+    yield (
+        _has_any(_are_within(robot, own)),
+        f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
+        f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
+        (),
+    )
+    for limit in problem.limits:
+        if limit.at_rest == "posture" and limit.role is not Role.SCENE:
+            allowed, nearest, remedies = _check_at_rest(robot, limit, own)
+            cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
+            yield allowed, cause, "Move the path", remedies
 
 
 def _unit_hint(problem: Problem) -> str | None:

@@ -6,9 +6,9 @@ the time law. So limits, splines, coordinates and the path may be others than wh
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -119,7 +119,7 @@ def with_tolerances(planned: Planned, problem: Problem) -> Planned:
     rows = motion.chart_rows
     if rows.size:
         rows = np.concatenate([widen(rows[..., :-1]), rows[..., -1:]], axis=-1)
-    motion = dataclasses.replace(
+    motion = replace(
         motion,
         task=problem.task,
         robot=robot,
@@ -130,7 +130,7 @@ def with_tolerances(planned: Planned, problem: Problem) -> Planned:
         chart_rows=rows,
     )
     verification = verify_trajectory(motion, own_limits=problem.user_limits)
-    return dataclasses.replace(planned, trajectory=motion, verification=verification)
+    return replace(planned, trajectory=motion, verification=verification)
 
 
 def without_tolerances(motion: Trajectory) -> Trajectory:
@@ -153,7 +153,7 @@ def without_tolerances(motion: Trajectory) -> Trajectory:
     rows = motion.chart_rows
     if rows.size:
         rows = rows[..., [*columns, wider.n]]
-    return dataclasses.replace(
+    return replace(
         motion,
         task=task,
         robot=robot,

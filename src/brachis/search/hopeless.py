@@ -22,10 +22,10 @@ import numpy as np
 
 from brachis.errors import PlanningError, Remedy
 from brachis.optimise.candidate import InitialGuess
+from brachis.optimise.motion import follow_law
 from brachis.problem.problem import Problem
 from brachis.search.holding import explain_holding
 from brachis.search.phase_plane import (
-    follow_law,
     phase_plane_on,
     postures_along,
     spread_stations,
@@ -284,19 +284,9 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         )
         ends = [check.speed_at(leg, side) for side in (0, -1)]
         number = max(shares, key=lambda number: (number in ends, shares[number]))
-        first, last = (
-            "rest" if end is None else str(check.speeds[end]) for end in ends
-        )
-        part = check.problem.legs[leg]
-        timing = check.pass_leg(leg, share * every)
-        assert timing is not None
-        active = check.planes[leg].active_limit(timing.rate)
-        why = (
-            f"for the {active} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
-            f"is too short to get from {first} to {last}"
-        )
+        why = _explain_short_leg(check, leg, share)
     possible = {
-        each: _round_down(own * check.speeds[each].figure)
+        each: round_to_three_digits(own * check.speeds[each].figure, down=True)
         for each, own in shares.items()
         if own < _EXACT or each == number
     }
@@ -318,7 +308,26 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
     return error.with_remedies(*remedies)
 
 
-def _round_down(value: float) -> float:
-    """Round a positive number down to three digits."""
+def _explain_short_leg(check: _SpeedCheck, leg: int, share: float) -> str:
+    """Say between which speeds a leg is too short, and for which limit, if this share of all speeds is possible."""
+    ends = [check.speed_at(leg, side) for side in (0, -1)]
+    first, last = ("rest" if end is None else str(check.speeds[end]) for end in ends)
+    timing = check.pass_leg(leg, np.full(len(check.speeds), share))
+    assert timing is not None
+    active = check.planes[leg].active_limit(timing.rate)
+    part = check.problem.legs[leg]
+    return (
+        f"for the {active} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
+        f"is too short to get from {first} to {last}"
+    )
+
+
+def round_to_three_digits(value: float, *, down: bool) -> float:
+    """Round a number down, or up; zero and negative ones stay."""
+    if value <= 0.0:
+        return value
     digits = 2 - math.floor(math.log10(value))
-    return math.floor(value * (1.0 + 1e-9) * 10.0**digits) / 10.0**digits
+    scaled = value * 10.0**digits
+    slack = 1e-9 * scaled  # 1.13 times 100 is a little less than 113
+    rounded = math.floor(scaled + slack) if down else math.ceil(scaled - slack)
+    return rounded / 10.0**digits

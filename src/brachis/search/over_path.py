@@ -9,10 +9,9 @@ this one, and the search goes on in it.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -109,7 +108,7 @@ def improve_guess(
             own = _program_like(program, moved)
             found = improve_joint_paths(own, moved.legs, solve, tolerance, effort)
             reports = (*better.found.reports, *found.reports)
-            found = dataclasses.replace(found, reports=reports)
+            found = replace(found, reports=reports)
             gain = 1.0 - found.t_end / better.found.t_end
             if gain < -tolerances.GAIN:
                 break
@@ -134,9 +133,9 @@ def _centre(better: BetterGuess) -> BetterGuess:
     """
     chart, s, q = _chart_of(better.start)
     centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
-    start = dataclasses.replace(better.start, joint_map=centred)
+    start = replace(better.start, joint_map=centred)
     program = _program_like(better.program, start)
-    return dataclasses.replace(better, start=start, program=program)
+    return replace(better, start=start, program=program)
 
 
 def _chart_of(start: InitialGuess) -> tuple[ChartMap, np.ndarray, np.ndarray]:
@@ -155,7 +154,7 @@ def _along(start: InitialGuess, found: BetterPaths) -> InitialGuess:
         return start
     curves = np.concatenate(found.curves)
     grows = np.append(True, np.diff(curves[:, 0]) > 0.0)
-    return dataclasses.replace(
+    return replace(
         start,
         joint_path=curves[grows],
         estimate=found.t_end + start.problem.dwell_time,
@@ -173,9 +172,7 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
     if least >= _TRANSVERSAL and not better.found.is_held_back:
         return None
     moved = chart_around(chart.task_map, chart.path, s, q)
-    return dataclasses.replace(
-        better.start, joint_map=moved, joint_path=moved.curves(s, q)
-    )
+    return replace(better.start, joint_map=moved, joint_path=moved.curves(s, q))
 
 
 def solve_over_path(

@@ -20,12 +20,12 @@ from brachis.common.arrays import bisect, interpolate_columns
 from brachis.errors import UnreachableError
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point, worst_time_scaling_ratio
+from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of
 from brachis.path.legs import Leg
-from brachis.path.time_law import TimeLaw
 from brachis.problem.problem import Problem
 from brachis.timing import JointPath, PhasePlane
 
@@ -117,16 +117,6 @@ def phase_plane_on(
     return PhasePlane(problem.limits, JointPath.through(stations, postures))
 
 
-def follow_law(
-    law: TimeLaw, stations: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find when a time law passes stations, (P,), s, and ds/dt, 1/s, and d2s/dt2, 1/s^2, there."""
-    t = np.linspace(0.0, law.duration, 8 * len(stations))
-    times = np.interp(stations, law.at(t)[0], t)
-    _, rate, acceleration, _ = law.at(times)
-    return times, rate, acceleration
-
-
 def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     """Fit splines to the joint path of a guess, as `starting_point` does.
 
@@ -147,7 +137,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
         is_near = start.is_improved or program.variables > FEW_VARIABLES
         timed = [
             _time_guess(phase, curves)
-            if is_near or _is_moving(phase)
+            if is_near or any(phase.boundary.rates)
             else (curves, None)
             for phase, curves in zip(program.phases, start.legs, strict=True)
         ]
@@ -212,11 +202,6 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
     growth = bisect(lambda trial: half * ends(trial, 1.0) > ratios, np.full(2, 20.0))
     before, behind = ends(growth[:, None], np.arange(half + 1.0))
     return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
-
-
-def _is_moving(phase: Phase) -> bool:
-    """Tell whether the tool moves at an end of a leg."""
-    return any(phase.boundary.rates)
 
 
 def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:

@@ -12,10 +12,10 @@ The outcome does not depend on the number of processes: work that one process wo
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 
@@ -223,9 +223,7 @@ class Search:
         for number in self._by_end_time(first):
             candidate = self._solved[number]
             if any(is_same_motion(candidate, other) for other in known):
-                self.candidates[number] = dataclasses.replace(
-                    candidate, status=SAME_MOTION
-                )
+                self.candidates[number] = replace(candidate, status=SAME_MOTION)
             else:
                 known.append(candidate)
                 self._waiting.append(number)
@@ -241,7 +239,7 @@ class Search:
             waiting = [self._solved[number] for number in numbers]
             work = run_in_processes(
                 candidates.finish_candidate,
-                [dataclasses.replace(each, to_beat=self._to_beat) for each in waiting],
+                [replace(each, to_beat=self._to_beat) for each in waiting],
                 self._latest,
                 jobs=jobs,
                 listener=self._listener,
@@ -254,7 +252,7 @@ class Search:
                     candidate = outcome
                     if self._to_beat <= outcome.adapted < np.inf:
                         # Over all knots it is slower than what was verified meanwhile.
-                        candidate = dataclasses.replace(
+                        candidate = replace(
                             self._solved[number],
                             adapted=outcome.adapted,
                             status=candidates.SLOW,

@@ -13,8 +13,8 @@ sampled, and a layer keeps a bounded number of nodes.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -99,10 +99,7 @@ class PostureLattice(Lattice):
         if self._r > 1 or not self._only_minima:
             others = distinct(found, most)
             chosen += [i for i in others if i not in chosen][: most - len(chosen)]
-        return [
-            dataclasses.replace(found[i], seed=self._seed_of(found[i].q[0]))
-            for i in chosen
-        ]
+        return [replace(found[i], seed=self._seed_of(found[i].q[0])) for i in chosen]
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
         """Make nodes all over the self-motion manifold at the path's beginning, one in a cell."""

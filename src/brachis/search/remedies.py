@@ -15,6 +15,7 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_from_settings
+from brachis.search.hopeless import round_to_three_digits
 from brachis.search.portfolio import Search
 from brachis.task import Task, load_task, task_with, with_keys
 
@@ -131,12 +132,13 @@ def _bracket(
     remedy: Remedy, is_enough: IsEnough, deadline: Deadline
 ) -> tuple[float | None, float]:
     """Find the smallest change known to be enough, None without any, and the largest one that is not."""
+    # Numbers are rounded towards the larger change.
     lowers = remedy.guess < remedy.asked
     away = -1.0 if lowers else 1.0
     good = None
     bad = remedy.asked
     step = _NEAR
-    value = _round(remedy.guess, down=lowers)
+    value = round_to_three_digits(remedy.guess, down=lowers)
     for _ in range(_TRIALS):
         if deadline.passed or value in (good, bad) or value <= 0.0:
             break
@@ -155,18 +157,10 @@ def _bracket(
             back = good / step**away
             if bad == remedy.asked and abs(back - good) < abs(value - good):
                 value = back
-        value = _round(value, down=lowers)
+        value = round_to_three_digits(value, down=lowers)
         # While all numbers are enough, or none, the steps grow.
         step = min(step**3, 2.0)
     return good, bad
-
-
-def _round(value: float, *, down: bool) -> float:
-    """Round to three digits, towards the larger change."""
-    if value <= 0.0:
-        return value
-    digits = 2 - math.floor(math.log10(value))
-    return (math.floor if down else math.ceil)(value * 10.0**digits) / 10.0**digits
 
 
 def _with_number(

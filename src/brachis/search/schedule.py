@@ -7,10 +7,9 @@ redundant joints or its branch gets these alone. Along a path of joints there is
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from brachis.common.deadline import Deadline
@@ -68,7 +67,7 @@ def _with_solvers(
     starts: Sequence[InitialGuess], solvers: Sequence[str]
 ) -> list[InitialGuess]:
     """Combine guesses with solvers."""
-    return [start.with_solver(solver) for solver in solvers for start in starts]
+    return [replace(start, solver=solver) for solver in solvers for start in starts]
 
 
 def batches(
@@ -109,7 +108,7 @@ def batches(
         known = yield from _level_by_level(levels, solvers, find)
         for solver in solvers[1:]:
             yield Batch(_with_solvers(known[:_SIZE], [solver]), len(known))
-        levels = tuple(dataclasses.replace(level, fallback=True) for level in levels)
+        levels = tuple(replace(level, fallback=True) for level in levels)
     if not decompositions:
         return
     find = partial(_guess_on_branches, decompositions, deadline, listener)
@@ -213,9 +212,7 @@ def _guess_on_some_branches(
             lattices.append((decomposition, found))
             continue
         # Those that another process found have a copy of the problem.
-        own = [
-            dataclasses.replace(start, problem=decomposition.problem) for start in found
-        ]
+        own = [replace(start, problem=decomposition.problem) for start in found]
         own.sort(key=lambda start: start.estimate)
         ranked += enumerate(
             own + numeric_starts(decomposition, level.numeric, deadline)

@@ -7,9 +7,9 @@ begins at the joint path where it ended.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -110,8 +110,8 @@ def _improve_most(
     # A program over the path knows no pauses, and its time differs a little from that of a timing.
     waiting = starts[0].problem.dwell_time
     least = min(start.estimate for start in starts) - waiting
-    options = dataclasses.replace(effort.options, to_beat=_NEAR_LEAST * least)
-    effort = dataclasses.replace(effort, options=options)
+    options = replace(effort.options, to_beat=_NEAR_LEAST * least)
+    effort = replace(effort, options=options)
     work = run_in_processes(
         _improve,
         starts,
@@ -151,7 +151,7 @@ def _improve(
 ) -> InitialGuess:
     """Improve a guess over the path. If that fails, its estimate stays; one never improved gets infinity."""
     if not start.is_improved:
-        start = dataclasses.replace(start, estimate=np.inf)
+        start = replace(start, estimate=np.inf)
     if deadline.passed:
         return start
     problem = start.problem

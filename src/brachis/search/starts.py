@@ -7,10 +7,9 @@ displaced by waves over s, end at others.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,7 +91,7 @@ _EXHAUSTIVE = SearchLevel(
 )
 
 SEARCH_LEVELS = {
-    "single": (_SINGLE, dataclasses.replace(_FAST, fallback=True)),
+    "single": (_SINGLE, replace(_FAST, fallback=True)),
     "fast": (_FAST,),
     "thorough": (_FAST, _THOROUGH),
     "exhaustive": (_FAST, _THOROUGH, _EXHAUSTIVE),
@@ -333,7 +332,7 @@ def perturb(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Join
         heights = rng.normal(0.0, own, (len(waves), problem.robot.n))
         q = given.q + np.array(waves).T @ heights
         q = np.clip(q, limits.position_lower, limits.position_upper)
-        found.append(dataclasses.replace(given, q=q))
+        found.append(replace(given, q=q))
     return found
 
 

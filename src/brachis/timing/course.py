@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
 from brachis.kernel import Spline
-from brachis.kinematics import JointMap
+from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit
 from brachis.timing.joint_path import JointPath, Passage, Timing
 from brachis.timing.phase_plane import AGREEMENT, PhasePlane
@@ -35,9 +35,19 @@ class Course:
     def through(cls, curves: np.ndarray, s: np.ndarray) -> Course:
         """Lay cubic splines through curves, (S, c), the first of them the path coordinate, and take them at s, (P,)."""
         spline = Spline.through(curves[:, 0], curves[:, 1:])
+        return cls.over_path(s, [spline(s, nu) for nu in range(3)])
+
+    @classmethod
+    def over_path(cls, s: np.ndarray, others: Iterable[np.ndarray]) -> Course:
+        """Join path coordinates, (P,), and other curves with two derivatives by these, (3, P, c - 1)."""
         own = (s, np.ones_like(s), np.zeros_like(s))  # s and its derivatives by s
-        parts = (np.column_stack([part, spline(s, nu)]) for nu, part in enumerate(own))
-        return cls(s, *parts)
+        return cls(s, *map(np.column_stack, zip(own, others, strict=True)))
+
+    def state(self, joint_map: JointMap) -> JointState:
+        """Joint motion at the stations if p is the time; raises UnreachableError where there is no posture."""
+        still = np.zeros_like(self.y)
+        t = self.p - self.p[0]
+        return joint_map.state(self.y, self.y_dp, self.y_ddp, still, t=t)
 
 
 class TimedCourse:
@@ -72,11 +82,8 @@ class TimedCourse:
         limits: Sequence[Limit],
         rate: np.ndarray | None = None,
     ) -> None:
-        p = course.p
-        still = np.zeros_like(course.y)
-        curves = (course.y, course.y_dp, course.y_ddp, still)
-        state = joint_map.state(*curves, t=p - p[0])
-        path = JointPath(p, state.s, state.q, state.qdot, state.qddot)
+        state = course.state(joint_map)
+        path = JointPath(course.p, state.s, state.q, state.qdot, state.qddot)
         self.path, kept = path.by_length()
         self.speeds = np.linalg.norm(state.qdot, axis=1)
         by_length = None if rate is None else (rate * self.speeds)[kept]

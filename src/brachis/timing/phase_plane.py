@@ -168,7 +168,7 @@ class PhasePlane:
         self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
     def _linearise(self, motion: Passage, kept: Sequence[_Rows] = ()) -> None:
-        """Write the limits at a motion half-way between the stations, and the bounds that follow.
+        """Write the limits at a motion half-way between the stations as rows, and these as bounds.
 
         Parameters
         ----------
@@ -193,11 +193,16 @@ class PhasePlane:
         earlier = [
             own for own in older if own not in rows and own.is_tangent_below(motion)
         ]
-        sloped = [own for own in rows + earlier if own.by_u is not None]
-        levels = [own for own in rows if own.by_u is None]
+        self._set_bounds(
+            [own for own in (*rows, *earlier) if own.by_u is not None],
+            [own for own in rows if own.by_u is None],
+        )
+
+    def _set_bounds(self, sloped: Sequence[_Rows], levels: Sequence[_Rows]) -> None:
+        """Find the bounds on u and x that rows with and without acceleration set, `_levels` known."""
         blank = [np.empty((len(self._steps), 0))]
         self._labels = [
-            str(label) for own in sloped + levels for label in own.limit.labels
+            str(label) for own in (*sloped, *levels) for label in own.limit.labels
         ]
         a, b, low, high = (
             np.hstack(blank + [getattr(own, part) for own in sloped])

@@ -129,7 +129,8 @@ def _worst_deviation(given: Given, leg: Leg) -> Worst:
 def _rows_within(given: Given, leg: Leg) -> tuple[float, float]:
     """Return the times of the first and the last row of a recorded motion that lie in a leg, s."""
     times = given.pieces.times
-    begin, end = given.pieces.times_of(np.array([leg.begin, leg.end]))
+    piece, part = given.pieces.place_on_path(np.array([leg.begin, leg.end]))
+    begin, end = times[piece] + part * given.pieces.lengths[piece]
     inside = times[(times >= begin) & (times <= end)]
     if len(inside) < 2:
         return float(begin), float(end)
