@@ -194,6 +194,22 @@ def test_arrays_and_paths_are_accepted_in_mappings() -> None:
     assert task.robot.urdf == str(Path.cwd() / "a.urdf")
 
 
+def test_a_row_of_a_table_keeps_the_names_of_its_numbers() -> None:
+    pandas = pytest.importorskip("pandas")
+    row = pandas.DataFrame({"b": [2.0], "a": [1.0]}).iloc[0]
+    task = load_task(minimal(start={"joints": row}))
+    assert task.start.joints == {"b": 2.0, "a": 1.0}
+    column = pandas.Series([1.0, 2.0])
+    assert load_task(minimal(start={"joints": column})).start.joints == (1.0, 2.0)
+
+
+def test_a_table_in_place_of_numbers_is_named_by_its_type() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"a": [1.0], "b": [2.0]})
+    with pytest.raises(TaskError, match="wrong form; found DataFrame; allowed"):
+        load_task(minimal(start={"joints": table}))
+
+
 @pytest.mark.parametrize(
     ("value", "share"),
     [("1 %", 0.01), ("0.5%", 0.005), ("100 %", 1.0), (0.02, 0.02), (0, 0.0)],

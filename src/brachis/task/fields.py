@@ -248,12 +248,20 @@ Vector = NonEmpty[Number]
 
 
 def plain(
-    value: object, sequence: type[list[object] | tuple[object, ...]] = list
+    value: Any, sequence: type[list[object] | tuple[object, ...]] = list
 ) -> object:
-    """Return `value` with arrays and sequences as `sequence`, array scalars as numbers, and path objects as strings."""
+    """Return `value` with arrays and sequences as `sequence`, array scalars as numbers, and path objects as strings.
+
+    Numbers with names, such as a row of a pandas table, become a mapping, because their order may be any.
+    """
     # An array is known by its method and not by its class: this stage has no need for NumPy.
     to_list = getattr(value, "tolist", None)
-    value = to_list() if callable(to_list) else value
+    if callable(to_list):
+        keys = getattr(value, "keys", None)
+        names = list(keys()) if callable(keys) else []
+        value = to_list()
+        if names and all(isinstance(name, str) for name in names):
+            value = dict(zip(names, value, strict=True))
     if isinstance(value, Mapping):
         return {key: plain(one, sequence) for key, one in value.items()}
     if isinstance(value, list | tuple):

@@ -83,7 +83,8 @@ def show(value: object) -> str:
         return f"a mapping with the keys {_shorten(keys)}"
     if isinstance(value, list | tuple):
         return f"{_shorten(repr(list(value)))} (a list)"
-    return _shorten(repr(value))
+    text = repr(value)
+    return type(value).__name__ if "\n" in text else _shorten(text)
 
 
 def _shorten(text: str) -> str:
