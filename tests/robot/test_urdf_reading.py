@@ -248,7 +248,7 @@ def inertial(mass: float, moments: tuple[float, float, float]) -> str:
     [
         (
             "",
-            "the body moved by joint 'j2' has no mass; found links tool, link2 without <inertial>",
+            "the body moved by joint 'j2' has no mass; found 0 kg in all of the links tool, link2;",
         ),
         (inertial(0.0, (0.0, 0.0, 0.0)), "the body moved by joint 'j2' has no mass"),
         (

@@ -101,8 +101,9 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
             raise UrdfError(
                 f"the body moved by joint {body.joint!r} has no mass",
                 where=where,
-                found=f"links {', '.join(body.links)} without <inertial>",
+                found=f"0 kg in all of the links {', '.join(body.links)}",
                 allowed="at least one link with <inertial> and mass > 0 kg",
+                hint=f"Add the mass and the inertia to one of them, or lock {body.joint} with robot.locked_joints",
             )
 
 
