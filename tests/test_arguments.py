@@ -70,6 +70,10 @@ def motion():
             "jobs: out of range; found 0; allowed: a whole number >= 1",
         ),
         (
+            lambda: brachis.plan_many(brachis.load_task(brachis.examples.scara_line)),
+            "tasks: this is one task, not a list of tasks; found Task",
+        ),
+        (
             lambda: brachis.verify_trajectory(5),
             "trajectory: this is not a motion; found int; allowed: a Trajectory, a Result, or",
         ),
@@ -103,6 +107,10 @@ def test_what_is_asked_for_is_named(make, told):
             "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body fixed to",
         ),
         (
+            {"strict": "no"},
+            "strict: wrong type; found 'no' (a string); allowed: true or false",
+        ),
+        (
             {"gravity": 9.81},
             "allowed: a list. gravity: Gravity [x, y, z] in the world frame, m/s^2",
         ),
@@ -134,6 +142,20 @@ def test_a_key_of_a_section_is_found_in_a_file():
         ),
         (lambda motion: motion.at([0.0, "b"]), "t: wrong type"),
         (lambda motion: motion.sample("a"), "dt: wrong type; found 'a'"),
+        (lambda motion: motion.at(None), "t: wrong type; found None"),
+        (lambda motion: motion.torque([True]), r"t: wrong type; found \[True\]"),
+        (
+            lambda motion: motion.at([[0.0, 0.1]]),
+            r"the times have the wrong shape; found \(1, 2\)",
+        ),
+        (lambda motion: motion.sample(0.1, last=None), "no ending named None"),
+        (lambda motion: motion.save(None), "path: wrong type; found NoneType"),
+        (lambda motion: export.write(motion, 3), "path: wrong type; found int"),
+        (lambda _: brachis.plots.save_figure(None, 3), "path: wrong type"),
+        (
+            lambda motion: brachis.compare(motion.position),
+            "recorded: wrong type; found method",
+        ),
         (lambda motion: motion.sample([0.1]), r"dt: wrong type; found \[0\.1\]"),
         (lambda motion: export.write(motion, "x.csv", dt="a"), "dt: wrong type"),
         (

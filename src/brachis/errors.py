@@ -403,13 +403,15 @@ class PlanningError(BrachisError):
 
 
 def nearest(
-    name: str, valid: Iterable[str], *, is_attribute: bool = False
+    name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
     """Suggest a valid name.
 
     In turn: the one for a word of other libraries, one with a slip, the longest beginning of `name`, the nearest.
     If an attribute is asked for, functions elsewhere in brachis count as well.
     """
+    if not isinstance(name, str):
+        return None
     by_small = {one.lower(): one for one in valid}
     small = name.lower()
     known = [

@@ -434,7 +434,7 @@ def plan_many(
     >>> [type(outcome).__name__ for outcome in outcomes]
     ['Result', 'PathError']
     """
-    is_one = isinstance(tasks, str | os.PathLike | Mapping)
+    is_one = isinstance(tasks, str | os.PathLike | Mapping | Task)
     if is_one or not isinstance(tasks, Iterable):
         raise InputError(
             "this is one task, not a list of tasks" if is_one else "wrong type",

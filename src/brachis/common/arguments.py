@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import inspect
-import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import wraps
-from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brachis.common.summary import show_value
 from brachis.errors import InputError, UnknownNameError
 
 _P = ParamSpec("_P")
@@ -55,21 +55,8 @@ def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def _wrong_type(value: object, where: str, allowed: str) -> InputError:
-    found = f"{value!r:.60}"
+    found = repr(value) if isinstance(value, str) else show_value(value)
     return InputError("wrong type", where=where, found=found, allowed=allowed)
-
-
-def file_name(value: object, where: str) -> Path:
-    """Return the name of a file as a path.
-
-    Raises
-    ------
-    InputError
-        It is something else.
-    """
-    if not isinstance(value, str | os.PathLike):
-        raise _wrong_type(value, where, "the name of a file")
-    return Path(value)
 
 
 def check_callable(value: object, where: str) -> None:
@@ -154,10 +141,10 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
     InputError
         It is something else.
     """
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise _wrong_type(value, where, f"a number, {unit}") from None
+    with suppress(TypeError, ValueError):
+        if np.asarray(value).dtype.kind in "fiuU":  # neither None nor booleans
+            return np.asarray(value, dtype=float)
+    raise _wrong_type(value, where, f"a number, {unit}")
 
 
 def number(value: float, where: str, unit: str) -> float:

@@ -142,6 +142,24 @@ def _runs(process: int) -> bool:
     return True
 
 
+def file_name(value: object, where: str) -> Path:
+    """Return the name of a file as a path.
+
+    Raises
+    ------
+    InputError
+        It is something else.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise InputError(
+            "wrong type",
+            where=where,
+            found=type(value).__name__,
+            allowed="the name of a file",
+        )
+    return Path(value)
+
+
 def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
     """Refuse a file name that ends as one of another format; one without a suffix, or in digits, may have any content.
 
@@ -149,7 +167,7 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
     ------
     InputError
     """
-    suffix = Path(path).suffix
+    suffix = file_name(path, "path").suffix
     if suffix and not suffix[1:].isdigit() and suffix.lower() != allowed:
         raise InputError(
             "the suffix belongs to another format",

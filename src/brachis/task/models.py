@@ -23,6 +23,7 @@ from brachis.task.fields import (
     POSITION,
     ByForm,
     CheckedModel,
+    Flag,
     Mistake,
     Model,
     Name,
@@ -219,7 +220,7 @@ class Task(CheckedModel):
     """Solver: its name or a mapping."""
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
-    strict: bool | None = None
+    strict: Flag | None = None
     """true: all implausible figures are errors. false: all are warnings. null: only a start posture that looks like
     degrees is an error."""
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brachis.common import tolerances
-from brachis.common.arguments import file_name, number, numbers
+from brachis.common.arguments import number, numbers
 from brachis.common.arrays import freeze
+from brachis.common.files import file_name
 from brachis.common.summary import Summary
 from brachis.common.words import write_apart, write_count
 from brachis.errors import InputError, UnknownNameError
@@ -344,6 +345,12 @@ class Trajectory(Summary):
     def _check_times(self, t: ArrayLike) -> np.ndarray:
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
         times = numbers(t, "t", "s")
+        if times.ndim > 1:
+            raise InputError(
+                "the times have the wrong shape",
+                found=times.shape,
+                allowed="a number, or a list or an array of numbers, (K,)",
+            )
         inside = np.clip(times, 0.0, self.t_end)
         if not np.all(np.abs(times - inside) <= 1e-9 * self.t_end):
             last, t_end = write_apart(times.max(), self.t_end, digits=6)

@@ -13,7 +13,8 @@ from brachis.apps.bottleneck.saturation import dense_samples, limit_ratios
 from brachis.apps.comparison.rows import RatioBounds, bound_ratios
 from brachis.apps.plots import style
 from brachis.apps.recording import import_motion, joint_path_of
-from brachis.common.arguments import check_callable, check_keywords, file_name
+from brachis.common.arguments import check_callable, check_keywords
+from brachis.common.files import file_name
 from brachis.common.progress import Listener
 from brachis.common.summary import Summary
 from brachis.errors import PathError, PlanningError

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, BinaryIO
 
 from brachis.apps.export.animation import film_of, write_gif, write_mp4
 from brachis.apps.export.controllers import write_mcap, write_ros2_yaml, write_urscript
 from brachis.apps.export.rows import rows_of
 from brachis.apps.export.tables import write_csv, write_json, write_parquet
-from brachis.common.files import atomic_write
+from brachis.common.files import atomic_write, file_name
 from brachis.errors import InputError, check_names
 from brachis.trajectory import Motion, motion_of
 
@@ -113,7 +112,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
     if name is not None:
         check_names("format", [name], FORMATS, "format")
         return FORMATS[name]
-    suffix = Path(path).suffix.lower()
+    suffix = file_name(path, "path").suffix.lower()
     found = [form for form in FORMATS.values() if form.suffix == suffix]
     if not found:
         raise InputError(

@@ -10,12 +10,11 @@ import io
 import os
 from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.common.files import BEGINNINGS, atomic_write
+from brachis.common.files import BEGINNINGS, atomic_write, file_name
 from brachis.errors import InputError, NotInstalledError
 from brachis.trajectory import MotionPhase
 
@@ -73,7 +72,7 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
     InputError
         The suffix is not one of `SUFFIXES`.
     """
-    suffix = Path(path).suffix.lower().removeprefix(".")
+    suffix = file_name(path, "path").suffix.lower().removeprefix(".")
     if suffix not in SUFFIXES:
         raise InputError(
             "the suffix of the figure is not that of a known format",

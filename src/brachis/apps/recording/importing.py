@@ -23,9 +23,9 @@ from brachis.apps.recording.nodes import (
     with_rests,
 )
 from brachis.apps.recording.recording import Recording, check_units, read_recording
-from brachis.common.arguments import check_keywords, file_name, numbers
+from brachis.common.arguments import check_keywords, numbers
 from brachis.common.arrays import spread, with_like_signs
-from brachis.common.files import is_task_file
+from brachis.common.files import file_name, is_task_file
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import Path, build_path
 from brachis.planner import Given

@@ -17,8 +17,7 @@ from typing import Any
 import brachis
 from brachis import planner
 from brachis.apps.sweeps.settings import SweepSettings
-from brachis.common.arguments import file_name
-from brachis.common.files import Kind, check_kind, read_text
+from brachis.common.files import Kind, check_kind, file_name, read_text
 from brachis.errors import (
     BrachisError,
     BrachisWarning,
