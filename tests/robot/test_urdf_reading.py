@@ -268,6 +268,14 @@ def test_bodies_that_cannot_be(text, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["", inertial(1.0, (0.1, 0.1, 0.3))])
+def test_bodies_that_cannot_be_stay_with_the_base_if_their_joint_is_locked(text):
+    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text), TURN]
+    with pytest.raises(UrdfError, match=r"lock .*j1 with robot\.locked_joints"):
+        load(joints)
+    assert load(joints, locked_joints={"j1": 0.1}).joint_names == ("j2",)
+
+
 def test_massless_link_is_fine_where_its_body_has_mass():
     heavy_tool = "<link name='load'>" + inertial(2.0, (0.1, 0.1, 0.1)) + "</link>"
     heavy_tool += "<joint name='grip' type='fixed'><parent link='tool'/><child link='load'/></joint>"

@@ -96,7 +96,11 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
         for name in body.links:
             inertial = tree.links[name].find("inertial")
             if inertial is not None:
-                _check_inertial(f"link {name!r}", inertial, where)
+                hint = (
+                    f"Correct it in the URDF; or lock the joints from the base to {body.joint} with "
+                    "robot.locked_joints, if they need not move"
+                )
+                _check_inertial(f"link {name!r}", inertial, where, hint)
         if not body.mass > 0.0:
             raise UrdfError(
                 f"the body moved by joint {body.joint!r} has no mass",
@@ -107,7 +111,7 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
             )
 
 
-def _check_inertial(link: str, inertial: Element, where: str) -> None:
+def _check_inertial(link: str, inertial: Element, where: str, hint: str) -> None:
     """Refuse a negative mass, a mass without moments of inertia, and moments that no body can have."""
     mass = number_of(inertial, "mass", "value", 0.0)
     if mass < 0.0:
@@ -116,6 +120,7 @@ def _check_inertial(link: str, inertial: Element, where: str) -> None:
             where=where,
             found=f"{mass:g} kg",
             allowed=">= 0 kg",
+            hint=hint,
         )
     if mass > 0.0 and inertial.find("inertia") is None:
         raise UrdfError(
@@ -123,9 +128,10 @@ def _check_inertial(link: str, inertial: Element, where: str) -> None:
             where=where,
             found=f"{mass:g} kg",
             allowed="<inertia> with the moments about the centre of mass",
+            hint=hint,
         )
     problem = f"{link} has a non-physical inertia"
-    check_inertia(inertia_matrix(inertial), problem, where, UrdfError)
+    check_inertia(inertia_matrix(inertial), problem, where, UrdfError, hint)
 
 
 @dataclass(frozen=True)

@@ -174,7 +174,11 @@ def symmetric_matrix(moments: Mapping[str, float]) -> np.ndarray:
 
 
 def check_inertia(
-    matrix: np.ndarray, problem: str, where: str, error: type[InputError]
+    matrix: np.ndarray,
+    problem: str,
+    where: str,
+    error: type[InputError],
+    hint: str | None = None,
 ) -> None:
     """Refuse an inertia matrix, (3, 3) kg m^2, that no rigid body has."""
     moments = np.linalg.eigvalsh(matrix)
@@ -186,6 +190,7 @@ def check_inertia(
             where=where,
             found=f"principal moments {found} kg m^2",
             allowed="moments >= 0, none above the sum of the other two, about the centre of mass",
+            hint=hint,
         )
 
 
