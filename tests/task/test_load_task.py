@@ -546,6 +546,16 @@ def test_required_keys(key: str) -> None:
     assert f"task: {key}: this key is required, and missing" in str(refused(task))
 
 
+def test_an_array_of_mistakes_does_not_fill_the_screen() -> None:
+    points = np.full((1000, 2), np.nan)
+    with pytest.raises(TaskError) as caught:
+        load_task(minimal(path=points))
+    lines = str(caught.value).splitlines()
+    assert lines[0] == "task: 2000 mistakes"
+    assert len(lines) == 22
+    assert lines[-1] == "  and 1980 more"
+
+
 def test_all_mistakes_are_in_one_message(tmp_path: Path) -> None:
     text = (
         COMPLETE.replace("0.9", ".nan")

@@ -22,6 +22,8 @@ from brachis.task.fields import (
 from brachis.task.units import unit_of
 
 _M = TypeVar("_M", bound=Model)
+_MOST_MISTAKES = 20
+"""Mistakes that one message lists: a screen. An array of NaN would give thousands."""
 _Location = tuple[str | int, ...]
 """Keys and indices on the way to a value, and tags of unions, as pydantic gives them."""
 
@@ -60,12 +62,16 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
     model : type
         The model that was validated; its fields tell which keys are allowed.
     """
-    details = error.errors(include_url=False)
-    errors = [_one(detail, source, model) for detail in details if not _is_echo(detail)]
-    if len(errors) == 1:
+    details = [
+        detail for detail in error.errors(include_url=False) if not _is_echo(detail)
+    ]
+    errors = [_one(detail, source, model) for detail in details[:_MOST_MISTAKES]]
+    if len(details) == 1:
         return errors[0]
     lines = "".join(f"\n  {one}" for one in errors)
-    return TaskError(f"{len(errors)} mistakes{lines}", where=source)
+    if len(details) > len(errors):
+        lines += f"\n  and {len(details) - len(errors)} more"
+    return TaskError(f"{len(details)} mistakes{lines}", where=source)
 
 
 def show(value: object) -> str:
