@@ -161,9 +161,9 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     Raises
     ------
     TaskError
-        The file cannot be read or is not YAML, or the task is wrong. All mistakes are in one message, a line each, with
-        file, key, what was found and what is allowed. Or a CSV file or a file of limits is wrong; the message names
-        its line or key.
+        The file cannot be read or is not YAML, or the task is wrong. One message has all mistakes, the first
+        twenty with a line each: file, key, what was found and what is allowed. Or a CSV file or a file of
+        limits is wrong; the message names its line or key.
 
     Examples
     --------
