@@ -150,7 +150,7 @@ def differentiate(
     states : sequence of (K, n) ndarray
         q, qdot and qddot.
     partials : sequence of (sequence of ndarray or None, ndarray or None)
-        Of the groups that are no quantities, in order: (K, size, n), or (size, n) if all points share them,
+        Of the groups in ``groups.with_partials``: (K, size, n), or (size, n) if all points share them,
         by q, qdot, qddot and qdddot, and (K, size) by the first curve.
     variables : VariableSlopes, optional
 

@@ -250,7 +250,7 @@ class PathMotion:
         return {name: vars(self)[name] for name in self.__dataclass_fields__}
 
     def find_postures(self) -> np.ndarray:
-        """Find the postures alone, (K, n); NaN where there is none."""
+        """Find the postures alone, (K, n); NaN where they do not exist."""
         load().brachis_postures(self.address)
         return self.q
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -138,7 +139,7 @@ class ChartMap(PathMap):
     """
 
     branch_label = CHART
-    faults = {  # noqa: RUF012
+    faults: ClassVar = {
         "no posture": "the chart has no posture there",
         "singular": "the motion leaves the chart: det J_aug changes its sign",
     }

@@ -16,7 +16,7 @@ Rows of redundant joints are constant: their derivatives vanish.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class ClosedFormMap(PathMap):
     """
 
     branch_of: Branch
-    faults = {  # noqa: RUF012
+    faults: ClassVar = {
         "no posture": "the target is out of the branch's reach",
         "singular": "the Jacobian of the non-redundant joints is singular",
         "turns too far": "a joint turns too far between collocation points to count its turns",
@@ -122,7 +122,7 @@ class ClosedFormMap(PathMap):
         return {"targets": sample.target, "rows": self._rows}
 
     def give_answers(self, motion: PathMotion) -> None:
-        """Write the answers of a closed form that is no formula."""
+        """Write the answers where the kernel has no formula of them."""
         if self.branch_of.answers_of is None:
             targets = motion.given["targets"]
             q_r = motion.given["y"][:, 1:]

@@ -31,7 +31,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -111,7 +111,7 @@ class PathMap(JointMap):
     path: Path
     branch_of: Branch | None = None
     side: float = 0.0
-    faults: Mapping[str, str]
+    faults: ClassVar[Mapping[str, str]]
     sample_at: LastCall[PathSample]
 
     def __init__(self, task_map: TaskMap, path: Path, start: np.ndarray) -> None:
