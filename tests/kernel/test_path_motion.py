@@ -1,13 +1,18 @@
 """Motion along a path, its derivatives and the chain rule against NumPy's formulas, on random chains."""
 
+import copy
+import pickle
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from brachis.kernel import (
+    Fault,
     PathMotion,
     Prescribed,
+    ScaledQuantity,
+    ValueGroups,
     find_least_singular,
     largest_parts,
     tool_derivatives,
@@ -189,10 +194,10 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
 @pytest.mark.parametrize(
     ("row", "side", "fault"),
     [
-        ([0.0, 0.0, 0.0], 0.0, "singular"),
-        ([0.0, 0.0, 1.0], 0.0, ""),
-        ([0.0, 0.0, -1.0], 1.0, "singular"),
-        ([0.0, 0.0, -1.0], -1.0, ""),
+        ([0.0, 0.0, 0.0], 0.0, Fault.SINGULAR),
+        ([0.0, 0.0, 1.0], 0.0, None),
+        ([0.0, 0.0, -1.0], 1.0, Fault.SINGULAR),
+        ([0.0, 0.0, -1.0], -1.0, None),
     ],
 )
 def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
@@ -207,7 +212,7 @@ def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
     side *= np.sign(upright.determinants[0])
     motion = PathMotion.prepare(chain, asked, given, side=side)
     motion.q[:] = 0.3
-    assert motion.evaluate() == fault
+    assert motion.evaluate() is fault
 
 
 def test_what_is_not_finite_is_no_posture():
@@ -217,7 +222,7 @@ def test_what_is_not_finite_is_no_posture():
     given["rows"] = np.eye(3, 4)[[2]]
     motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
     motion.q[:] = np.nan
-    assert motion.evaluate() == "no posture"
+    assert motion.evaluate() is Fault.NO_POSTURE
 
 
 def test_conditions_of_other_shapes_are_refused():
@@ -226,6 +231,59 @@ def test_conditions_of_other_shapes_are_refused():
     given = {"y": ones, "rows": np.zeros((1, 1, 4)), "turning": np.zeros((2, 1, 1, 4))}
     with pytest.raises(ValueError, match="needed"):
         PathMotion.prepare(chain, Prescribed((0, 1)), given)
+
+
+def test_what_the_library_would_read_beyond_its_end_is_refused():
+    chain = chain_of(*random_model(3, 1))
+    asked = Prescribed((0, 1))
+    ones = np.ones((1, 2))
+    given = {"y": ones, "rows": np.zeros((1, 4))}
+    with pytest.raises(ValueError, match="rows of the motion is missing"):
+        PathMotion.prepare(chain, asked, {"y": ones})
+    with pytest.raises(ValueError, match="targets of the motion is missing"):
+        PathMotion.prepare(chain, asked, given | {"reference": np.zeros((1, 7))})
+    with pytest.raises(ValueError, match="ydot, yddot, xi, xi_ds, xi_dds of the"):
+        PathMotion.prepare(chain, asked, given).evaluate()
+    one = np.ones(1)
+    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
+    with pytest.raises(ValueError, match="needs qdddot"):
+        PathMotion.prepare(chain, asked, given, groups=ValueGroups([jerk], [1]))
+
+
+def test_derivatives_are_those_of_the_last_evaluation(case):
+    *_, motion = case
+    known = [own.copy() for own in motion.derivatives()]
+    q = motion.q.copy()
+    motion.q[:] = q + 0.1
+    motion.evaluate()
+    assert np.abs(motion.derivatives()[0] - known[0]).max() > 1e-3
+    motion.q[:] = q
+    motion.evaluate()
+    for own, first in zip(motion.derivatives(), known, strict=True):
+        np.testing.assert_array_equal(own, first)
+
+
+@pytest.mark.parametrize(
+    "send",
+    [copy.copy, copy.deepcopy, lambda own: pickle.loads(pickle.dumps(own))],  # noqa: S301  (our own)
+)
+def test_a_motion_can_be_copied_and_sent(case, send):
+    *_, motion = case
+    again = send(motion)
+    for name in ("q", "qdot", "gradient", "inverse"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
+    for own, other in zip(again.derivatives(), motion.derivatives(), strict=True):
+        np.testing.assert_array_equal(own, other)
+
+
+def test_no_points_give_no_motion():
+    chain = chain_of(*random_model(3, 1))
+    none = np.zeros((0, 2))
+    given = dict.fromkeys(("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds"), none)
+    given["rows"] = np.eye(3, 4)[[2]]
+    motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
+    assert motion.evaluate() is None
+    assert motion.derivatives()[0].shape == (0, 3, 2)
 
 
 def test_close_least_singular_values():

@@ -5,7 +5,15 @@ import pickle
 import numpy as np
 import pytest
 
-from brachis.kernel import Branch, Formula, PathMotion, Prescribed
+from brachis.kernel import (
+    Branch,
+    Fault,
+    Formula,
+    FormulaQuantity,
+    PathMotion,
+    Prescribed,
+    ValueGroups,
+)
 from brachis.robot.chain import chain_of
 from support.random_chains import random_model
 
@@ -114,11 +122,11 @@ def test_turns_are_counted_by_velocities():
     np.testing.assert_allclose(motion.q[:, 1], q, atol=1e-12)
 
 
-@pytest.mark.parametrize(("ranged", "fault"), [(1, "turns too far"), (0, "")])
+@pytest.mark.parametrize(("ranged", "fault"), [(1, Fault.TURNS_TOO_FAR), (0, None)])
 def test_turns_that_are_not_certain(ranged, fault):
     _, q, _, _ = fast_motion(9)
     q[4:] += 0.4 * TURN
-    assert turning(q, ranged).evaluate() == fault
+    assert turning(q, ranged).evaluate() is fault
 
 
 def test_a_branch_comes_back_from_another_process():
@@ -138,3 +146,48 @@ def test_what_does_not_fit_is_refused():
     formula = Formula.of(lambda a, b: np.stack([a[:, 0], b[:, 0]], axis=1), 2, 1)
     with pytest.raises(ValueError, match=r"the answers have the shape \(2,\)"):
         _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula).address
+
+
+def test_a_branch_of_another_chain_is_refused():
+    chain = chain_of(*random_model(4, 1))
+    mask = np.ones(N, dtype=bool)
+    given = {"y": np.zeros((1, 2)), "rows": np.zeros((1, 4))}
+    given["targets"] = np.zeros((1, 2))
+    branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
+    with pytest.raises(ValueError, match="has 3 joints; needed: 4"):
+        PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, branch=branch)
+    formula = Formula.of(lambda a: a[:, None, :2], 3)
+    branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula)
+    chain = chain_of(*random_model(N, 1))
+    with pytest.raises(ValueError, match=r"of \(3,\) numbers; needed: \(2, 1\)"):
+        PathMotion.prepare(chain, ASKED, given, branch=branch)
+
+
+def test_formulas_of_answers_and_of_margins_share_their_room():
+    """The first is long, the second short, and the other way round."""
+    rng = np.random.default_rng(5)
+    chain = chain_of(*random_model(N, 1))
+    mask = np.zeros(N, dtype=bool)
+
+    def answers(targets, q_r):
+        for _ in range(20):
+            targets = targets * targets + q_r
+        return (targets * 0.0 + q_r)[:, None]
+
+    def margins(q):
+        return q[:, :1] * q[:, 1:2]
+
+    branch = Branch(
+        REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, Formula.of(answers, 2, 1)
+    )
+    quantity = FormulaQuantity(
+        Formula.of(margins, N), Formula.gradient(margins, N), np.ones(1)
+    )
+    groups = ValueGroups([quantity], [1])
+    names = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds", "targets")
+    given = {name: rng.uniform(0.1, 0.5, (7, 2)) for name in names}
+    given["rows"] = np.eye(N, N + 1)[[1]]
+    motion = PathMotion.prepare(chain, ASKED, given, branch=branch, groups=groups)
+    assert motion.evaluate() is None
+    np.testing.assert_allclose(motion.q, given["y"][:, [1, 1, 1]], atol=1e-15)
+    np.testing.assert_allclose(motion.values[0], margins(motion.q), atol=1e-15)

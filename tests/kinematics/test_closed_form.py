@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 
 from brachis.errors import UnreachableError
+from brachis.ik.planar import PlanarSolver
+from brachis.kinematics.closed_form import ClosedFormMap
+from brachis.limits.safeguards import build_branch_margins
+from brachis.optimise.evaluator import Evaluator
 from brachis.robot import Robot
 from support.chains import planar_robot
 from support.motions import Sway, check_derivatives, check_time_derivatives, joint_map
@@ -125,3 +131,62 @@ def test_target_out_of_reach(scara_urdf):
     assert np.isnan(postures[1, :2]).all()
     with pytest.raises(UnreachableError, match="out of the branch's reach"):
         chain.state(y, 0.0 * y, 0.0 * y, 0.0 * y)
+
+
+class Slower(PlanarSolver):
+    """A family whose subclass has answers and margins of its own."""
+
+    calls = 0
+
+    def solve_branch(self, targets, q_r, branch):
+        self.calls += 1
+        return super().solve_branch(targets, q_r, branch)
+
+    def branch_margins(self, q, branch):
+        return 0.1 * super().branch_margins(q, branch)
+
+    def margin_gradient(self, q, branch):
+        return 0.1 * super().margin_gradient(q, branch)
+
+
+def test_what_a_subclass_computes_itself_is_asked_for():
+    robot = planar_robot("RRR", "xy")
+    start = [0.4, 1.0, 0.5]
+    known = joint_map(
+        robot, ["x", "y"], curved(robot, ["x", "y"], start), start, ["j2"]
+    )
+    assert isinstance(known.solver, PlanarSolver)
+    solver = copy.copy(known.solver)
+    solver.__class__ = Slower
+    chain = known.task_map, known.path, solver, (1,), known.branch, known.start
+    own = ClosedFormMap(*chain)
+    y, *rates = Sway(known, amplitude=0.1)(T)
+    (margin,) = build_branch_margins(own)
+    state = own.state(y, *rates)
+    assert solver.calls == 1
+    np.testing.assert_array_equal(state.q, known.state(y, *rates).q)
+    assert margin.kernel_quantity(robot.chain) is None
+    evaluation = Evaluator(own, [margin]).evaluate(y, *rates)
+    expected = 0.1 * known.branch_margins(state.q)
+    np.testing.assert_allclose(evaluation.values, expected, atol=1e-14)
+    solver.solve_branch = lambda *_given: np.zeros((len(T), 2))
+    with pytest.raises(ValueError, match=r"Slower\.solve_branch returned"):
+        own.postures(y)
+
+
+def test_turns_follow_postures_that_are_known_to_be_near(motion):
+    y, *rates = motion(T)
+    chain = motion.joint_map
+    q = chain.postures(y)
+    far = q + 4.0 * np.pi * chain.branch_of.turns
+    np.testing.assert_allclose(chain.postures(y, near=far), far, atol=1e-12)
+    np.testing.assert_allclose(chain.state(y, *rates, near=far).q, far, atol=1e-12)
+
+
+def test_a_part_of_a_path_begins_in_the_turns_of_its_own_start(motion):
+    y, *_ = motion(T)
+    chain = motion.joint_map
+    start = chain.start + 2.0 * np.pi * chain.branch_of.turns
+    part = chain.along(chain.path, start)
+    turned = chain.postures(y) + 2.0 * np.pi * chain.branch_of.turns
+    np.testing.assert_allclose(part.postures(y), turned, atol=1e-12)

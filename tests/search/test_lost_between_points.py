@@ -11,7 +11,7 @@ import brachis
 from brachis.common.arrays import greville
 from brachis.common.deadline import NEVER
 from brachis.errors import UnreachableError
-from brachis.kernel import PathMotion
+from brachis.kernel import Fault, PathMotion
 from brachis.kinematics import ClosedFormMap
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.guess import starting_point
@@ -95,7 +95,7 @@ def test_the_last_point_may_be_lost_and_a_phase_with_a_given_speed(monkeypatch):
     paths = [next(differential_ik_paths(phase.joint_map)) for phase in program.phases]
     x = starting_point(program, paths, [None] * len(paths))
     assert add_points_where_lost(program, x) is None
-    honest = ClosedFormMap.place
+    honest = ClosedFormMap.kernel_inputs
 
     def lose_the_last(self, y, sample):
         found = honest(self, y, sample)
@@ -103,7 +103,7 @@ def test_the_last_point_may_be_lost_and_a_phase_with_a_given_speed(monkeypatch):
         targets[-1] = np.nan
         return found | {"targets": targets}
 
-    monkeypatch.setattr(ClosedFormMap, "place", lose_the_last)
+    monkeypatch.setattr(ClosedFormMap, "kernel_inputs", lose_the_last)
     finer = add_points_where_lost(program, x)
     added = [
         np.setdiff1d(fine.t_norm, phase.t_norm)
@@ -121,7 +121,7 @@ def test_a_motion_that_turns_too_far_between_points_gets_points_everywhere(
 ):
     x = next(starting_points(program))
 
-    monkeypatch.setattr(PathMotion, "evaluate", lambda _motion: "turns too far")
+    monkeypatch.setattr(PathMotion, "evaluate", lambda _motion: Fault.TURNS_TOO_FAR)
     finer = add_points_where_lost(program, x)
     gaps = program.collocation_points - 1
     assert finer.collocation_points == program.collocation_points + 3 * gaps

@@ -74,11 +74,17 @@ class IKSolver(ABC):
         """
 
     def branch_formula(self, branch: int, *counts: int) -> Formula | None:
-        """Return the formula of `solve_branch`, of so many task coordinates and redundant joints; None without one."""
+        """Return the formula of `solve_branch`, of so many task coordinates and redundant joints.
+
+        None but in `FormulaSolver`: the planner then asks `solve_branch`.
+        """
         return None
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
-        """Return the formulas of margins and slopes in postures of n joints; None without them."""
+        """Return the formulas of margins and slopes in postures of n joints.
+
+        None but in `FormulaMargins`: the planner then asks `branch_margins` and `margin_gradient`.
+        """
         return None
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
@@ -118,21 +124,30 @@ class FormulaMargins(IKSolver):
             self._formulas[key] = make(*given)
         return self._formulas[key]
 
-    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity:
-        """Record the margins and their slopes, and take the branch's signs."""
-        values = self._formula("margins", Formula.of, self.margins, n)
-        slopes = self._formula("slopes", Formula.gradient, self.margins, n)
-        return FormulaQuantity(values, slopes, self.margin_signs(branch))
+    def _values(self, n: int) -> Formula:
+        return self._formula(("margins", n), Formula.of, self.margins, n)
+
+    def _slopes(self, n: int) -> Formula:
+        return self._formula(("slopes", n), Formula.gradient, self.margins, n)
+
+    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
+        """Return margins and slopes with the branch's signs; None where a subclass computes one of them itself."""
+        own = type(self)
+        if own.branch_margins is not FormulaMargins.branch_margins:
+            return None
+        if own.margin_gradient is not FormulaMargins.margin_gradient:
+            return None
+        values = self._values(n)
+        signs = np.broadcast_to(self.margin_signs(branch), values.shape)
+        return FormulaQuantity(values, self._slopes(n), signs)
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Evaluate the margins by their formula."""
-        formulas = self.margin_formulas(branch, q.shape[1])
-        return formulas.values_of(q) * formulas.factors
+        return self._values(q.shape[1])(q) * self.margin_signs(branch)
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Evaluate the slopes of the margins."""
-        formulas = self.margin_formulas(branch, q.shape[1])
-        return formulas.slopes_of(q) * formulas.factors[:, None]
+        return self._slopes(q.shape[1])(q) * self.margin_signs(branch)[:, None]
 
 
 class FormulaSolver(FormulaMargins):
@@ -142,25 +157,30 @@ class FormulaSolver(FormulaMargins):
     def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Non-redundant joints, (K, B, A, m), as of `solve`; one of them is not finite where there is no answer."""
 
-    def _answers_formula(self, *counts: int) -> Formula:
+    def _of_all(self, *counts: int) -> Formula:
         make = partial(Formula.of, discards_incomplete=True)
-        return self._formula("answers", make, self.answers, *counts)
+        return self._formula(counts, make, self.answers, *counts)
 
-    def branch_formula(self, branch: int, *counts: int) -> Formula:
-        """Return the part of a branch of the answers' formula."""
-        return self._formula(branch, self._answers_formula(*counts).part, branch)
+    def _of_branch(self, branch: int, *counts: int) -> Formula:
+        key = ("branch", branch, *counts)
+        return self._formula(key, self._of_all(*counts).part, branch)
+
+    def branch_formula(self, branch: int, *counts: int) -> Formula | None:
+        """Return the part of a branch of the answers; None where a subclass has a `solve_branch` of its own."""
+        if type(self).solve_branch is not FormulaSolver.solve_branch:
+            return None
+        return self._of_branch(branch, *counts)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Evaluate the answers of all branches."""
-        formula = self._answers_formula(targets.shape[1], q_r.shape[1])
-        return formula(targets, q_r)
+        return self._of_all(targets.shape[1], q_r.shape[1])(targets, q_r)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
         """Evaluate the answers of one branch."""
-        formula = self.branch_formula(branch, targets.shape[1], q_r.shape[1])
-        return formula(targets, q_r)
+        counts = targets.shape[1], q_r.shape[1]
+        return self._of_branch(branch, *counts)(targets, q_r)
 
 
 class NotApplicableError(Exception):

@@ -16,7 +16,7 @@ from brachis.kernel.halving import halve_intervals
 from brachis.kernel.lattice import largest_parts
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
-from brachis.kernel.path_motion import PathMotion, find_least_singular
+from brachis.kernel.path_motion import Fault, PathMotion, find_least_singular
 from brachis.kernel.postures import Branch
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.splines import Basis, Spline, blossom, collocation
@@ -33,6 +33,7 @@ __all__ = [
     "Branch",
     "Chain",
     "CurvePattern",
+    "Fault",
     "Formula",
     "FormulaQuantity",
     "MotionSlopes",

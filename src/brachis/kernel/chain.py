@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import Structured, address, as_doubles, load
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
 """In the order of tool.c."""
@@ -38,7 +37,7 @@ class _Chain(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class Chain(Structured):
     """A serial chain at its zero posture, in the world frame.
 
     Attributes
@@ -81,11 +80,9 @@ class Chain:
         """Number of joints."""
         return len(self.revolute)
 
-    @cached_property
-    def _numbers(self) -> list[np.ndarray]:
-        """What the library reads: contiguous, and kept as long as this object."""
+    def _make_structure(self) -> _Chain:
         n = self.n
-        return [
+        numbers = [
             as_doubles(self.revolute, (n,)),
             as_doubles(self.axes, (n, 3)),
             as_doubles(self.points, (n, 3)),
@@ -97,19 +94,9 @@ class Chain:
             _as_doubles_or_zero(self.gravity, (3,)),
             _as_doubles_or_zero(self.friction, (n, 4)),
         ]
-
-    @cached_property
-    def _structure(self) -> _Chain:
-        return _Chain(self.n, *(address(own) for own in self._numbers))
-
-    @property
-    def address(self) -> int:
-        """Where the library finds the chain."""
-        return ctypes.addressof(self._structure)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave addresses behind."""
-        return {name: value for name, value in vars(self).items() if name[0] != "_"}
+        structure = _Chain(n, *map(address, numbers))
+        structure.kept = numbers
+        return structure
 
     def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
         """Torques, (K, n), Nm or N, of rigid bodies, rotors and friction in K states, (K, n) each."""

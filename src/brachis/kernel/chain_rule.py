@@ -170,8 +170,8 @@ def differentiate(
         raise ValueError("values that depend on qdddot need qdddot_y")
     shape = count, n, width
     along = motion.path_motion
-    if along is not None and along.chain.n != n:
-        raise ValueError("the motion along the path has other joints")
+    if along is not None and along.gradient.shape != shape:
+        raise ValueError("the motion along the path has other joints, curves or points")
     parts: list[Partial] = [None] * 4  # along a path the library knows them
     if along is None:
         parts = [motion.gradient, motion.qdot_y, motion.qddot_y, motion.qddot_ydot]

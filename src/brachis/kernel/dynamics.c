@@ -140,6 +140,8 @@ static inline matrix coriolis(const bodies *own, twist v)
     return (matrix){x, y, z};
 }
 
+_Static_assert(sizeof(bodies) == 28 * sizeof(pack), "bodies are made of packs alone");
+
 static inline void add_bodies(bodies *sum, const bodies *own)
 {
     pack *numbers = (pack *)sum; /* all that a body is made of */

@@ -12,7 +12,7 @@ enum { PLUS, MINUS, TIMES, OVER, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2, CEIL }
     }                                                   \
     break
 
-/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. `numbers` has room for all
+/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. `room` is that for all
 numbers of the formula, of SIDE_BY_SIDE points. Found are (K, outputs). */
 void brachis_formula(
     const formula *own, long count, const double *first, long first_step, const double *second, long second_step,

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import Structured, address, as_doubles, load
 
 _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
@@ -249,7 +249,7 @@ class _Formula(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class Formula:
+class Formula(Structured):
     """A recorded function of K points, with one argument or two.
 
     Attributes
@@ -377,26 +377,15 @@ class Formula:
         )
         return found
 
-    @cached_property
-    def _structure(self) -> _Formula:
-        """As the library takes it."""
+    def _make_structure(self) -> _Formula:
         counts = (*self.counts, 0)[:2]
         parts = (self.constants, self.steps, self.wanted)
         sized = [part for own in parts for part in (len(own), address(own))]
         together = self.shape[-1] if self.discards_incomplete else 0
         return _Formula((ctypes.c_long * 2)(*counts), *sized, together)
 
-    @property
-    def address(self) -> int:
-        """Where the library finds the formula."""
-        return ctypes.addressof(self._structure)
-
     @cached_property
     def room(self) -> int:
         """Numbers of all inputs, constants and steps, as many as are computed side by side."""
         numbers = sum(self.counts) + len(self.constants) + len(self.steps)
         return numbers * int(load().brachis_side_by_side())
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave addresses behind."""
-        return {name: value for name, value in vars(self).items() if name[0] != "_"}

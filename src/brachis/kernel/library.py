@@ -103,6 +103,34 @@ def address(values: np.ndarray) -> int:
         return int(place)
 
 
+class Structured:
+    """A dataclass that the library reads by a structure, which is made once and lives as long as the object."""
+
+    __dataclass_fields__: dict[str, Any]
+
+    def _make_structure(self) -> ctypes.Structure:
+        """Make the structure; arrays that it points to are attributes of it."""
+        raise NotImplementedError
+
+    @property
+    def structure(self) -> Any:
+        """What the library reads."""
+        kept = vars(self)
+        if "_structure" not in kept:
+            # Threads that ask together get the same one.
+            kept.setdefault("_structure", self._make_structure())
+        return kept["_structure"]
+
+    @property
+    def address(self) -> int:
+        """Where the library finds the structure."""
+        return _find_address(self.structure)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave addresses, and what follows from the fields, behind."""
+        return {name: vars(self)[name] for name in self.__dataclass_fields__}
+
+
 def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Return an array of this shape as contiguous doubles.
 

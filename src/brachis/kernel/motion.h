@@ -55,7 +55,7 @@ typedef struct {
     const double *near;                /* (K, n): postures known to be near, which decide about turns; null without them */
 
     /* Found by brachis_postures. */
-    double *answers; /* (K, A, m) */
+    double *answers; /* (K, A, m); given where no formula finds them */
     double *numbers; /* room for a formula */
     double *levels;  /* (K, r) */
     double *q;       /* (K, n) */
@@ -113,7 +113,7 @@ void brachis_torque_slopes(
 );
 void brachis_formula(
     const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
-    double *numbers, double *found
+    double *room, double *found
 );
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from brachis.kernel.chain import Chain
-from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
+from brachis.kernel.library import (
+    Structured,
+    address,
+    as_doubles,
+    as_doubles_at_points,
+    load,
+)
 
 STEPS = 15
-"""Of Newton's method, at most."""
+"""Newton's method takes no more steps."""
 TOLERANCE = 1e-10
 """A miss, m or rad, after which one more step meets the target to rounding: Newton's method squares it."""
 LARGEST_STEP = 0.5
@@ -32,7 +37,7 @@ class _Prescribed(ctypes.Structure):
 
 
 @dataclass(frozen=True)
-class Prescribed:
+class Prescribed(Structured):
     """What of the tool is prescribed: its pose, or rows of its position and perhaps yaw.
 
     Attributes
@@ -61,18 +66,10 @@ class Prescribed:
         """How many task coordinates they have: of a pose position and rotation matrix."""
         return self.count if self.axes else 12
 
-    @cached_property
-    def structure(self) -> _Prescribed:
-        """As the library takes it."""
+    def _make_structure(self) -> _Prescribed:
         axes = (ctypes.c_long * 3)(*self.axes)
         count = len(self.axes)
         return _Prescribed(not count, count, axes, self.tool_axis, self.sign)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave the structure behind."""
-        return {
-            name: value for name, value in vars(self).items() if name != "structure"
-        }
 
 
 def find_postures(
@@ -104,7 +101,7 @@ def find_postures(
     found = np.empty((count, chain.n))
     load().brachis_newton(
         chain.address,
-        ctypes.addressof(prescribed.structure),
+        prescribed.address,
         count,
         prescribed.coordinates,
         targets_at,

@@ -73,6 +73,7 @@ void brachis_path_motion(path_motion *own)
     const prescribed *asked = own->asked;
     long count = own->count;
     long n = arm->joints;
+    own->is_differentiated = 0;
     const selection chosen = select_parts(asked);
     long m = chosen.count;
     long r = n - m;

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from brachis.kernel.chain import Chain
-from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
+from brachis.kernel.library import (
+    Structured,
+    address,
+    as_doubles,
+    as_doubles_at_points,
+    load,
+)
 from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE, Prescribed
 from brachis.kernel.postures import Branch
 from brachis.kernel.value_groups import ValueGroups
@@ -51,10 +58,18 @@ _FOUND = {
 }
 """What it writes: also `a` answers of a closed form, and `f` numbers of formulas."""
 _OF_LIMITS = {"torque": "Kn", "values": "Kv"}
-"""What it writes besides, with v values of limits."""
+"""What it also writes, with v values of limits."""
 _DOUBLE = np.dtype(float).itemsize
-FAULTS = ("", "no posture", "singular", "turns too far")
-"""What `PathMotion.evaluate` may find, in the order of postures.c."""
+_OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
+"""What is needed for more than postures."""
+
+
+class Fault(IntEnum):
+    """Why there is no motion; the numbers are those of postures.c."""
+
+    NO_POSTURE = 1
+    SINGULAR = 2
+    TURNS_TOO_FAR = 3
 
 
 class _PathMotion(ctypes.Structure):
@@ -87,7 +102,10 @@ class _Block(NamedTuple):
 def _divide(
     **sizes: int,
 ) -> tuple[dict[str, tuple[int, ...]], dict[str, _Block], int]:
-    """Return the shapes of what is given, the parts of one block for all that is found, and the block's length."""
+    """Return the shapes of what is given, the parts of one block for all that is found, and the block's length.
+
+    Motions share them: they are not to be written to.
+    """
 
     def shape_of(letters: str) -> tuple[int, ...]:
         """Return the numbers that letters stand for."""
@@ -105,7 +123,7 @@ def _divide(
 
 
 @dataclass(frozen=True, eq=False)
-class PathMotion:
+class PathMotion(Structured):
     """Motion at K points along a path.
 
     First all is prepared; answers of a closed form without a formula, or postures that are known, are then written to
@@ -122,7 +140,11 @@ class PathMotion:
     groups : ValueGroups or None
         Values that are computed with the motion.
     given : dict of str to ndarray
-        What is named in `_GIVEN`, contiguous; what has no meaning, or vanishes, is left out.
+        The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) where all points share them.
+        For a closed form or a chart ``targets``, (K, coordinates), and in a chart its ``reference``, (K, n + r + n
+        r): posture, sigma and dq/dsigma. For `evaluate` ``ydot`` and ``yddot``, and the path's ``xi``, ``xi_ds`` and
+        ``xi_dds``, (K, m). Where rows change along the path, three derivatives of them, ``turning``, (3, K, r, n +
+        1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known to be so.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
     blocks : dict of str to _Block
@@ -170,18 +192,26 @@ class PathMotion:
         Raises
         ------
         ValueError
-            An array has another shape: the library would read beyond its end.
+            An array is missing or has another shape, or branch or groups are those of another chain: the library would
+            read beyond the ends of arrays.
         """
         n = chain.n
         m = prescribed.count
         room = 0
         alternatives = 0
         values = 0
+        needed = ["y", "rows"]
+        if "reference" in given or (branch is not None and branch.answers_of):
+            needed.append("targets")
+        _need(given, needed)
         if branch is not None:
+            branch.check_fits(n, prescribed.coordinates)
             alternatives = branch.alternatives
             room = branch.room
         if groups is not None:
             groups.check_joints(n)
+            if groups.has_jerk:
+                raise ValueError("a group needs qdddot, which follows from derivatives")
             values = groups.size
             room = max(room, groups.room)
         shapes, blocks, length = _divide(
@@ -220,15 +250,13 @@ class PathMotion:
     gradient = cached_property(lambda self: self._find("gradient"))
     torque = cached_property(lambda self: self._find("torque"))
 
-    @cached_property
-    def _structure(self) -> _PathMotion:
-        """What the library reads, and where it writes."""
+    def _make_structure(self) -> _PathMotion:
         given = self.given
         blocks = self.blocks
         first = address(self.room)
         return _PathMotion(
             self.chain.address,
-            ctypes.addressof(self.prescribed.structure),
+            self.prescribed.address,
             None if self.branch is None else self.branch.address,
             len(given["y"]),
             self.rows_step,
@@ -240,30 +268,23 @@ class PathMotion:
             *[first + blocks[name].begin * _DOUBLE for name in _FOUND],
         )
 
-    @property
-    def address(self) -> int:
-        """Where the library finds the motion."""
-        return ctypes.addressof(self._structure)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave addresses and views behind."""
-        return {name: vars(self)[name] for name in self.__dataclass_fields__}
-
     def find_postures(self) -> np.ndarray:
         """Find the postures alone, (K, n); NaN where they do not exist."""
         load().brachis_postures(self.address)
         return self.q
 
-    def evaluate(self) -> str:
-        """Find postures, motion, and values of the groups; return what is at fault, one of `FAULTS`."""
+    def evaluate(self) -> Fault | None:
+        """Find postures, motion, and values of the groups; return what is at fault."""
+        _need(self.given, _OF_MOTION)
         groups = self.groups
-        own = (0, None, None) if groups is None else groups.places
+        own = (0, None, None) if groups is None else groups.pointers
         first = address(self.room)
         where = [
             first + self.blocks[name].begin * _DOUBLE
             for name in ("torque", "numbers", "values")
         ]
-        return FAULTS[load().brachis_evaluate(self.address, *own, *where)]
+        fault = load().brachis_evaluate(self.address, *own, *where)
+        return Fault(fault) if fault else None
 
     @property
     def values(self) -> list[np.ndarray]:
@@ -293,6 +314,13 @@ class PathMotion:
         places = map(address, (*singular, by_q, by_s))
         load().brachis_singular_slopes(self.address, *places)
         return by_q, by_s
+
+
+def _need(given: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
+    """Refuse what is not complete."""
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise ValueError(f"{', '.join(missing)} of the motion is missing")
 
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

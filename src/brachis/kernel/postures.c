@@ -147,7 +147,7 @@ void brachis_postures(path_motion *own)
     take_turns(own, n);
 }
 
-enum { FOUND, NO_POSTURE, SINGULAR, TURNS_TOO_FAR };
+enum { NO_FAULT, NO_POSTURE, SINGULAR, TURNS_TOO_FAR };
 
 /* Find postures and motion, and the values of groups; `torque`, (K, n), is found where `arm` is that of which torques are asked
 for. Returns what is at fault. */
@@ -163,7 +163,8 @@ int brachis_evaluate(
     brachis_path_motion(own);
     for (long k = 0; k < own->count; k++) {
         double determinant = own->determinants[k];
-        if (!(determinant * (own->side != 0.0 ? own->side : determinant) > 0.0)) {
+        double size = own->side == 0.0 ? fabs(determinant) : determinant * own->side;
+        if (!(size > 0.0)) {
             return SINGULAR;
         }
     }
@@ -175,5 +176,5 @@ int brachis_evaluate(
     }
     const double *quantities[5] = {own->q, own->qdot, own->qddot, NULL, torque};
     brachis_values(own->count, n, quantities, groups, of, numbers, found);
-    return FOUND;
+    return NO_FAULT;
 }

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from brachis.kernel.formula import Formula
-from brachis.kernel.library import address, as_doubles
+from brachis.kernel.library import Structured, address, as_doubles
 
 
 class _Branch(ctypes.Structure):
@@ -26,7 +25,7 @@ class _Branch(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Structured):
     """A branch of a closed form, by which m of n joints follow from target and redundant joints.
 
     Of several answers the one is taken that is nearest, modulo turns, to the posture before. Angles get the turns
@@ -66,22 +65,29 @@ class Branch:
         """Numbers of the formula; see `Formula.room`."""
         return 0 if self.answers_of is None else self.answers_of.room
 
-    @cached_property
-    def _numbers(self) -> list[np.ndarray]:
-        """What the library reads: contiguous, and kept as long as this object."""
+    def check_fits(self, n: int, coordinates: int) -> None:
+        """Refuse another number of joints or task coordinates: the library would read beyond the end of arrays.
+
+        Raises
+        ------
+        ValueError
+        """
+        r = len(self.redundant)
+        if len(self.start) != n:
+            raise ValueError(f"the branch has {len(self.start)} joints; needed: {n}")
+        if self.answers_of is None or self.answers_of.counts == (coordinates, r):
+            return
+        raise ValueError(
+            f"the answers are of {self.answers_of.counts} numbers; needed: {(coordinates, r)}"
+        )
+
+    def _make_structure(self) -> _Branch:
         n = len(self.start)
         joints = np.concatenate([self.redundant, self.others])
         if not np.array_equal(np.sort(joints), np.arange(n)):
             raise ValueError("redundant and other joints are not all joints, once each")
         if self.alternatives < 1:
             raise ValueError("no answers to choose from")
-        tables = [
-            as_doubles(own, (n,)) for own in (self.turns, self.ranged, self.start)
-        ]
-        return [self.redundant.astype("l"), self.others.astype("l"), *tables]
-
-    @cached_property
-    def _structure(self) -> _Branch:
         formula = None
         if self.answers_of is not None:
             formula = self.answers_of.address
@@ -90,13 +96,10 @@ class Branch:
                 raise ValueError(
                     f"the answers have the shape {self.answers_of.shape}; needed: {needed}"
                 )
-        return _Branch(formula, self.alternatives, *map(address, self._numbers))
-
-    @property
-    def address(self) -> int:
-        """Where the library finds the branch."""
-        return ctypes.addressof(self._structure)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave addresses behind."""
-        return {name: value for name, value in vars(self).items() if name[0] != "_"}
+        tables = [
+            as_doubles(own, (n,)) for own in (self.turns, self.ranged, self.start)
+        ]
+        numbers = [self.redundant.astype("l"), self.others.astype("l"), *tables]
+        structure = _Branch(formula, self.alternatives, *map(address, numbers))
+        structure.kept = numbers
+        return structure

@@ -181,7 +181,7 @@ class ValueGroups:
             raise ValueError(f"the motion has {n} joints; needed: {self._joints}")
 
     @property
-    def places(self) -> tuple[int, int, int | None]:
+    def pointers(self) -> tuple[int, int, int | None]:
         """How many groups there are, and where the library finds them and the chain of the torques."""
         arm = None if self.chain is None else self.chain.address
         return len(self._table), address(self._table), arm

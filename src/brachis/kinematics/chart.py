@@ -23,7 +23,7 @@ import numpy as np
 from brachis.common.arrays import LastCall, apply_each
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton, null_spaces
-from brachis.kernel import Spline
+from brachis.kernel import Fault, Spline
 from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -114,7 +114,7 @@ class ChartRows:
         rows, offset = self.at(s)
         return apply_each(rows, q) - offset
 
-    def tables(self, s: np.ndarray) -> dict[str, np.ndarray]:
+    def kernel_inputs(self, s: np.ndarray) -> dict[str, np.ndarray]:
         """Return [C, p] at path coordinates (K,), and three derivatives by s, as the kernel takes them."""
         if self.is_constant:
             return {"rows": self.coefficients[0]}
@@ -140,8 +140,8 @@ class ChartMap(PathMap):
 
     branch_label = CHART
     faults: ClassVar = {
-        "no posture": "the chart has no posture there",
-        "singular": "the motion leaves the chart: det J_aug changes its sign",
+        Fault.NO_POSTURE: "the chart has no posture there",
+        Fault.SINGULAR: "the motion leaves the chart: det J_aug changes its sign",
     }
 
     def __init__(
@@ -173,7 +173,8 @@ class ChartMap(PathMap):
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
         self._typical = max(float(np.median(least)), _SINGULAR)
         self._start_margin = float(least[0]) / self._typical
-        self.side = float(np.sign(np.linalg.det(augmented[0])))
+        # A determinant of zero has no side: then nothing is on it.
+        self.side = float(np.sign(np.linalg.det(augmented[0]))) or np.nan
 
     def _augmented_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
         """J_aug, (K, n, n), in postures (K, n) at path coordinates (K,)."""
@@ -193,11 +194,11 @@ class ChartMap(PathMap):
         """Values of y, (K, 1 + r), in postures (K, n) at path coordinates (K,)."""
         return np.column_stack([s, self.rows.values(s, q)])
 
-    def place(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
+    def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
         """Return targets, rows, and the reference, from which Newton's method sets out."""
         s = y[:, 0]
         found = {"targets": sample.target, "reference": self._reference_at(s)}
-        return found | self.rows.tables(s)
+        return found | self.rows.kernel_inputs(s)
 
     def start_margins(self) -> np.ndarray:
         """Margin of the reference at its beginning."""

@@ -21,7 +21,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from brachis.ik import IKSolver
-from brachis.kernel import Branch, FormulaQuantity, PathMotion
+from brachis.kernel import Branch, Fault, FormulaQuantity, PathMotion
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
@@ -48,9 +48,9 @@ class ClosedFormMap(PathMap):
 
     branch_of: Branch
     faults: ClassVar = {
-        "no posture": "the target is out of the branch's reach",
-        "singular": "the Jacobian of the non-redundant joints is singular",
-        "turns too far": "a joint turns too far between collocation points to count its turns",
+        Fault.NO_POSTURE: "the target is out of the branch's reach",
+        Fault.SINGULAR: "the Jacobian of the non-redundant joints is singular",
+        Fault.TURNS_TOO_FAR: "a joint turns too far between collocation points to count its turns",
     }
 
     def __init__(
@@ -117,13 +117,21 @@ class ClosedFormMap(PathMap):
         """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""
         return np.append(s, q[self.redundant])
 
-    def place(self, _y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
+    def kernel_inputs(
+        self, _y: np.ndarray, sample: PathSample
+    ) -> dict[str, np.ndarray]:
         """Return targets, and rows that each select a redundant joint."""
         return {"targets": sample.target, "rows": self._rows}
 
-    def give_answers(self, motion: PathMotion) -> None:
+    def write_answers(self, motion: PathMotion) -> None:
         """Write the answers where the kernel has no formula of them."""
         if self.branch_of.answers_of is None:
             targets = motion.given["targets"]
             q_r = motion.given["y"][:, 1:]
-            motion.answers[:] = self.solver.solve_branch(targets, q_r, self.branch)
+            found = self.solver.solve_branch(targets, q_r, self.branch)
+            if np.shape(found) != motion.answers.shape:
+                raise ValueError(
+                    f"{type(self.solver).__name__}.solve_branch returned the shape {np.shape(found)}; "
+                    f"needed: {motion.answers.shape}"
+                )
+            motion.answers[:] = found

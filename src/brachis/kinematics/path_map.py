@@ -40,6 +40,7 @@ from brachis.errors import UnreachableError
 from brachis.kernel import (
     Branch,
     Chain,
+    Fault,
     MotionSlopes,
     PathMotion,
     ValueGroups,
@@ -102,8 +103,8 @@ class PathMap(JointMap):
         What the kernel needs to know of the branch; None in a chart.
     side : float
         Sign that det J_aug must have; 0: either.
-    faults : dict of str to str
-        What a message says of each of `brachis.kernel.path_motion.FAULTS`.
+    faults : dict of Fault to str
+        What a message says of each.
     sample_at : LastCall
         Samples the path; over the path all iterates have the same s.
     """
@@ -111,7 +112,7 @@ class PathMap(JointMap):
     path: Path
     branch_of: Branch | None = None
     side: float = 0.0
-    faults: ClassVar[Mapping[str, str]]
+    faults: ClassVar[Mapping[Fault, str]]
     sample_at: LastCall[PathSample]
 
     def __init__(self, task_map: TaskMap, path: Path, start: np.ndarray) -> None:
@@ -122,7 +123,7 @@ class PathMap(JointMap):
         self.sample_at = LastCall(path.sample)
 
     @abstractmethod
-    def place(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
+    def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
         """Return what the kernel needs to find postures; see `PathMotion`.
 
         Parameters
@@ -132,7 +133,7 @@ class PathMap(JointMap):
             The path there.
         """
 
-    def give_answers(self, motion: PathMotion) -> None:
+    def write_answers(self, motion: PathMotion) -> None:
         """Write answers that the kernel cannot compute itself to a motion that is prepared."""
 
     def postures(self, y: np.ndarray, *, near: np.ndarray | None = None) -> np.ndarray:
@@ -165,12 +166,12 @@ class PathMap(JointMap):
         motion = PathMotion.prepare(
             self.robot.chain,
             self.task_map.prescribed,
-            given | self.place(given["y"], sample),
+            given | self.kernel_inputs(given["y"], sample),
             branch=self.branch_of,
             side=self.side,
             groups=groups,
         )
-        self.give_answers(motion)
+        self.write_answers(motion)
         return motion
 
     def along(self, path: Path, start: np.ndarray) -> Self:
@@ -210,7 +211,7 @@ class PathMap(JointMap):
             given["t"] = t
         motion = self._prepare(given, sample, groups)
         fault = motion.evaluate()
-        if fault:
+        if fault is not None:
             raise UnreachableError(self.faults[fault])
         found = (motion.q, motion.qdot, motion.qddot, motion.gradient)
         return PathState(self, y, ydot, yddot, ydddot, *found, motion)

@@ -83,7 +83,7 @@ class Progress:
         return sum_powers(self.given, x[0]) + self.part.control_points(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian, (z,)."""
+        """Entries of the Jacobian, (z,); not to be written to."""
         part = self.part
         if len(self.given) == 1:
             return part.weight

@@ -37,6 +37,7 @@ from brachis.optimise.layout import RowLayout, VariableLayout
 from brachis.optimise.motion import Motion, per_second, sample_law
 
 _EACH_ORDER = np.arange(ORDERS)
+"""Orders of derivatives."""
 _is_checked = attrgetter("is_checked_at_points")
 
 
