@@ -298,3 +298,41 @@ def test_a_corner_at_the_seam_is_refused():
 def test_a_motion_that_does_not_end_at_rest_is_not_held(circle):
     with pytest.raises(brachis.InputError, match="does not end at rest"):
         circle.trajectory.sample(0.01, last="hold")
+
+
+LINK = """<link name="l{0}"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j{0}" type="{1}"><parent link="{2}"/><child link="l{0}"/><origin xyz="{3} 0 0"/><axis xyz="0 0 1"/>
+<limit effort="60" velocity="4" lower="-7" upper="7"/></joint>"""
+
+
+@pytest.mark.parametrize("kind", ["continuous", "revolute"])
+def test_a_circle_round_the_arm_closes_if_joints_turn_freely(tmp_path, kind):
+    """The first joint makes a whole turn, which a joint with a range cannot repeat."""
+    links = [LINK.format(i, kind, f"l{i - 1}", 0.4 * (i > 1)) for i in (1, 2, 3)]
+    tool = (
+        '<link name="tool"/><joint name="jt" type="fixed"><parent link="l3"/>'
+        '<child link="tool"/><origin xyz="0.4 0 0"/></joint>'
+    )
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(
+        f'<robot name="arm"><link name="l0"/>{"".join(links)}{tool}</robot>'
+    )
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": str(urdf)},
+        "start": "free",
+        "path_start": [0.93, 0.3],
+        "task_space": ["x", "y"],
+        "path": [{"circle": {"center": [0.3, 0.3]}}],
+        "boundary": {"periodic": True},
+        "spline": {"intervals": 16},
+        "search": QUICK | {"time_limit": 4.0},
+    }
+    result = brachis.plan(task, strict=False)
+    turned = result.trajectory.position(result.t_end) - result.trajectory.position(0.0)
+    assert np.abs(turned[0]) == pytest.approx(2.0 * np.pi, abs=1e-9)
+    assert failed(result.trajectory) == (
+        set() if kind == "continuous" else {"position over the seam"}
+    )
+    assert result.verified == (kind == "continuous")

@@ -313,7 +313,7 @@ class BoundarySettings(CheckedModel):
     """The same at the path's end."""
     periodic: Flag = False
     """Whether a closed path is repeated without stopping: posture, velocity and acceleration at its end equal those at
-    its start. With spline.degree: 2 the acceleration jumps there."""
+    its start; a joint without a range may have made whole turns. With spline.degree: 2 the acceleration jumps there."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for key in ("start_speed", "end_speed"):
