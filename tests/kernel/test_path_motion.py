@@ -21,6 +21,7 @@ from brachis.robot.chain import chain_of
 from support.random_chains import random_model
 
 POINTS = 11
+CURVES_AND_PATH = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds")
 CASES = {
     "pose, r = 0": (6, Prescribed()),
     "pose, r = 2": (8, Prescribed()),
@@ -202,8 +203,7 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
 )
 def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
     chain = chain_of(*random_model(3, 1))
-    ones = np.ones((1, 2))
-    given = dict.fromkeys(("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds"), ones)
+    given = dict.fromkeys(CURVES_AND_PATH, np.ones((1, 2)))
     given["rows"] = np.array([[*row, 0.0]])
     asked = Prescribed((0, 1))
     upright = PathMotion.prepare(chain, asked, given | {"rows": np.eye(3, 4)[[2]]})
@@ -217,8 +217,7 @@ def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
 
 def test_what_is_not_finite_is_no_posture():
     chain = chain_of(*random_model(3, 1))
-    ones = np.ones((1, 2))
-    given = dict.fromkeys(("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds"), ones)
+    given = dict.fromkeys(CURVES_AND_PATH, np.ones((1, 2)))
     given["rows"] = np.eye(3, 4)[[2]]
     motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
     motion.q[:] = np.nan
@@ -278,8 +277,7 @@ def test_a_motion_can_be_copied_and_sent(case, send):
 
 def test_no_points_give_no_motion():
     chain = chain_of(*random_model(3, 1))
-    none = np.zeros((0, 2))
-    given = dict.fromkeys(("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds"), none)
+    given = dict.fromkeys(CURVES_AND_PATH, np.zeros((0, 2)))
     given["rows"] = np.eye(3, 4)[[2]]
     motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
     assert motion.evaluate() is None

@@ -154,11 +154,14 @@ def test_a_branch_of_another_chain_is_refused():
     given = {"y": np.zeros((1, 2)), "rows": np.zeros((1, 4))}
     given["targets"] = np.zeros((1, 2))
     branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
-    with pytest.raises(ValueError, match="has 3 joints; needed: 4"):
+    with pytest.raises(ValueError, match="has 3 joints, 1 redundant; needed: 4, 1"):
         PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, branch=branch)
+    branch = Branch(OTHERS, REDUNDANT, mask, mask, np.zeros(N))
+    chain = chain_of(*random_model(N, 1))
+    with pytest.raises(ValueError, match="has 3 joints, 2 redundant; needed: 3, 1"):
+        PathMotion.prepare(chain, ASKED, given, branch=branch)
     formula = Formula.of(lambda a: a[:, None, :2], 3)
     branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula)
-    chain = chain_of(*random_model(N, 1))
     with pytest.raises(ValueError, match=r"of \(3,\) numbers; needed: \(2, 1\)"):
         PathMotion.prepare(chain, ASKED, given, branch=branch)
 

@@ -37,7 +37,7 @@ FUNCTIONS = {
     "brachis_newton": "- ppllpplpllplddip",
     "brachis_halve": "l plddlpp",
     "brachis_postures": "- p",
-    "brachis_evaluate": "i plppppp",
+    "brachis_evaluate": "i plpp",
     "brachis_path_derivatives": "- p",
     "brachis_least_singular": "- llppp",
     "brachis_singular_slopes": "- ppppp",

@@ -71,6 +71,7 @@ typedef struct {
 
     /* Found by brachis_path_derivatives, (K, n, c), once. */
     double *qdot_y, *qddot_y, *qddot_ydot;
+    double *torque, *values; /* found by brachis_evaluate, where they are asked for */
     long is_differentiated;
 } path_motion;
 

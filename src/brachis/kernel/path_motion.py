@@ -55,10 +55,10 @@ _FOUND = {
     "qdot_y": "Knc",
     "qddot_y": "Knc",
     "qddot_ydot": "Knc",
+    "torque": "Kn",
+    "values": "Kv",
 }
-"""What it writes: also `a` answers of a closed form, and `f` numbers of formulas."""
-_OF_LIMITS = {"torque": "Kn", "values": "Kv"}
-"""What it also writes, with v values of limits."""
+"""What it writes: also a answers of a closed form, f numbers of formulas, and v values of limits."""
 _DOUBLE = np.dtype(float).itemsize
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
 """What is needed for more than postures."""
@@ -114,7 +114,7 @@ def _divide(
     given = {name: shape_of(letters) for name, letters in _GIVEN.items()}
     blocks = {}
     end = 0
-    for name, letters in (_FOUND | _OF_LIMITS).items():
+    for name, letters in _FOUND.items():
         begin = end
         shape = shape_of(letters)
         end += math.prod(shape)
@@ -205,7 +205,7 @@ class PathMotion(Structured):
             needed.append("targets")
         _need(given, needed)
         if branch is not None:
-            branch.check_fits(n, prescribed.coordinates)
+            branch.check_fits(n, n - m, prescribed.coordinates)
             alternatives = branch.alternatives
             room = branch.room
         if groups is not None:
@@ -278,12 +278,7 @@ class PathMotion(Structured):
         _need(self.given, _OF_MOTION)
         groups = self.groups
         own = (0, None, None) if groups is None else groups.pointers
-        first = address(self.room)
-        where = [
-            first + self.blocks[name].begin * _DOUBLE
-            for name in ("torque", "numbers", "values")
-        ]
-        fault = load().brachis_evaluate(self.address, *own, *where)
+        fault = load().brachis_evaluate(self.address, *own)
         return Fault(fault) if fault else None
 
     @property

@@ -149,11 +149,9 @@ void brachis_postures(path_motion *own)
 
 enum { NO_FAULT, NO_POSTURE, SINGULAR, TURNS_TOO_FAR };
 
-/* Find postures and motion, and the values of groups; `torque`, (K, n), is found where `arm` is that of which torques are asked
-for. Returns what is at fault. */
-int brachis_evaluate(
-    path_motion *own, long groups, const group *of, const chain *arm, double *torque, double *numbers, double *found
-)
+/* Find postures and motion, and the values of groups; torques are those of `arm`, if groups ask for them. Returns what is at
+fault. */
+int brachis_evaluate(path_motion *own, long groups, const group *of, const chain *arm)
 {
     long n = own->arm->joints;
     brachis_postures(own);
@@ -172,9 +170,9 @@ int brachis_evaluate(
         return TURNS_TOO_FAR;
     }
     if (arm) {
-        brachis_torques(arm, own->count, own->q, own->qdot, own->qddot, torque);
+        brachis_torques(arm, own->count, own->q, own->qdot, own->qddot, own->torque);
     }
-    const double *quantities[5] = {own->q, own->qdot, own->qddot, NULL, torque};
-    brachis_values(own->count, n, quantities, groups, of, numbers, found);
+    const double *quantities[5] = {own->q, own->qdot, own->qddot, NULL, own->torque};
+    brachis_values(own->count, n, quantities, groups, of, own->numbers, own->values);
     return NO_FAULT;
 }

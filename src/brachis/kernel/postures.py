@@ -65,16 +65,20 @@ class Branch(Structured):
         """Numbers of the formula; see `Formula.room`."""
         return 0 if self.answers_of is None else self.answers_of.room
 
-    def check_fits(self, n: int, coordinates: int) -> None:
-        """Refuse another number of joints or task coordinates: the library would read beyond the end of arrays.
+    def check_fits(self, n: int, r: int, coordinates: int) -> None:
+        """Refuse other numbers of joints, redundant joints or task coordinates.
+
+        The library would read beyond the end of arrays.
 
         Raises
         ------
         ValueError
         """
-        r = len(self.redundant)
-        if len(self.start) != n:
-            raise ValueError(f"the branch has {len(self.start)} joints; needed: {n}")
+        found = len(self.start), len(self.redundant)
+        if found != (n, r):
+            raise ValueError(
+                f"the branch has {found[0]} joints, {found[1]} redundant; needed: {n}, {r}"
+            )
         if self.answers_of is None or self.answers_of.counts == (coordinates, r):
             return
         raise ValueError(
