@@ -26,8 +26,6 @@ from brachis.errors import BrachisError, InputError
 from brachis.optimise.candidate import Candidate
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import LeastMotion, find_least_motion
-from brachis.optimise.program import Program
-from brachis.optimise.transcription import breaks_of, program_of
 from brachis.problem.feasibility import check_regular, lacks_a_direction
 from brachis.problem.plausibility import (
     check_within_reach,
@@ -44,7 +42,7 @@ from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
-from brachis.search import Search, first_maps, try_remedies
+from brachis.search import Search, TaskProgram, first_guess, try_remedies
 from brachis.search.given_motion import with_tolerances
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
@@ -343,7 +341,7 @@ def transcribe(
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),
     **keywords: Unpack[TaskKeywords],
-) -> tuple[Program, str]:
+) -> tuple[TaskProgram, str]:
     """Turn a task into an NLP that can be inspected and solved.
 
     Parameters
@@ -353,30 +351,33 @@ def transcribe(
 
     Returns
     -------
-    program : Program
-        Over as many equal knot intervals a phase as the task says; with ``intervals: auto`` over 10, the first mesh,
-        which `plan` refines.
+    program : TaskProgram
+        ``program.guess`` is a point x to begin with, ``program.names`` says what stands where in x, and
+        ``program.trajectory(x)`` is its motion, for `verify_trajectory`. There are as many equal knot intervals a phase
+        as the task says; with ``intervals: auto`` 10, the first mesh, which `plan` refines.
     family : str
         Family of the closed form.
 
     Raises
     ------
     InputError
-        As `plan` does.
+        As `plan` does; no joint path was found (`PathError`).
 
     Examples
     --------
     >>> import brachis
     >>> program, family = brachis.transcribe(brachis.examples.scara_line, redundant_joints=["j1"])
-    >>> program.variables, family
-    (36, 'planar')
+    >>> program.variables, family, program.names[:3]
+    (36, 'planar', ['t_end', 's[3]', 's[4]'])
+    >>> trajectory = program.trajectory(program.guess)
+    >>> trajectory.t_end == program.objective(program.guess)
+    True
     """
     ik.check_families(families)
     robot, asked = _read(robot_or_task, task, keywords)
     problem = Problem.of(robot, asked, own_limits)
-    joint_maps, family = first_maps(problem, decompositions_of(problem, families))
-    breaks = [breaks_of(problem)] * len(joint_maps)
-    return program_of(problem, joint_maps, breaks), family
+    start = first_guess(problem, decompositions_of(problem, families))
+    return TaskProgram(start), start.family
 
 
 Outcome = Result | BrachisError

@@ -150,6 +150,14 @@ class JointMap(ABC):
     redundant_joints: tuple[str, ...] = ()
     branch_label: str = ""
 
+    @property
+    def curve_names(self) -> tuple[str, ...]:
+        """Names of the curves: s along a path, then the redundant joints, or sigma_1, sigma_2, ... of a chart."""
+        if self.path is None:
+            return self.redundant_joints
+        sigma = (f"sigma_{number}" for number in range(1, 1 + self.r))
+        return ("s", *(self.redundant_joints or sigma))
+
     @abstractmethod
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""

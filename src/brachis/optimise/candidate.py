@@ -358,7 +358,7 @@ def verify(
     verification = None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
-            trajectory = extract_trajectory(problem.task, refined)
+            trajectory = extract_trajectory(problem.task, refined.program, refined.x)
             verification = verify_trajectory(trajectory, own_limits=problem.user_limits)
     phase = refined.program.phases[0]
     tolerance = problem.task.refinement.tolerance

@@ -9,21 +9,21 @@ import numpy as np
 from brachis.common.arrays import cut
 from brachis.kinematics import ChartMap, Nodes, interpolate, join_nodes
 from brachis.optimise.bspline import clamped_knots
-from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Link
+from brachis.optimise.program import Link, Program
 from brachis.task import Task
 from brachis.trajectory import CONTINUOUS_TORQUE, PhaseSpline, Trajectory, join_splines
 
 
-def extract_trajectory(task: Task, solved: SolvedProgram) -> Trajectory:
-    """Turn the answer of a program into a trajectory that can be evaluated without the closed form.
+def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajectory:
+    """Turn a point of a program into a trajectory that can be evaluated without the closed form.
 
     Parameters
     ----------
     task : Task
-    solved : SolvedProgram
+    program : Program
+    x : (v,) ndarray
 
     Returns
     -------
@@ -35,21 +35,21 @@ def extract_trajectory(task: Task, solved: SolvedProgram) -> Trajectory:
         The motion leaves the branch between the collocation points.
     """
     parts: list[_Part] = []
-    for phase, motion in zip(solved.program.phases, _join(solved), strict=True):
+    for phase, motion in zip(program.phases, _join(program, x), strict=True):
         before = parts[-1] if parts else None
         if before is not None and before.pause:
             parts.append(before.wait())
         parts.append(_Part.of(phase, motion, before))
     splines = [part.spline for part in parts]
     knots, control_points = join_splines(splines)
-    joint_map = solved.program.phases[0].joint_map
+    joint_map = program.phases[0].joint_map
     rows = np.empty((0, 0, 0))
     chart_knots = np.empty(0)
     if isinstance(joint_map, ChartMap):
         rows = joint_map.rows.coefficients
         chart_knots = joint_map.rows.knots
     nodes = join_nodes([part.nodes for part in parts])
-    limits = solved.program.phases[0].limits
+    limits = program.phases[0].limits
     own = [limit.name for limit in limits if limit.origin.startswith("own_limits")]
     return Trajectory(
         task=task,
@@ -108,10 +108,9 @@ class _Part:
         return _Part(PhaseSpline(self.pause, knots, degree, points), nodes)
 
 
-def _join(solved: SolvedProgram) -> list[Motion]:
+def _join(program: Program, x: np.ndarray) -> list[Motion]:
     """Return the motions of all phases. Links hold exactly where they begin; a solver holds them to its tolerance."""
-    program = solved.program
-    motions = program.motions(solved.x)
+    motions = program.motions(x)
     for link in program.links:
         before = motions[link.before]
         last = np.array(before.at(np.array([before.t_end])))[:, 0]

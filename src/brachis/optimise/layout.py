@@ -184,6 +184,24 @@ class VariableLayout:
         width = boundary.given + len(splines)
         self.pattern = CurvePattern(own.point, curve, count, width)
 
+    def names(self, curves: Sequence[str]) -> list[str]:
+        """Name the variables: ``t_end`` is the duration, ``s[3]`` control point 3 of s, ``h[0]`` a length.
+
+        Numbers begin at 0. A variable that moves several control points has the number of the first one.
+
+        Parameters
+        ----------
+        curves : sequence of str
+            Names of the curves, one for each spline.
+        """
+        names = ["t_end"]
+        for curve, spline in zip(curves, self.splines, strict=True):
+            part = spline.free_part
+            first = np.unique(part.variable, return_index=True)[1]
+            names += [f"{curve}[{point}]" for point in part.point[first]]
+        count = len(self.x_lower) - len(names)
+        return [*names, *(f"h[{number}]" for number in range(count))]
+
 
 class RowLayout:
     """Where rows and entries of the Jacobian stand; see the module.

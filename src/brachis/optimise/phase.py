@@ -205,6 +205,11 @@ class Phase:
         return self._rows.pattern[1]
 
     @property
+    def names(self) -> list[str]:
+        """Names of the variables; see `VariableLayout.names`."""
+        return self._layout.names(self.joint_map.curve_names[self.boundary.given :])
+
+    @property
     def lengths(self) -> slice:
         """The variables that are interval lengths; none where the knots are fixed."""
         return self._layout.lengths

@@ -192,6 +192,17 @@ class Program(Summary):
         return self._pattern[1]
 
     @property
+    def names(self) -> list[str]:
+        """Names of the variables by their index in x; see `Phase.names`. Those of several phases say which one."""
+        if len(self.phases) == 1:
+            return self.phases[0].names
+        return [
+            f"{name} of phase {number}"
+            for number, phase in enumerate(self.phases, 1)
+            for name in phase.names
+        ]
+
+    @property
     def variables(self) -> int:
         """Number of variables."""
         return len(self.x_lower)

@@ -2,6 +2,7 @@
 
 from brachis.search.portfolio import Search
 from brachis.search.remedies import try_remedies
-from brachis.search.starts import first_maps
+from brachis.search.starts import first_guess
+from brachis.search.task_program import TaskProgram
 
-__all__ = ["Search", "first_maps", "try_remedies"]
+__all__ = ["Search", "TaskProgram", "first_guess", "try_remedies"]

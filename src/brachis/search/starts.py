@@ -18,7 +18,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.errors import PathError, UnreachableError
 from brachis.kernel import Spline, collocation
-from brachis.kinematics import CHART, JointMap, JointSpaceMap, Newton, chart_around
+from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
 from brachis.limits import Role
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
@@ -417,12 +417,10 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     )
 
 
-def first_maps(
+def first_guess(
     problem: Problem, decompositions: Sequence[Decomposition]
-) -> tuple[list[JointMap], str]:
-    """Return joint maps of the problem, one for each leg, of a closed form if there is one, and its family.
-
-    They begin at the given start posture, or if that is free, or there are several legs, along the first joint path.
+) -> InitialGuess:
+    """Return the guess of the first joint path that a lattice has, in a closed form if there is one.
 
     Raises
     ------
@@ -430,11 +428,8 @@ def first_maps(
         The lattice has no joint path.
     """
     if isinstance(problem.task_map, JointSpace):
-        start = joint_space_start(problem)
-        return start.maps_by_leg(), start.family
+        return joint_space_start(problem)
     first = next(iter(decompositions), None)
-    if first is not None and problem.start is not None and len(problem.legs) == 1:
-        return [first.joint_map(problem.start, first.branches[0])], first.match.family
     level = SEARCH_LEVELS["fast"][0]
     found = (
         chart_starts(problem, decompositions, level)
@@ -443,4 +438,4 @@ def first_maps(
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
-    return found[0].maps_by_leg(), found[0].family
+    return found[0]

@@ -1,0 +1,74 @@
+"""The program of a task with a guess to begin with: for a solver of the user's own."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from brachis.common.arguments import check_array, check_finite
+from brachis.errors import PathError
+from brachis.optimise.candidate import InitialGuess
+from brachis.optimise.extraction import extract_trajectory
+from brachis.optimise.program import Program
+from brachis.optimise.transcription import breaks_of, program_of
+from brachis.search.phase_plane import initial_guess
+from brachis.trajectory import Trajectory
+
+
+class TaskProgram(Program):
+    """A `Program` with a first point x, and the trajectory of any point x.
+
+    A solver needs ``guess``, ``x_lower``, ``x_upper``, ``lower``, ``upper`` and the methods ``objective``,
+    ``gradient``, ``rows`` and ``jacobian``, whose entries stand at ``jacobian_rows`` and ``jacobian_columns``. The
+    methods raise `UnreachableError` at points x at which the arm cannot reach the path: there a solver has to shorten
+    its step.
+
+    Parameters
+    ----------
+    start : InitialGuess
+        Joint path of the first guess, with its coordinates.
+    """
+
+    def __init__(self, start: InitialGuess) -> None:
+        joint_maps = start.maps_by_leg()
+        breaks = [breaks_of(start.problem)] * len(joint_maps)
+        program = program_of(start.problem, joint_maps, breaks)
+        super().__init__(program.phases, program.links)
+        self._start = start
+
+    @cached_property
+    def guess(self) -> np.ndarray:
+        """A point x to begin with, (v,): splines through a joint path, slow enough for the limits where that helps.
+
+        Raises
+        ------
+        PathError
+            Such splines leave the branch.
+        """
+        x = initial_guess(self, self._start)
+        if x is None:
+            raise PathError(
+                "the splines through the joint path leave the branch, or the chart",
+                hint="Try more knot intervals (spline.intervals)",
+            )
+        return x
+
+    def trajectory(self, x: np.ndarray) -> Trajectory:
+        """Return the motion of a point x, to be saved, sampled and given to `brachis.verify_trajectory`.
+
+        Parameters
+        ----------
+        x : (v,) ndarray
+            Within its bounds.
+
+        Raises
+        ------
+        InputError
+            `x` is not an array of finite numbers of this size.
+        UnreachableError
+            The motion leaves the branch.
+        """
+        check_array(x, (self.variables,), "x")
+        check_finite(x, "x")
+        return extract_trajectory(self._start.problem.task, self, x)
