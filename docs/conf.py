@@ -20,11 +20,12 @@ extensions = [
     "myst_nb",
     "sphinx_design",
     "docstring_links",
+    "formulas",
 ]
 nitpicky = True
 templates_path: list[str] = []
 
-myst_enable_extensions = ["colon_fence"]
+myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 nb_execution_mode = "force"
 nb_execution_show_tb = True
@@ -36,6 +37,7 @@ autodoc_default_options = {"exclude-members": "model_config"}
 default_role = "py:obj"  # docstring_links.py says what becomes of it
 numpydoc_show_class_members = False
 
+html_math_renderer = "pictures"
 html_theme = "furo"
 html_title = "brachis"
 html_static_path = ["_static"]
