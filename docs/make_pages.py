@@ -11,25 +11,26 @@ ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "docs/figures/gallery.json"
 RESULTS = ROOT / "benchmarks/results"
 PICTURES = {
-    "01": "scara_line.gif",
-    "02": "scara_table.png",
-    "03": "tx90l_rail.gif",
-    "04": "ur10_weld.png",
-    "05": "panda_circle.png",
-    "06": "free_roll.png",
-    "07": "candidates.png",
-    "08": "cam_seam.png",
-    "09": "payload.png",
-    "10": "periodic_circle.gif",
-    "11": "joint_path.png",
-    "12": "today.png",
-    "13": "weld_seams.png",
-    "14": "round_the_post.png",
-    "15": "tilted_torch.png",
-    "16": "into_the_car_body.png",
-    "ik_plugin": "crane.png",
-    "limit_plugin": "coupled.png",
+    "01": ("scara_line.gif", "The paper's line"),
+    "02": ("scara_table.png", "Eight lines, three redundant joints"),
+    "03": ("tx90l_rail.gif", "Six joints on a rail"),
+    "04": ("ur10_weld.png", "A welding seam with a corner and an arc"),
+    "05": ("panda_circle.png", "A seven-joint arm draws a circle"),
+    "06": ("free_roll.png", "A tool whose roll is free"),
+    "07": ("candidates.png", "The fastest of all joint paths"),
+    "08": ("cam_seam.png", "Scattered points of a CAM program"),
+    "09": ("payload.png", "Payload, friction and jerk"),
+    "10": ("periodic_circle.gif", "A circle that is repeated without a stop"),
+    "11": ("joint_path.png", "The timing of a joint path, beside toppra"),
+    "12": ("today.png", "A recorded motion, and a faster one"),
+    "13": ("weld_seams.png", "Two seams at given speeds, with a stop"),
+    "14": ("round_the_post.png", "An elbow that goes round a post"),
+    "15": ("tilted_torch.png", "A torch that may tilt"),
+    "16": ("into_the_car_body.png", "Through the window of a car body"),
+    "ik_plugin": ("crane.png", "A closed form of your own: a crane"),
+    "limit_plugin": ("coupled.png", "A limit of your own: two coupled joints"),
 }
+"""Picture and title of each example."""
 GALLERY_HEAD = """\
 <!-- Made by docs/make_pages.py from docs/figures/gallery.json. -->
 
@@ -40,7 +41,7 @@ Every example of the repository. Click a picture to see the example's source. To
 end times. Every motion shown is verified.
 """
 CARD = """\
-:::{{grid-item-card}} {stem}
+:::{{grid-item-card}} {title}
 :img-top: figures/{picture}
 :class-img-top: thumbnail
 :link: example-{name}
@@ -82,7 +83,8 @@ def _card(name: str, t_end: dict[str, float]) -> str:
     times = (
         f"{values[0]} s" if len(values) == 1 else f"{min(values)} to {max(values)} s"
     )
-    return CARD.format(stem=_stem(name), picture=PICTURES[name], name=name, times=times)
+    picture, title = PICTURES[name]
+    return CARD.format(title=title, picture=picture, name=name, times=times)
 
 
 def _files(name: str) -> list[Path]:
@@ -97,18 +99,14 @@ def _files(name: str) -> list[Path]:
     )
 
 
-def _stem(name: str) -> str:
-    return _files(name)[0].stem if name[0].isdigit() else name
-
-
 def _example(name: str, t_end: dict[str, float]) -> str:
     files = _files(name)
-    stem = _stem(name)
+    picture, title = PICTURES[name]
     times = ", ".join(f"{value:.4f} s ({key})" for key, value in t_end.items())
     parts = [
-        f"(example-{name})=\n## {stem}\n",
+        f"(example-{name})=\n## {title}\n",
         f"{_about(files)}\n",
-        f"![{stem}](figures/{PICTURES[name]})\n",
+        f"![{title}](figures/{picture})\n",
         f"End time: {times}.\n",
     ]
     for path in files:

@@ -39,7 +39,8 @@ def test_every_example_has_its_picture(pages):
     numbers = {path.name.split("_")[0] for path in (ROOT / "examples").glob("[0-9]*")}
     plugins = {path.name for path in (ROOT / "examples").glob("*_plugin")}
     assert set(pages.PICTURES) == numbers | plugins
-    for picture in pages.PICTURES.values():
+    for picture, title in pages.PICTURES.values():
+        assert "_" not in title
         assert 1000 < (DOCS / "figures" / picture).stat().st_size < MOST_BYTES
 
 
