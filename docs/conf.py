@@ -21,6 +21,7 @@ extensions = [
     "sphinx_design",
     "docstring_links",
     "formulas",
+    "cells",
 ]
 nitpicky = True
 templates_path: list[str] = []
@@ -44,13 +45,23 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 
 
+STARTUP = """\
+import os
+import warnings
+os.chdir({folder!r})
+# Cells have few knot intervals, so that they are quick; a kernel's file names say nothing.
+warnings.filterwarnings("ignore", message=".*the same joint path can be passed in")
+warnings.formatwarning = lambda message, category, *place: f"{{category.__name__}}: {{message}}\\n"
+"""
+
+
 def _isolated_clone(folder: Path) -> None:
     """Have cells run in a folder that looks like the repository and may be written to."""
     for name in ("robots", "examples"):
         (folder / name).symlink_to(ROOT / name)
     startup = folder / ".ipython/profile_default/startup"
     startup.mkdir(parents=True)
-    (startup / "clone.py").write_text(f"import os\nos.chdir({str(folder)!r})\n")
+    (startup / "clone.py").write_text(STARTUP.format(folder=str(folder)))
     os.environ["IPYTHONDIR"] = str(folder / ".ipython")
 
 
