@@ -90,3 +90,31 @@ def test_the_warning_says_where_time_is_lost(part, where, intervals_are_given):
     assert where in issue.message
     advice = "spline.intervals: auto" if intervals_are_given else "search.time_limit"
     assert advice in issue.message
+
+
+@pytest.mark.parametrize(
+    "through",
+    [
+        [[0, 0.1, 0], [0, 0.2, 0], [0, 0.1, 0], [0, 1e-4, 0]],
+        [[0.05, 0.07, 0], [0.15, 0.21, 0], [0.05, 0.07, 0]],
+        [[0, 0, 0.1], [0, 0, -0.05], [0, 0, 0.12]],
+    ],
+)
+def test_a_spline_there_and_back_is_not_promised_a_faster_timing(through):
+    """The arm stands where the spline turns round: no grid of the phase plane steps over it."""
+    result = brachis.plan(
+        {
+            "brachis": 1,
+            "robot": {
+                "urdf": "ur10_rail",
+                "locked_joints": {"rail": 0},
+                "limits": {"acceleration": 12},
+            },
+            "start": {"joints": [0, -1.2, 1.6, -0.4, 1.0, 0]},
+            "task_space": "pose",
+            "path": [{"spline": {"relative": True, "through": through}}],
+        }
+    )
+    assert result.verified
+    assert -1e-3 < result.timing_gap.gap < 3e-3
+    assert not result.warnings

@@ -117,8 +117,8 @@ def test_the_parameter_does_not_matter():
     robot = gantry(acceleration=[3.0, 2.0], velocity=[1.0, 0.4])
     q, q_dp, q_ddp = curved(P)
     exact = JointPath(P, P, q, q_dp, q_ddp)
-    by_length, kept = exact.by_length()
-    assert len(kept) == len(P)
+    by_length, places = exact.by_length()
+    np.testing.assert_array_equal(places, P)
     np.testing.assert_allclose(np.linalg.norm(by_length.q_dp, axis=1), 1.0, rtol=1e-12)
     times = [
         least_time(robot, path) for path in (exact, by_length, JointPath.through(P, q))
@@ -154,3 +154,42 @@ def test_what_the_phase_plane_leaves_out():
     jerk = JerkLimit.build(robot, None)
     assert is_left_out(jerk)
     assert not is_left_out(AccelerationLimit.build(robot, None))
+
+
+def there_and_back(p, *, bend=0.0, aside=0.0):
+    """A joint path that turns round at p = 0: in a cusp, p^2 (1, bend p), or in a hairpin if `aside` is not 0."""
+    q = np.column_stack([p**2, bend * p**3 + aside * p])
+    q_dp = np.column_stack([2.0 * p, 3.0 * bend * p**2 + aside])
+    q_ddp = np.column_stack([np.full_like(p, 2.0), 6.0 * bend * p])
+    return q, q_dp, q_ddp
+
+
+def time_there_and_back(first, last, **shape):
+    """Least time on stations that step over p = 0, finer where the path turns, as for plans."""
+    p = np.linspace(first, last, 1802)
+    p = divide_turns(p, there_and_back(p, **shape)[1])
+    path = JointPath(p, p, *there_and_back(p, **shape)).by_length()[0]
+    return least_time(gantry(acceleration=3.0, velocity=2.0), path), path
+
+
+@pytest.mark.parametrize("first", [-1.0, -0.37, -0.011])
+def test_the_arm_stands_at_a_straight_cusp(first):
+    found, path = time_there_and_back(first, 1.0)
+    assert len(path.stops) == 2
+    assert found == pytest.approx(2.0 * sum(np.sqrt([first**2 / 3.0, 1 / 3.0])), 1e-4)
+
+
+@pytest.mark.parametrize("first", [-1.0, -0.37])
+@pytest.mark.parametrize("bend", [0.3, -1.0, 4.0])
+def test_the_arm_stands_at_a_bent_cusp(first, bend):
+    found, _ = time_there_and_back(first, 1.0, bend=bend)
+    halves = (time_there_and_back(*half, bend=bend)[0] for half in ((first, 0), (0, 1)))
+    assert found == pytest.approx(sum(halves), rel=1e-4)
+
+
+def test_a_hairpin_is_passed_and_becomes_a_cusp():
+    """The first axis turns round in either case, and decides how long it takes."""
+    found = [time_there_and_back(-1.0, 1.0, aside=aside) for aside in (0.1, 1e-3, 1e-9)]
+    assert [len(path.stops) for _, path in found] == [0, 0, 2]
+    times = [time for time, _ in found]
+    assert times == pytest.approx([4.0 / np.sqrt(3.0)] * 3, rel=1e-4)

@@ -23,6 +23,7 @@ from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
+from brachis.timing.joint_path import halfway
 
 _FIRST_LOSS = 5.0
 """What the intervals may lose together at first, in tolerances."""
@@ -36,6 +37,9 @@ _MESHES = 5
 """Choices of knots that are tried, no more."""
 _GAINS = 0.9
 """Finer meshes are tried for speed as long as the last one was slower by less than this part of what it was before."""
+_GROWS = 1.2
+"""Finer meshes have so many times the knots of the last one, or twice as many: along a path with cusps even joint
+accelerations do not tell how uneven d2s/dt2 is."""
 _BETTER = 0.5
 """A finer mesh is tried as long as the last one left less than this part of the violation of limits on postures."""
 _MOST_INTERVALS = 200_000
@@ -140,8 +144,12 @@ def follow(
     outside = np.inf
     slower = np.inf
     is_last = False
+    breaks = np.empty(0)
     for number in range(1, _MESHES + 1):
+        before = breaks
         breaks = _knots(phase, own, timing, lost)
+        if len(breaks) < _GROWS * len(before):
+            breaks = np.union1d(before, halfway(before))
         if len(breaks) > _MOST_INTERVALS:
             break
         is_last = is_last or number == _MESHES

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.kernel import Spline
 from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit
@@ -84,16 +85,19 @@ class TimedCourse:
     ) -> None:
         state = course.state(joint_map)
         path = JointPath(course.p, state.s, state.q, state.qdot, state.qddot)
-        self.path, kept = path.by_length()
+        self.path, places = path.by_length()
         self.speeds = np.linalg.norm(state.qdot, axis=1)
-        by_length = None if rate is None else (rate * self.speeds)[kept]
+        speeds = np.interp(places, course.p, self.speeds)
+        by_length = None
+        if rate is not None:
+            by_length = speeds * np.interp(places, course.p, rate)
         self._plane = PhasePlane(limits, self.path, by_length)
-        y_dp = course.y_dp[kept]
-        slopes = y_dp / np.maximum(self.speeds[kept], 1e-300)[:, None]
+        y_dp = interpolate_columns(places, course.p, course.y_dp)
+        slopes = y_dp / np.maximum(speeds, 1e-300)[:, None]
         for end, beside in ((0, 1), (-1, -2)):
-            if not self.speeds[kept[end]] > 0.0:
+            if not speeds[end] > 0.0:
                 slopes[end] = slopes[beside]
-        self._y = course.y[kept]
+        self._y = interpolate_columns(places, course.p, course.y)
         self._slopes = slopes
 
     def solve(

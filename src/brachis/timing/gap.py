@@ -184,13 +184,13 @@ def _time_phase(
     s = trajectory.path_coordinate(t)
     qdot = trajectory.velocity(t)
     q = trajectory.position(t)
-    path, kept = JointPath(t, s, q, qdot, trajectory.acceleration(t)).by_length()
+    path, times = JointPath(t, s, q, qdot, trajectory.acceleration(t)).by_length()
     speeds = np.linalg.norm(qdot, axis=1)
     speeds = np.where(speeds > _STILL * speeds.max(), speeds, 0.0)
     timing = PhasePlane(limits, path).solve((float(speeds[0]), float(speeds[-1])))
     if timing is None:
         return None
-    return path, t[kept], timing.times
+    return path, times, timing.times
 
 
 def _narrowest(s: np.ndarray, lost: np.ndarray) -> tuple[float, float]:

@@ -7,10 +7,11 @@ and q depend on time by powers, and derivatives by time vanish.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.kernel import Spline
 from brachis.robot.dynamics import SharedTorques
 
@@ -24,6 +25,8 @@ _TURN = 0.02
 """Largest change of a unit tangent between stations, rad: a path that turns may speed up or brake at once."""
 _MOST_PARTS = 64
 """Parts of one step, no more."""
+_CORNER = 0.5
+"""Change of a unit tangent in one of these parts, rad, from which on it is a corner, as at a cusp: the arm stands."""
 
 
 def halfway(values: np.ndarray) -> np.ndarray:
@@ -32,12 +35,18 @@ def halfway(values: np.ndarray) -> np.ndarray:
 
 
 def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
-    """Divide the steps between stations p, (P,), in which a joint path turns, by its derivatives there, (P, n)."""
+    """Divide the steps between stations p, (P,), in which a joint path turns, by its derivatives there, (P, n).
+
+    So are those in which its speed changes several times over, as beside a cusp.
+    """
     speed = np.linalg.norm(q_dp, axis=1)[:, None]
     tangent = np.divide(q_dp, speed, out=np.zeros_like(q_dp), where=speed > 0.0)
     turn = np.linalg.norm(np.diff(tangent, axis=0), axis=1)
-    is_known = (speed[1:, 0] > 0.0) & (speed[:-1, 0] > 0.0)
-    parts = np.where(is_known, np.ceil(turn / _TURN), 1.0).clip(1, _MOST_PARTS)
+    slower, faster = np.sort([speed[1:, 0], speed[:-1, 0]], axis=0)
+    is_known = slower > 0.0
+    ratio = np.divide(faster, slower, out=np.ones_like(turn), where=is_known)
+    wanted = np.maximum(np.ceil(turn / _TURN), np.round(ratio))
+    parts = np.where(is_known, wanted, 1.0).clip(1, _MOST_PARTS)
     numbers = np.append(0.0, np.cumsum(parts))
     return np.interp(np.arange(numbers[-1] + 1.0), numbers, p)
 
@@ -54,6 +63,8 @@ class JointPath:
         Path coordinate of the tool; NaN without a path.
     q, q_dp, q_ddp : (P, n) ndarray
         Postures, rad or m, and their derivatives by p.
+    stops : (k,) int ndarray
+        Numbers of the stations at which dp/dt is zero: those before and behind a corner.
     """
 
     p: np.ndarray
@@ -61,6 +72,7 @@ class JointPath:
     q: np.ndarray
     q_dp: np.ndarray
     q_ddp: np.ndarray
+    stops: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
 
     @classmethod
     def through(cls, s: np.ndarray, q: np.ndarray) -> JointPath:
@@ -74,16 +86,15 @@ class JointPath:
         Returns
         -------
         path : JointPath
-            Without the stations at which q does not change with p, but with both ends.
-        kept : (P',) int ndarray
-            Numbers of its stations.
+            Without the stations at which q does not change with p, but with both ends, and with two at each corner.
+        places : (P',) ndarray
+            Values of p at its stations.
         """
         speed = np.linalg.norm(self.q_dp, axis=1)
         moves = speed > _STANDING * speed.max()
         inner = moves.copy()
         inner[[0, -1]] = True
         kept = np.flatnonzero(inner)
-        q = self.q[kept]
         speed = speed[kept]
         with np.errstate(divide="ignore", invalid="ignore"):
             tangent = self.q_dp[kept] / speed[:, None]
@@ -94,14 +105,37 @@ class JointPath:
                 along[end] = np.linalg.norm(self.q_ddp[kept[end]]) * (1 + 2 * end)
                 tangent[end] = tangent[beside]
                 bend[end] = bend[beside]
+        turn = np.linalg.norm(np.diff(tangent, axis=0), axis=1)
+        (corners,) = np.nonzero(turn > _CORNER)
+        sides = np.column_stack([corners, corners + 1])
+        numbers = np.insert(
+            np.arange(len(kept)), sides[:, [1, 1]].ravel(), sides.ravel()
+        )
+        stops = sides + 1 + 2 * np.arange(len(corners))[:, None]
+        places = self.p[kept][numbers]
+        speed = speed[numbers]
+        # The speed falls to zero and rises again, both evenly.
+        ends = places[stops]
+        shares = speed[stops] / speed[stops].sum(axis=1, keepdims=True)
+        places[stops] = np.sum(ends * shares[:, ::-1], axis=1, keepdims=True)
+        speed[stops] = 0.0
+        along = along[numbers]
         # The integral of the speed, by its values and slopes at the stations.
-        step = np.diff(self.p[kept])
+        step = np.diff(places)
         lengths = step * halfway(speed)
         lengths += step**2 / 12.0 * (along[:-1] - along[1:])
         # Stations of their own, also where a path all but stands still.
         lengths = np.maximum(lengths, _SHORTEST * lengths.sum())
         length = np.append(0.0, np.cumsum(lengths))
-        return JointPath(length, self.s[kept], q, tangent, bend), kept
+        path = JointPath(
+            length,
+            np.interp(places, self.p, self.s),
+            interpolate_columns(places, self.p, self.q),
+            tangent[numbers],
+            bend[numbers],
+            stops.ravel(),
+        )
+        return path, places
 
     def middles(self) -> JointPath:
         """Take the path half-way between its stations, by cubics between these."""

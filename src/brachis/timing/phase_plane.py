@@ -227,6 +227,7 @@ class PhasePlane:
         lines = _as_lines(*map(self._at_stations, (a, b, low, high)))
         ceilings.append(kernel.bounds_of_pairs(*lines, _TINY)[1])
         self._ceiling = np.min(ceilings, axis=0)
+        self._ceiling[self.path.stops] = 0.0
         # x + 2 step u is x at the next station.
         self._factor = 1.0 + 2.0 * step * slope
         self._least = 2.0 * step * lower
