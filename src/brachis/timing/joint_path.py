@@ -25,8 +25,9 @@ _TURN = 0.02
 """Largest change of a unit tangent between stations, rad: a path that turns may speed up or brake at once."""
 _MOST_PARTS = 64
 """Parts of one step, no more."""
-_CORNER = 0.5
-"""Change of a unit tangent in one of these parts, rad, from which on it is a corner, as at a cusp: the arm stands."""
+_CORNER = 1.9
+"""Change of a unit tangent from one station to the next from which on it reverses, as at a cusp: the arm stands. On
+coarse stations a path that passes a branch boundary turns by up to 1.5; a reversal is 2."""
 
 
 def halfway(values: np.ndarray) -> np.ndarray:
