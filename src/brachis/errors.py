@@ -247,7 +247,7 @@ class UnknownNameError(InputError):
     kind : str
         What was looked for, for example ``"joint"``.
     name : str
-        The name that was asked for.
+        The name that was asked for, the first of several.
     valid : tuple of str
         The names that exist.
     """
@@ -258,6 +258,7 @@ class UnknownNameError(InputError):
         name: str,
         valid: Iterable[str],
         *,
+        others: Sequence[str] = (),
         where: str | None = None,
         hint: str | None = None,
     ) -> None:
@@ -265,7 +266,7 @@ class UnknownNameError(InputError):
         self.name = name
         self.valid = tuple(valid)
         super().__init__(
-            f"there is no {kind} named {name!r}",
+            f"there is no {kind} named {' or '.join(map(repr, (name, *others)))}",
             allowed=", ".join(self.valid) or "none",
             where=where,
             hint=hint or suggest(name, self.valid),
@@ -275,10 +276,11 @@ class UnknownNameError(InputError):
 def check_names(
     kind: str, names: Iterable[str], valid: Collection[str], where: str
 ) -> None:
-    """Refuse the first of the names that does not exist; see `UnknownNameError`."""
-    for name in names:
-        if name not in valid:
-            raise UnknownNameError(kind, name, valid, where=where)
+    """Refuse names that do not exist; see `UnknownNameError`."""
+    unknown = [name for name in names if name not in valid]
+    if unknown:
+        first, *others = unknown
+        raise UnknownNameError(kind, first, valid, others=others, where=where)
 
 
 class LimitError(InputError):
@@ -287,17 +289,24 @@ class LimitError(InputError):
     Attributes
     ----------
     joint : str
-        The joint's name.
+        The joint's name, the first of several.
     key : str
         The task key that supplies the limit, for example ``robot.limits.torque.j1``.
     """
 
     def __init__(
-        self, problem: str, *, joint: str, key: str, **details: Unpack[Details]
+        self,
+        problem: str,
+        *,
+        joint: str,
+        key: str,
+        others: Sequence[str] = (),
+        **details: Unpack[Details],
     ) -> None:
         self.joint = joint
         self.key = key
-        details["where"] = f"joint {joint!r}"
+        word = "joints" if others else "joint"
+        details["where"] = f"{word} {', '.join(map(repr, (joint, *others)))}"
         details["hint"] = f"Set {key} in the task file"
         super().__init__(problem, **details)
 

@@ -20,13 +20,12 @@ def limits_of(**spec):
     return planar_robot("RRR", limits=LimitSpec(**spec)).limits
 
 
-def with_limit(**changes) -> Robot:
+def with_limit(limits=None, **changes) -> Robot:
     limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 1.0, **changes}
     limit = {key: value for key, value in limit.items() if value is not None}
     joints = [Joint("revolute"), Joint("revolute", limit=limit)]
-    return Robot.from_urdf(
-        "file.urdf", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0))
-    )
+    text = chain_urdf(joints, tool=(0.3, 0.0, 0.0))
+    return Robot.from_urdf("file.urdf", urdf_text=text, limits=limits)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +107,6 @@ def test_scale_comes_last():
 @pytest.mark.parametrize(
     ("changes", "kind"),
     [
-        ({"effort": 0.0}, "torque"),
         ({"effort": -1.0}, "torque"),
         ({"velocity": 0.0}, "velocity"),
     ],
@@ -204,12 +202,16 @@ def test_neither_torque_nor_acceleration():
     assert limits_of(torque={"j2": None}, acceleration={"j2": 5.0}).torque[1] == INF
 
 
-def test_urdf_without_effort():
+@pytest.mark.parametrize("effort", [None, 0.0])
+def test_urdf_without_effort(effort):
     with pytest.raises(
         LimitError, match="neither a torque nor an acceleration limit"
     ) as caught:
-        with_limit(effort=None)
+        with_limit(effort=effort)
     assert caught.value.joint == "j2"
+    assert "no effort, or 0, in the URDF" in str(caught.value)
+    loose = with_limit(effort=effort, limits={"acceleration": {"j2": 5.0}})
+    assert loose.limits.torque[1] == INF
 
 
 def test_unknown_joint_with_suggestion():

@@ -16,10 +16,13 @@ from brachis.errors import (
     UnknownNameError,
     UrdfError,
 )
+from brachis.problem.plausibility import of_robot
 from brachis.robot import Robot
+from brachis.robot.dynamics import torque
 from brachis.robot.robot import RobotKeywords
 from brachis.robot.urdf import DefaultChain, default_chain
 from brachis.task import RobotSettings
+from brachis.verify.mechanics import torques
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
@@ -188,13 +191,42 @@ def test_mimic_on_the_chain_is_refused_by_name():
         load([TURN, mimic])
 
 
-def test_mimic_off_the_chain_that_follows_the_chain_is_refused_by_name():
-    with pytest.raises(UrdfError, match="joint 'follower' mimics 'j1'"):
-        load(
-            [TURN, TURN],
-            tool_frame="palm",
-            more=GRIPPER.replace("joint='finger'", "joint='j1'"),
-        )
+def test_a_joint_beside_the_chain_that_follows_it_is_held():
+    more = GRIPPER.replace("joint='finger'", "joint='j1'")
+    robot = load([TURN, TURN], tool_frame="palm", more=more)
+    assert robot.joint_names == ("j1", "j2")
+    assert robot.model.inertias[2].mass == 3.0  # with both fingers
+    assert of_robot(robot) == ()
+
+
+def test_a_follower_on_the_way_to_the_tool_is_refused_even_if_it_is_locked():
+    mimic = Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<mimic joint='j1'/>")
+    with pytest.raises(UrdfError, match="joint 'j2' mimics 'j1'"):
+        load([TURN, mimic, TURN], locked_joints={"j2": 0.0})
+
+
+def test_moments_without_mass_are_left_out_with_a_warning():
+    ghost = f"<link name='ghost'>{inertial(0.0, (0.1, 0.1, 0.1))}</link>"
+    ghost += "<joint name='fix' type='fixed'><parent link='tool'/><child link='ghost'/></joint>"
+    bare, haunted = (load([TURN, TURN], more=more) for more in ("", ghost))
+    q = np.array([[0.3, -0.7]])
+    args = q, 2.0 * q, 30.0 * q
+    np.testing.assert_array_equal(torque(haunted, *args), torque(bare, *args))
+    np.testing.assert_array_equal(torques(haunted, *args), torques(bare, *args))
+    (issue,) = of_robot(haunted)
+    assert issue.where == "URDF link ghost"
+    assert issue.found == "0.1 kg m^2"
+
+
+def test_undeclared_prefixes_are_a_part_of_the_name():
+    text = chain_urdf(
+        [TURN], more="<sensor:camera name='x'><a:b c:d='1'/></sensor:camera>"
+    )
+    assert Robot.from_urdf("memory", urdf_text=text).n == 1
+    with pytest.raises(
+        UrdfError, match="not well-formed XML; found Opening and ending"
+    ):
+        Robot.from_urdf("memory", urdf_text=text.replace("</sensor:camera>", ""))
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
@@ -246,11 +278,9 @@ def inertial(mass: float, moments: tuple[float, float, float]) -> str:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (
-            "",
-            "the body moved by joint 'j2' has no mass; found 0 kg in all of the links tool, link2;",
-        ),
-        (inertial(0.0, (0.0, 0.0, 0.0)), "the body moved by joint 'j2' has no mass"),
+        ("", "found 0 kg in the links that are moved by j2 (tool, link2);"),
+        (inertial(0.0, (0.0, 0.0, 0.0)), "torques are unknown without masses"),
+        (inertial(0.0, (0.1, 0.1, 0.1)), "torques are unknown without masses"),
         (
             inertial(-1.0, (0.1, 0.1, 0.1)),
             "link 'link2' has a negative mass; found -1 kg",
@@ -268,7 +298,9 @@ def test_bodies_that_cannot_be(text, words):
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", inertial(1.0, (0.1, 0.1, 0.3))])
+@pytest.mark.parametrize(
+    "text", [inertial(-1.0, (0.1, 0.1, 0.1)), inertial(1.0, (0.1, 0.1, 0.3))]
+)
 def test_bodies_that_cannot_be_stay_with_the_base_if_their_joint_is_locked(text):
     joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text), TURN]
     with pytest.raises(UrdfError, match=r"lock .*j1 with robot\.locked_joints"):

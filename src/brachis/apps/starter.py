@@ -123,10 +123,11 @@ def _quality(
         alone = np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1]
         quality = np.minimum(quality, alone)
     still = np.zeros_like(postures)
-    torque = dynamics.torque(robot, postures, still, still)
-    limits = robot.limits
-    shares = np.maximum(torque / limits.torque_upper, torque / limits.torque_lower)
-    quality[shares.max(axis=1) >= 0.7] = 0.0
+    if robot.has_masses:
+        torque = dynamics.torque(robot, postures, still, still)
+        limits = robot.limits
+        shares = np.maximum(torque / limits.torque_upper, torque / limits.torque_lower)
+        quality[shares.max(axis=1) >= 0.7] = 0.0
     quality[robot.heights(postures) < lowest] = 0.0
     return quality
 
@@ -175,15 +176,19 @@ def _follow(
     return postures
 
 
-def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec:
+def placeholders(
+    names: Sequence[str], stated: Sequence[UrdfLimit], *, has_masses: bool
+) -> LimitSpec:
     """Return limits for the joints of which a URDF states no usable ones; what it states stays.
+
+    Torques without masses are not usable.
 
     Limits of zero, and a range from zero to zero, are what exporters write for a missing limit. Without a torque a
     joint gets a limit of acceleration, since its time would go to zero otherwise.
     """
     given: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     for name, limit in zip(names, stated, strict=True):
-        if not limit.effort:
+        if not (limit.effort and has_masses):
             given["torque"][name] = None
             given["acceleration"][name] = 1.0  # rad/s^2 or m/s^2: a careful machine
         if not limit.velocity:
@@ -210,8 +215,7 @@ robot:
   urdf: {urdf}    # a file, relative to this one, or an included robot
   tool_frame: {tool}    # the link that follows the path{base}
 {limits}
-  # payload: {{mass: 0.5, com: [0, 0, 0.05]}}    # kg, m in the tool frame
-  # mounting: ceiling    # or floor, wall, {{xyz: [0, 0, 1], rpy_deg: [0, 90, 0]}}
+{payload}  # mounting: ceiling    # or floor, wall, {{xyz: [0, 0, 1], rpy_deg: [0, 90, 0]}}
 
 start:    # or start: free, with path_start, the place where the path begins
   joints:
@@ -231,6 +235,7 @@ search: {{effort: fast}}    # single, fast, thorough or exhaustive
 # boundary: {{start_speed: 0.1}}    # m/s along the path; without it the motion begins and ends at rest
 # tool_limits: {{speed: 0.5}}    # m/s
 """
+_PAYLOAD = "  # payload: {mass: 0.5, com: [0, 0, 0.05]}    # kg, m in the tool frame\n"
 _OWN_LIMITS = """\
   # Limits of torque, velocity and position are the URDF's; brachis inspect shows them. To change some:
   # limits: {{torque: {{{joint}: {torque}}}, scale: {{velocity: 0.5}}}}    # {unit}, as the URDF; half of all speeds"""
@@ -274,6 +279,7 @@ def task_text(
         tool=_inline(robot.tool_frame),
         base=base if robot.settings.base_frame else "",
         limits=_limits(robot, limits),
+        payload=_PAYLOAD if robot.has_masses else "",
         joints="\n".join(_joint(robot, i, choice.posture[i]) for i in range(robot.n)),
         space=_inline(space),
         degree=f"{write_count(robot.n, 'joint')}: {redundant or 'none is'} redundant",
@@ -375,7 +381,8 @@ def starter_task(
         base_frame = base_frame or limb.base
         tool_frame = limb.tool
     chain = read_chain(text, str(path), tool_frame, base_frame)
-    limits = placeholders(chain.joint_names, chain.limits)
+    has_masses = not chain.dynamics.without_mass
+    limits = placeholders(chain.joint_names, chain.limits, has_masses=has_masses)
     robot = Robot.from_urdf(
         path, tool_frame=tool_frame, base_frame=base_frame, limits=limits
     )

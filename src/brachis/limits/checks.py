@@ -153,7 +153,9 @@ def build_user_limits(
         _check_functions(limit, robot, where)
         if has_check(model):
             moments = sample_moments(robot)
-            motion = (moments.q, moments.qdot, moments.qddot, moments.torque(robot))
+            states = moments.q, moments.qdot, moments.qddot
+            known = robot.has_masses
+            motion = (*states, moments.torque(robot) if known else moments.q[:, :0])
             few = 1 + len(limit.labels) % 2  # moments, not as many as values
             check_ratios(
                 where, model, robot, [own[:few] for own in motion], len(limit.labels)

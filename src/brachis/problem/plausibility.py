@@ -22,6 +22,7 @@ from brachis.robot.plausibility import (
     angle_issue,
     distance_hint,
     distances_from_base,
+    find_left_out,
     find_locked_in_degrees,
     issue_above,
     link_lengths,
@@ -139,7 +140,7 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
         ("end.joints", problem.end),
     ):
         if given is not None:
-            issues += _positions(task_map.robot, key, given, may_wind=of_joints)
+            issues += _positions(task_map.robot, key, given)
     if YAW in task_map.rows:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
@@ -148,18 +149,15 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
     return tuple(issues)
 
 
-def _positions(
-    robot: Robot, key: str, postures: np.ndarray, *, may_wind: bool
-) -> Iterator[Issue]:
+def _positions(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
     """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
     for i in np.flatnonzero(robot.revolute):
         values = postures.reshape(-1, robot.n)[:, i]
         value = float(values[np.argmax(np.abs(values))])
-        # Along a path a joint without a range may wind up five times.
-        turns = 5.0 if may_wind else 1.0
-        usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
+        # A joint without a range may have wound up five times.
+        usual = (2.0 if is_ranged[i] else 5.0) * TURN + 1e-3
         of_posture = key in {"start.joints", "end.joints"}
         more = f"; in a task file: !degrees {value:.6g}" if of_posture else ""
         yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
@@ -167,7 +165,7 @@ def _positions(
 
 def of_posture(robot: Robot, key: str, q: np.ndarray) -> tuple[Issue, ...]:
     """Look at a posture, (n,)."""
-    return tuple(_positions(robot, key, q, may_wind=False))
+    return tuple(_positions(robot, key, q))
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
@@ -253,6 +251,7 @@ def of_robot(robot: Robot) -> tuple[Issue, ...]:
         *_curves(bare),
         *_lengths(robot),
         *_masses(bare),
+        *find_left_out(robot),
         *_payload(robot, bare),
         *find_locked_in_degrees(robot),
     )

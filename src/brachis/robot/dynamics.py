@@ -52,7 +52,7 @@ class SharedTorques:
 
     def torque(self, robot: Robot) -> np.ndarray:
         """Joint torques, (K, n)."""
-        return self.torque_of(robot.chain)
+        return self.torque_of(robot.chain_with_masses)
 
     def torque_of(self, chain: Chain) -> np.ndarray:
         """Joint torques of a chain, (K, n)."""
@@ -60,7 +60,8 @@ class SharedTorques:
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
         """Return the derivatives of the joint torques."""
-        return TorqueDerivatives(*self._compute_once(robot.chain.torque_derivatives))
+        chain = robot.chain_with_masses
+        return TorqueDerivatives(*self._compute_once(chain.torque_derivatives))
 
 
 def torque(
@@ -78,12 +79,18 @@ def torque(
     -------
     (K, n) ndarray
         ``rnea + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``, Nm or N.
+
+    Raises
+    ------
+    UrdfError
+        Masses are missing in the URDF.
     """
-    return robot.chain.torques(q, qdot, qddot)
+    return robot.chain_with_masses.torques(q, qdot, qddot)
 
 
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    return TorqueDerivatives(*robot.chain.torque_derivatives(q, qdot, qddot))
+    chain = robot.chain_with_masses
+    return TorqueDerivatives(*chain.torque_derivatives(q, qdot, qddot))

@@ -23,6 +23,7 @@ from brachis.robot.robot import Robot
 from brachis.robot.task_map.choice import with_tool_joints
 from brachis.robot.urdf import read_chain
 from brachis.task import (
+    FROM_URDF,
     LIMIT_KINDS,
     FrictionSettings,
     LimitSpec,
@@ -30,7 +31,11 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
-from brachis.task.limit_models import map_by_joint, without_defaults
+from brachis.task.limit_models import (
+    map_by_joint,
+    per_joint_values,
+    without_defaults,
+)
 
 
 def robot_from_settings(
@@ -218,8 +223,9 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
 def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
     """Describe what is in use in words, with units: payload, placements, gravity, slower limits, armature, friction.
 
-    Friction is always described, with where it comes from: the URDF, unless the task says otherwise. So are joints
-    without a limit on their acceleration; and, if accelerations of a motion, (K, n), are given, the largest of these.
+    So is friction, with where it comes from: the URDF, unless the task says otherwise; and joints without a limit on
+    their acceleration, or for which nobody states a torque limit. If accelerations of a motion, (K, n), are given, the
+    largest of those without a limit is named. Without masses the torques are said to be unknown.
     """
     settings = robot.settings
     payload = settings.payload
@@ -249,11 +255,27 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
     )
     if factors:
         used["limits"] = f"{factors} of what is stated (limits.scale)"
-    if robot.friction.armature.any():
-        used["armature"] = _by_joint(robot, "armature")
     unlimited = _without_acceleration_limit(robot, qddot)
     if unlimited:
         used["acceleration limits"] = unlimited
+    return used | _torques_in_use(robot)
+
+
+def _torques_in_use(robot: Robot) -> dict[str, str]:
+    """Describe armature, friction and missing torque limits; or say that torques are unknown."""
+    bodies = robot.urdf_dynamics.without_mass
+    if bodies:
+        joints = ", ".join(body.joint for body in bodies)
+        of_some = f" at {joints}" if len(bodies) < len(robot.urdf_joints) else ""
+        return {"torques": f"unknown, the URDF has no masses{of_some}"}
+    used = {}
+    unstated = _without_stated_torque(robot)
+    if unstated:
+        used["torque limits"] = (
+            f"not stated for {unstated} (effort in the URDF, or robot.limits.torque)"
+        )
+    if robot.friction.armature.any():
+        used["armature"] = _by_joint(robot, "armature")
     titles = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
     for kind, stated in robot.urdf_dynamics.friction.items():
         figures = getattr(robot.friction, kind)[: len(stated)]
@@ -285,6 +307,19 @@ def _without_acceleration_limit(robot: Robot, qddot: np.ndarray | None) -> str:
             joint = joints[np.argmax(largest[joints])]
             found.append(f"{largest[joint]:.4g} {shown}, of {names[joint]}")
     return f"{text}; the largest is {', and '.join(found)}"
+
+
+def _without_stated_torque(robot: Robot) -> str:
+    """Name the joints for which neither the URDF states a torque limit nor the task one, or that there is none."""
+    names = robot.urdf_joints
+    stated = robot.settings.limits.torque
+    listed = per_joint_values("robot.limits.torque", stated, names, FROM_URDF)
+    rows = zip(names, listed, robot.urdf_limits, robot.limits.torque, strict=False)
+    return ", ".join(
+        name
+        for name, given, urdf, limit in rows
+        if given == FROM_URDF and urdf.effort is None and np.isinf(limit)
+    )
 
 
 def _by_joint(robot: Robot, kind: str) -> str:

@@ -166,6 +166,8 @@ def resolve_limits(
     joint_names: Sequence[str],
     urdf: Sequence[UrdfLimit],
     speed_override: float = 1.0,
+    *,
+    has_masses: bool = True,
 ) -> Limits:
     """Combine the user's limits with the URDF's.
 
@@ -179,6 +181,8 @@ def resolve_limits(
         The URDF's limits of the same joints.
     speed_override : float, optional
         Factor on velocity limits, beside those of `spec`.
+    has_masses : bool, optional
+        Whether torques are known, so that messages may advise to limit them.
 
     Returns
     -------
@@ -210,11 +214,16 @@ def resolve_limits(
     at_rest = np.array([curve[0][1] if curve else np.inf for curve in curves])
     pairs["torque"] = np.clip(pairs["torque"], -at_rest, at_rest)
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
-    for i in np.flatnonzero(is_free):
+    if is_free.any():
+        first, *others = np.flatnonzero(is_free)
+        kinds = ("torque", "acceleration") if has_masses else ("acceleration",)
         raise LimitError(
-            "the joint has neither a torque nor an acceleration limit, so the end time would go to zero",
-            joint=names[i],
-            key=f"robot.limits.torque.{names[i]} or robot.limits.acceleration.{names[i]}",
+            "there is neither a torque nor an acceleration limit, so the end time would go to zero",
+            joint=names[first],
+            others=[names[i] for i in others],
+            key=" or ".join(f"robot.limits.{kind}.{names[first]}" for kind in kinds)
+            + " and so on" * bool(others),
+            found=None if urdf[first].effort else "no effort, or 0, in the URDF",
         )
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(

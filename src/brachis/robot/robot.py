@@ -28,6 +28,7 @@ from brachis.robot.limits import (
     to_spec,
     without_joints,
 )
+from brachis.robot.masses import check_masses, list_users
 from brachis.robot.model import build_model
 from brachis.robot.posture import read_posture
 from brachis.robot.tool_joints import ToolJoint
@@ -223,11 +224,13 @@ class Robot(Summary):
         )
         names = chain.joint_names
         spec = check_limits(without_joints(settings.limits, chain.locked), names)
-        limits = resolve_limits(spec, names, chain.limits, settings.speed_override)
+        known = not chain.dynamics.without_mass
+        override = settings.speed_override
+        limits = resolve_limits(spec, names, chain.limits, override, has_masses=known)
         model = build_model(chain, settings, source)
         friction = Friction.of(names, chain.dynamics.friction, settings.friction)
         friction.check_against(model, limits.torque)
-        return cls(
+        robot = cls(
             model=model,
             joint_names=names,
             tool_frame=chain.tool_frame,
@@ -240,6 +243,8 @@ class Robot(Summary):
             source=source,
             urdf=text,
         )
+        check_masses(chain.dynamics, source, robot.users_of_masses)
+        return robot
 
     def with_limits(self, **limits: Unpack[LimitKeywords]) -> Robot:
         """Return the robot with some of its limits changed.
@@ -266,12 +271,16 @@ class Robot(Summary):
         stated = vars(to_spec(self.limits, names))
         check_names("limit", limits, stated, "with_limits")
         spec = check_limits(LimitSpec(**merge(stated, limits)), names)
-        resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
+        stated_limits = self.urdf_limits[: len(names)]
+        known = self.has_masses
+        resolved = resolve_limits(spec, names, stated_limits, has_masses=known)
         resolved = resolved.with_tool_joints(self.tool_joints)
         self.friction.check_against(self.model, resolved.torque)
         changed = {"limits": spec, "speed_override": 1.0}
         settings = self.settings.model_copy(update=changed)
-        return replace(self, limits=resolved, settings=settings)
+        robot = replace(self, limits=resolved, settings=settings)
+        check_masses(self.urdf_dynamics, self.source, robot.users_of_masses)
+        return robot
 
     @check_keywords
     def with_payload(
@@ -325,7 +334,9 @@ class Robot(Summary):
             "tool frame": self.tool_frame,
             "from": self.in_words(limits.position_lower),
             "to": self.in_words(limits.position_upper),
-            "torque": self.in_words(limits.torque, "torque"),
+            "torque": self.in_words(limits.torque, "torque")
+            if self.has_masses
+            else "unknown, the URDF has no masses",
             "velocity": self.in_words(limits.velocity, "velocity"),
             **({} if payload is None else {"payload": f"{payload.mass:g} kg"}),
         }
@@ -340,6 +351,17 @@ class Robot(Summary):
         return ", ".join(
             number if number == "none" else f"{number} {unit}" for number, unit in pairs
         )
+
+    @property
+    def has_masses(self) -> bool:
+        """Whether the URDF has the masses that torques need."""
+        return not self.urdf_dynamics.without_mass
+
+    @property
+    def users_of_masses(self) -> tuple[str, ...]:
+        """Keys of the task that need masses: limits of torques and powers, a payload, friction."""
+        given = self.urdf_dynamics, self.limits, self.friction, self.settings
+        return tuple(list_users(*given))
 
     @property
     def name(self) -> str:
@@ -407,6 +429,12 @@ class Robot(Summary):
     def chain(self) -> Chain:
         """The chain as the compiled kernel takes it."""
         return chain_of(self.model, self.frame_id, self.friction.table)
+
+    @property
+    def chain_with_masses(self) -> Chain:
+        """The chain, for torques; raises UrdfError if masses are missing."""
+        check_masses(self.urdf_dynamics, self.source)
+        return self.chain
 
     def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
         """Yield Pinocchio's placements of all joints and of the tool frame in postures (K, n), one after the other.

@@ -24,6 +24,7 @@ from brachis.robot.urdf_bodies import (
     UrdfDynamics,
     check_inertia,
     inertia_matrix,
+    mass_of,
     read_dynamics,
 )
 from brachis.robot.urdf_elements import (
@@ -42,8 +43,13 @@ _WORLD = "universe"
 _MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
-def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
-    """Refuse joints that a serial chain of one-coordinate joints cannot have."""
+def _check_joints(
+    tree: UrdfTree, path: Sequence[str], chain: Sequence[str], where: str
+) -> None:
+    """Refuse joints that a serial chain of one-coordinate joints cannot have.
+
+    Those on the path from base to tool that do not move are not in the chain. A mimic joint beside the path is held.
+    """
     if _WORLD in tree.joints:
         raise UrdfError(
             "a joint has the name that Pinocchio gives to the world",
@@ -70,13 +76,13 @@ def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
                 found=f"<axis xyz={' '.join(f'{component:g}' for component in axis)!r}>",
                 allowed="a direction, any length but zero",
             )
-    for name in _movable(tree):
+    for name in path:
         leader = _leader_of(tree.joints[name])
         if leader and not {name, leader}.isdisjoint(chain):
             raise UrdfError(
                 f"joint {name!r} mimics {leader!r}",
                 where=where,
-                found="a mimic joint that moves with the chain",
+                found="a mimic joint between base and tool",
                 allowed="independent joints",
                 hint=f"Remove the mimic element, or lock {name} and {leader} with robot.locked_joints",
             )
@@ -88,10 +94,7 @@ def _movable(tree: UrdfTree) -> list[str]:
 
 
 def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
-    """Refuse moving bodies without mass and inertias that no body can have.
-
-    Massless links (frames) are fine if the body as a whole has mass.
-    """
+    """Refuse inertias of moving bodies that no body can have."""
     for body in bodies:
         for name in body.links:
             inertial = tree.links[name].find("inertial")
@@ -101,14 +104,6 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
                     "robot.locked_joints, if they need not move"
                 )
                 _check_inertial(f"link {name!r}", inertial, where, hint)
-        if not body.mass > 0.0:
-            raise UrdfError(
-                f"the body moved by joint {body.joint!r} has no mass",
-                where=where,
-                found=f"0 kg in all of the links {', '.join(body.links)}",
-                allowed="at least one link with <inertial> and mass > 0 kg",
-                hint=f"Add the mass and the inertia to one of them, or lock {body.joint} with robot.locked_joints",
-            )
 
 
 def _check_inertial(link: str, inertial: Element, where: str, hint: str) -> None:
@@ -191,7 +186,7 @@ def read_chain(
     Raises
     ------
     UrdfError
-        The text is broken, the chain has an unsupported joint, or a moving link lacks a physical inertia.
+        The text is broken, the chain has an unsupported joint, or the inertia of a moving link is not physical.
     UnknownNameError
         A frame or joint does not exist.
     """
@@ -216,7 +211,7 @@ def read_chain(
     for name, position in given.items():
         _check_locked_position(tree.joints[name], name, position)
     chain = tuple(name for name in path if name in movable and name not in given)
-    _check_joints(tree, chain, where)
+    _check_joints(tree, path, chain, where)
     if not chain:
         raise UrdfError(
             "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
@@ -352,6 +347,7 @@ def _read_limit(joint: Element) -> UrdfLimit:
         number_of(joint, "limit", key, None)
         for key in ("lower", "upper", "velocity", "effort")
     )
+    effort = effort or None  # exporters write 0 for a limit that nobody stated
     turns_freely = joint.get("type") == "continuous"
     if turns_freely or lower is None or upper is None:
         return UrdfLimit(None, None, velocity, effort, needs_range=not turns_freely)
@@ -366,7 +362,8 @@ def _plain_xml(tree: UrdfTree) -> str:
     robot = etree.Element("robot", name="robot")
     for name, link in tree.links.items():
         plain = etree.SubElement(robot, "link", name=LINK + name)
-        plain.extend(_copy_parts(link, "inertial"))
+        if mass_of(link):
+            plain.extend(_copy_parts(link, "inertial"))
     kinds = {"prismatic": "prismatic", "revolute": "revolute", "continuous": "revolute"}
     for name, joint in tree.joints.items():
         kind = kinds.get(joint.get("type"), "fixed")

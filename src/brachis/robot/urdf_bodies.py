@@ -67,6 +67,11 @@ class UrdfDynamics(Summary):
     friction: dict[str, np.ndarray]
     links: dict[str, tuple[int, np.ndarray]]
 
+    @property
+    def without_mass(self) -> tuple[Body, ...]:
+        """Bodies of which no link has a mass."""
+        return tuple(body for body in self.bodies if not body.mass > 0.0)
+
 
 def read_dynamics(
     tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str
@@ -120,13 +125,13 @@ def _read_body(
     moment = np.zeros(3)
     second = np.zeros((3, 3))
     for link, placed in links.items():
-        inertial = tree.links[link].find("inertial")
-        if inertial is None:
+        weight = mass_of(tree.links[link])
+        if not weight:
             continue
+        inertial = tree.links[link].find("inertial")
         frame = placed @ origin_of(inertial, "origin")
         rotation = frame[:3, :3]
         lever = frame[:3, 3]
-        weight = number_of(inertial, "mass", "value", 0.0)
         mass += weight
         moment += weight * lever
         second += rotation @ inertia_matrix(inertial) @ rotation.T + weight * _spread(
@@ -154,6 +159,11 @@ def _axis(joint: Element) -> np.ndarray:
     """Return the unit vector of a joint's axis, (3,)."""
     axis = np.array(numbers_of(joint, "axis", "xyz", "1 0 0"))
     return axis / np.linalg.norm(axis)
+
+
+def mass_of(link: Element) -> float:
+    """Return the mass of a checked link, kg; without one its moments of inertia do not count."""
+    return number_of(link, "inertial/mass", "value", 0.0)
 
 
 def inertia_matrix(inertial: Element) -> np.ndarray:

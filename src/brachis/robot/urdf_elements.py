@@ -114,17 +114,17 @@ def _robot_element(text: str, where: str) -> Element:
             hint="Name a URDF, or a robot that comes with brachis: brachis robots lists them",
         )
     parser = etree.XMLParser(
-        remove_blank_text=True, resolve_entities=False, encoding="utf-8"
+        remove_blank_text=True, resolve_entities=False, encoding="utf-8", recover=True
     )
-    try:
-        robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
-    except etree.XMLSyntaxError as error:
-        raise UrdfError(
-            "the URDF file is not well-formed XML",
-            where=where,
-            found=str(error),
-            hint=_EXPAND if "xacro" in str(error) else None,
-        ) from error
+    robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
+    for entry in parser.error_log:
+        # ROS reads undeclared prefixes of tags, such as sensor:camera, as a part of the name.
+        if entry.type_name != "NS_ERR_UNDEFINED_NAMESPACE":
+            raise UrdfError(
+                "the URDF file is not well-formed XML",
+                where=where,
+                found=f"{entry.message}, line {entry.line}, column {entry.column}",
+            )
     if robot.tag != "robot":
         raise UrdfError(
             "the file is not a URDF",

@@ -80,6 +80,8 @@ class LimitKind:
     urdf : str
         Attribute of a URDF's ``<limit>`` that states it; empty for none.
     usual : UsualLimit or None
+    needs_masses : bool
+        Whether the quantity follows from the masses of the robot.
     """
 
     name: str
@@ -89,6 +91,7 @@ class LimitKind:
     scale: str = ""
     urdf: str = ""
     usual: UsualLimit | None = None
+    needs_masses: bool = False
 
     def in_words(self, position_unit: str) -> str:
         """Name the quantity of a joint; the torque of a prismatic joint is a force."""
@@ -120,6 +123,7 @@ _ROWS = (
         scale="torque and force limits and torque-speed curves",
         urdf="effort",
         usual=replace(_USUAL_TORQUE, by_curve=True),
+        needs_masses=True,
     ),
     LimitKind(
         "velocity",
@@ -158,6 +162,7 @@ _ROWS = (
         {"rad": "W", "m": "W"},
         "Largest mechanical power (torque x speed), drawn or returned, W. Null: none.",
         scale="power limits, also total_power",
+        needs_masses=True,
     ),
     LimitKind(
         "rms_torque",
@@ -166,6 +171,7 @@ _ROWS = (
         "motor. Null: none.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
+        needs_masses=True,
     ),
     LimitKind(
         "jerk",
@@ -178,6 +184,7 @@ _ROWS = (
         {"rad": "Nm/s", "m": "N/s"},
         "Largest rate of change of the torque, N m/s (force, N/s). Null: none.",
         scale="limits of torque rates",
+        needs_masses=True,
     ),
 )
 LIMIT_KINDS: Final = {row.name: row for row in _ROWS}

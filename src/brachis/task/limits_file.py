@@ -252,11 +252,14 @@ def _check_joints(
     stated = set(limited).union(robot.locked_joints, *by_name)
     missing = [name for name in moving if name not in stated]
     if missing:
+        words = ", ".join(map(repr, missing))
         raise TaskError(
-            f"joint {missing[0]!r}, which moves the tool, has no entry",
+            f"joint {words}, which moves the tool, has no entry"
+            if len(missing) == 1
+            else f"joints {words}, which move the tool, have no entries",
             found=", ".join(limited),
             where=f"{where}: joint_limits",
-            hint=f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
+            hint=f"Add what is missing, or state it in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
         )
 
 
@@ -271,7 +274,9 @@ def _joints_of(
     from lxml import etree
 
     try:
-        tree = etree.parse(str(urdf), etree.XMLParser(resolve_entities=False))
+        tree = etree.parse(
+            str(urdf), etree.XMLParser(resolve_entities=False, recover=True)
+        )
     except (OSError, ValueError, etree.XMLSyntaxError):
         return [], []
     joints = tree.getroot().findall("joint")
@@ -284,4 +289,4 @@ def _joints_of(
         link = joint.xpath("string(parent/@link)")
         if joint.get("type") != "fixed":
             moving.append(joint.get("name"))
-    return [joint.get("name") for joint in joints], moving
+    return [joint.get("name") for joint in joints], moving[::-1]

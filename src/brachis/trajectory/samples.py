@@ -31,8 +31,10 @@ class Samples(Summary):
         s.
     s : (K,) ndarray
         Path coordinate, dimensionless.
-    q, qdot, qddot, tau : (K, n) ndarray
-        Position (rad or m), velocity, acceleration, torque (Nm or N).
+    q, qdot, qddot : (K, n) ndarray
+        Position (rad or m), velocity, acceleration.
+    tau : (K, n) ndarray or None
+        Torque (Nm or N); None if the URDF has no masses.
     tool_position : (K, 3) ndarray
         Of the tool frame in the world, m.
     tool_quaternion : (K, 4) ndarray
@@ -54,23 +56,36 @@ class Samples(Summary):
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
-    tau: np.ndarray
+    tau: np.ndarray | None
     tool_position: np.ndarray
     tool_quaternion: np.ndarray
     tool_speed: np.ndarray
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""
-        freeze(self, *(field.name for field in fields(self)))
+        names = [field.name for field in fields(self)]
+        freeze(self, *(name for name in names if getattr(self, name) is not None))
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Those of `COLUMNS` that are known."""
+        return {
+            prefix: quantity
+            for prefix, quantity in COLUMNS.items()
+            if getattr(self, quantity) is not None
+        }
 
     def __len__(self) -> int:
         """Return the number of times, K."""
         return len(self.t)
 
     def joint_columns(self, joint_names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint."""
+        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint.
+
+        Torques are left out if they are unknown.
+        """
         columns: dict[str, np.ndarray] = {}
-        for prefix, quantity in COLUMNS.items():
+        for prefix, quantity in self.columns.items():
             names = [f"{prefix}_{joint}" for joint in joint_names]
             columns |= zip(names, getattr(self, quantity).T, strict=True)
         return columns

@@ -204,8 +204,9 @@ class Trajectory(Summary):
         return self.jerk_pieces(self._check_times(t))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
-        """Joint torques, as `position`; Nm or N."""
-        tau = self.at(t).tau
+        """Joint torques, as `position`; Nm or N. Raises UrdfError if the URDF has no masses."""
+        states = self.position(t), self.velocity(t), self.acceleration(t)
+        tau = dynamics.torque(self.robot, *map(np.atleast_2d, states))
         return tau if np.ndim(t) else tau[0]
 
     def at(self, t: ArrayLike) -> Samples:
@@ -223,7 +224,9 @@ class Trajectory(Summary):
         if stops:
             qdot[-1] = 0.0
             qddot[-1] = 0.0
-        tau = dynamics.torque(self.robot, q, qdot, qddot)
+        tau = None
+        if self.robot.has_masses:
+            tau = dynamics.torque(self.robot, q, qdot, qddot)
         tool = tool_motion(self.robot, q, qdot)
         return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
 
@@ -279,9 +282,9 @@ class Trajectory(Summary):
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds; see `sample`.
 
-        Columns: ``t`` (s), ``s``; for every joint ``q_<joint>`` (rad or m), ``qd_``, ``qdd_`` and ``tau_`` (Nm or N);
-        ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed`` (m/s). Needs pandas
-        (``pip install "brachis[pandas]"``).
+        Columns: ``t`` (s), ``s``; for every joint ``q_<joint>`` (rad or m), ``qd_``, ``qdd_`` and ``tau_`` (Nm or N, if
+        known); ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed`` (m/s). Needs
+        pandas (``pip install "brachis[pandas]"``).
 
         Raises
         ------

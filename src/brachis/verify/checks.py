@@ -162,7 +162,8 @@ def check_continuity(given: Given) -> list[Check]:
         at_stops = np.isin(pieces.times[1:-1], times_of_stops(given))
     names = {"position": "q", "velocity": "qdot"}
     if given.trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
-        names |= {"acceleration": "qddot", "torque": "tau"}
+        names |= {"acceleration": "qddot"}
+        names |= {"torque": "tau"} if given.robot.has_masses else {}
     checks = []
     for what, (first, second) in joins.items():
         before = MotionStates.at(pieces, first, np.ones(len(first)))

@@ -88,7 +88,9 @@ def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def torques(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
-    """Joint torques (K, n) from states (K, n), Nm or N; those of virtual joints are zero."""
+    """Joint torques (K, n) from states (K, n), Nm or N; those of virtual joints are zero. No columns without masses."""
+    if not robot.has_masses:
+        return q[:, :0]
     f = robot.friction
     return (
         _rigid(robot, q, qdot, qddot)

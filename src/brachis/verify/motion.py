@@ -23,6 +23,7 @@ from brachis.errors import InputError
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of
 from brachis.robot import Robot, TaskMap
+from brachis.robot.masses import check_masses
 from brachis.task import SpeedTable, Task
 from brachis.trajectory import MotionPhase, Trajectory
 from brachis.trajectory.pieces import values_of
@@ -220,8 +221,9 @@ class MotionStates:
         s = pieces.path_coordinate(t)
         return cls(piece, u, t, s, q, qdot, qddot, qdddot, tau)
 
-    def torque(self, _robot: Robot) -> np.ndarray:
+    def torque(self, robot: Robot) -> np.ndarray:
         """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
+        check_masses(robot.urdf_dynamics, robot.source)
         return self.tau
 
     def only(self, chosen: np.ndarray | slice | list[int]) -> MotionStates:

@@ -143,7 +143,9 @@ def test_limits_that_are_missing_are_marked(tmp_path):
 
 def test_placeholders_of_every_kind():
     limits = placeholders(
-        ("a", "b"), (UrdfLimit(-1.0, 1.0, 2.0, 3.0), UrdfLimit(0.0, 0.0, 0.0, None))
+        ("a", "b"),
+        (UrdfLimit(-1.0, 1.0, 2.0, 3.0), UrdfLimit(0.0, 0.0, 0.0, None)),
+        has_masses=True,
     )
     assert limits.torque == {"b": None}
     assert limits.velocity == {"b": None}

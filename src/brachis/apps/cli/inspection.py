@@ -279,6 +279,7 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     limits = robot.limits
     columns = {"range": "position"}
     columns |= {kind.replace("_", " "): kind for kind in MAGNITUDES}
+    massless = {body.joint for body in robot.urdf_dynamics.without_mass}
     rows = []
     for i, (name, unit) in enumerate(
         zip(robot.joint_names, robot.position_units, strict=True)
@@ -298,7 +299,9 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
             if (lower, upper) == (-float("inf"), float("inf")):
                 text = _NONE
             row[key] = text
-        row["mass"] = f"{robot.model.inertias[i + 1].mass:.4g} kg"
+        is_known = name not in massless
+        mass = f"{robot.model.inertias[i + 1].mass:.4g} kg"
+        row["mass"] = mass if is_known else "unknown"
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]
             row[key] = f"{value:.4g} {UNITS[key][unit]}" if value else _NONE
@@ -354,8 +357,13 @@ def _robot_of_urdf(
     magnitudes = {}
     for kind in ("acceleration", "velocity", "torque"):
         stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
-        magnitudes[kind] = np.array([np.inf if x is None else x for x in stated])
-    return replace(robot, limits=robot.limits.with_magnitudes(**magnitudes))
+        is_known = robot.has_masses or not brachis.task.LIMIT_KINDS[kind].needs_masses
+        magnitudes[kind] = np.array(
+            [np.inf if x is None or not is_known else x for x in stated]
+        )
+    settings = robot.settings.model_copy(update={"limits": brachis.LimitSpec()})
+    limits = robot.limits.with_magnitudes(**magnitudes)
+    return replace(robot, limits=limits, settings=settings)
 
 
 def _frames(

@@ -17,7 +17,6 @@ from brachis.errors import (
     check_names,
 )
 from brachis.trajectory import Samples, Trajectory
-from brachis.trajectory.samples import COLUMNS
 
 
 class LeftOutWarning(BrachisWarning):
@@ -106,7 +105,7 @@ def rows_of(
     if left_out:
         hint = "Move the missing joints with their own controller at the same time, or write all joints"
         warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=3)
-    own = {name: getattr(samples, name)[:, index] for name in COLUMNS.values()}
+    own = {name: getattr(samples, name)[:, index] for name in samples.columns.values()}
     return JointRows(
         tuple(chosen),
         tuple(units[each] for each in index),

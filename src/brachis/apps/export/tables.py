@@ -16,15 +16,14 @@ import numpy as np
 from pydantic import BaseModel, Field, PositiveFloat
 
 from brachis.apps.export.rows import JointRows, require_library
-from brachis.trajectory.samples import COLUMNS
 
 
 def write_csv(rows: JointRows, stream: BinaryIO) -> None:
     """Write time, joint positions, velocities, accelerations and torques.
 
     The header is ``t``, then ``q_<joint>`` of all joints, ``qd_<joint>``, ``qdd_<joint>`` and ``tau_<joint>``, in
-    s, rad (m), rad/s (m/s), rad/s^2 (m/s^2) and Nm (N). If a joint that moves is left out, a line that begins with
-    ``#`` stands before the header.
+    s, rad (m), rad/s (m/s), rad/s^2 (m/s^2) and Nm (N); torques are left out if the URDF has no masses. If a joint
+    that moves is left out, a line that begins with ``#`` stands before the header.
     """
     columns = rows.columns()
     text = io.StringIO()
@@ -70,7 +69,10 @@ class _Samples(BaseModel, extra="forbid", title="samples"):
     )
     qdot: _Rows = Field(description="velocities, rad/s or m/s")
     qddot: _Rows = Field(description="accelerations, rad/s^2 or m/s^2")
-    tau: _Rows = Field(description="torques, Nm, or forces, N")
+    tau: _Rows = Field(
+        default=[],
+        description="torques, Nm, or forces, N; absent if the URDF has no masses",
+    )
 
 
 class _JointTrajectory(BaseModel, extra="forbid", title="A joint trajectory"):
@@ -97,7 +99,7 @@ def samples_schema() -> dict[str, Any]:
 
 def write_json(rows: JointRows, stream: BinaryIO) -> None:
     """Write samples as JSON that fulfils `samples_schema`."""
-    names = ("t", "s", *COLUMNS.values())
+    names = ("t", "s", *rows.samples.columns.values())
     content = {
         "$schema": SCHEMA_ID,
         "joint_names": rows.joints,

@@ -27,6 +27,7 @@ from brachis.apps.plots.panels import (
 )
 from brachis.apps.plots.postures import draw_postures, legend_postures
 from brachis.limits import Limit
+from brachis.robot.masses import check_masses
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -71,12 +72,18 @@ def plot_torques(trajectory: Trajectory) -> Figure:
         One column wide. Joints without a limit are left out; if no joint has one, the torques themselves are shown,
         and the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
 
+    Raises
+    ------
+    UrdfError
+        The URDF has no masses, so that torques are unknown.
+
     Examples
     --------
     >>> from brachis import plan
     >>> from brachis.apps.plots import plot_torques, save_figure
     >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
+    check_masses(trajectory.robot.urdf_dynamics, trajectory.robot.source)
     samples = dense_samples(trajectory)
     return _stack(
         trajectory, torque_panels(trajectory, samples, limit_ratios(trajectory))
@@ -125,8 +132,8 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     -------
     Figure
         What holds the motion are the kinds of limits that are active longest, at most three; torques and forces if
-        they are among these, or no limit is active. See `plot_postures`, `plot_torques`, `plot_limits` and
-        `plot_motion` for what the panels show.
+        they are among these, or no limit is active (accelerations if the URDF has no masses). See `plot_postures`,
+        `plot_torques`, `plot_limits` and `plot_motion` for what the panels show.
     """
     samples = dense_samples(trajectory)
     columns = [
@@ -157,6 +164,7 @@ def draw_holding(
     longest = sorted(shares, key=shares.__getitem__, reverse=True)[:3]
     active = [title for title in longest if shares[title] > 0.0]
     torques = torque_panels(trajectory, samples, ratios)
+    torques = torques or panels_of(trajectory, samples, "acceleration")
     others = [title for title in active if title not in torques[0].title.split(", ")]
     shown = [] if active and others == active else torques
     shown += [ratio_panel(trajectory, ratios, title) for title in others]

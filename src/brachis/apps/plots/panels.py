@@ -15,6 +15,7 @@ from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
+from brachis.task import LIMIT_KINDS
 from brachis.trajectory import Samples, Trajectory
 
 MOST_CURVES = 10
@@ -239,12 +240,19 @@ PANELS = {
 """All panels by their titles. Rows without a unit are of joints; their keys are the names of the robot's limits."""
 
 
+def _is_known(trajectory: Trajectory, name: str) -> bool:
+    """Tell whether a row can be shown: torques only with the masses of the robot."""
+    kind = LIMIT_KINDS.get(name)
+    return trajectory.robot.has_masses or kind is None or not kind.needs_masses
+
+
 def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the rows of joints that are of interest for a motion."""
     return tuple(
         name
         for name, row in PANELS.items()
         if row.unit is None
+        and _is_known(trajectory, name)
         and (
             not row.only_if_limited
             or np.isfinite(trajectory.robot.limits.both_ways(name)).any()
@@ -277,10 +285,12 @@ def panels_of(
     Returns
     -------
     list of Panel
-        One or two of each row, revolute joints first.
+        One or two of each row, revolute joints first; none of torques without masses.
     """
     found = []
     for name in names:
+        if not _is_known(trajectory, name):
+            continue
         row = PANELS[name]
         if row.unit is None:
             found += _joint_panels(trajectory, samples, name, degrees=degrees)
@@ -379,7 +389,10 @@ def at_distinct_times(ratios: LimitRatios) -> LimitRatios:
 def torque_panels(
     trajectory: Trajectory, samples: Samples, ratios: LimitRatios
 ) -> list[Panel]:
-    """Show torques and forces over their limits in one panel; by units in one or two if no joint has a limit."""
+    """Show torques and forces over their limits in one panel; by units in one or two if no joint has a limit.
+
+    There is no panel if the robot has no masses.
+    """
     parts = panels_of(trajectory, samples, "torque")
     titles = titles_of(ratios)
     limited = [part for part in parts if part.ratio_title in titles]

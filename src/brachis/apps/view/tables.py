@@ -19,7 +19,7 @@ _STATE = {"position": 3, "velocity": 3, "torque": 2}
 
 
 def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) -> str:
-    """Time, path coordinate, tool, and every joint's position, velocity and torque at one instant, with units.
+    """Time, path coordinate, tool, and every joint's position, velocity and torque, if known, at one instant.
 
     Parameters
     ----------
@@ -40,15 +40,16 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         lines.append(f"phase {number + 1} of {len(phases)}: {phases[number].kind}")
     head = _paragraph(*lines)
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
+    titles = ("joint", "position", "velocity", "torque, force")
     rows = []
     for name in trajectory.joint_names:
-        own = zip(curves_of(panels, name), _STATE.values(), strict=True)
+        own = zip(curves_of(panels, name), _STATE.values(), strict=False)
         cells = [
             f"{curve.values[0]:z.{digits}f} {panel.unit}"
             for (panel, curve), digits in own
         ]
         rows.append([name, *cells])
-    return head + _table(("joint", "position", "velocity", "torque, force"), rows)
+    return head + _table(titles[: len(rows[0])], rows)
 
 
 def phases_table(trajectory: Trajectory) -> str:
