@@ -289,24 +289,17 @@ class LimitError(InputError):
     Attributes
     ----------
     joint : str
-        The joint's name, the first of several.
+        The joint's name.
     key : str
         The task key that supplies the limit, for example ``robot.limits.torque.j1``.
     """
 
     def __init__(
-        self,
-        problem: str,
-        *,
-        joint: str,
-        key: str,
-        others: Sequence[str] = (),
-        **details: Unpack[Details],
+        self, problem: str, *, joint: str, key: str, **details: Unpack[Details]
     ) -> None:
         self.joint = joint
         self.key = key
-        word = "joints" if others else "joint"
-        details["where"] = f"{word} {', '.join(map(repr, (joint, *others)))}"
+        details["where"] = f"joint {joint!r}"
         details["hint"] = f"Set {key} in the task file"
         super().__init__(problem, **details)
 

@@ -209,7 +209,7 @@ def test_urdf_without_effort(effort):
     ) as caught:
         with_limit(effort=effort)
     assert caught.value.joint == "j2"
-    assert "no effort, or 0, in the URDF" in str(caught.value)
+    assert "an effort of 0 in the URDF is no limit" in str(caught.value)
     loose = with_limit(effort=effort, limits={"acceleration": {"j2": 5.0}})
     assert loose.limits.torque[1] == INF
 

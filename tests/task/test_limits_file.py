@@ -301,7 +301,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
     )
     with pytest.raises(
         TaskError,
-        match=r"ur\.yaml: joint_limits: joint 'rail', which moves the tool, has no entry",
+        match=r"ur\.yaml: joint_limits: no entry for 'rail', by which the tool moves",
     ):
         loaded(ur)
 

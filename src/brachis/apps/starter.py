@@ -215,7 +215,8 @@ robot:
   urdf: {urdf}    # a file, relative to this one, or an included robot
   tool_frame: {tool}    # the link that follows the path{base}
 {limits}
-{payload}  # mounting: ceiling    # or floor, wall, {{xyz: [0, 0, 1], rpy_deg: [0, 90, 0]}}
+  # payload: {{mass: 0.5, com: [0, 0, 0.05]}}    # kg, m in the tool frame; needs the masses of the URDF
+  # mounting: ceiling    # or floor, wall, {{xyz: [0, 0, 1], rpy_deg: [0, 90, 0]}}
 
 start:    # or start: free, with path_start, the place where the path begins
   joints:
@@ -235,7 +236,6 @@ search: {{effort: fast}}    # single, fast, thorough or exhaustive
 # boundary: {{start_speed: 0.1}}    # m/s along the path; without it the motion begins and ends at rest
 # tool_limits: {{speed: 0.5}}    # m/s
 """
-_PAYLOAD = "  # payload: {mass: 0.5, com: [0, 0, 0.05]}    # kg, m in the tool frame\n"
 _OWN_LIMITS = """\
   # Limits of torque, velocity and position are the URDF's; brachis inspect shows them. To change some:
   # limits: {{torque: {{{joint}: {torque}}}, scale: {{velocity: 0.5}}}}    # {unit}, as the URDF; half of all speeds"""
@@ -279,7 +279,6 @@ def task_text(
         tool=_inline(robot.tool_frame),
         base=base if robot.settings.base_frame else "",
         limits=_limits(robot, limits),
-        payload=_PAYLOAD if robot.has_masses else "",
         joints="\n".join(_joint(robot, i, choice.posture[i]) for i in range(robot.n)),
         space=_inline(space),
         degree=f"{write_count(robot.n, 'joint')}: {redundant or 'none is'} redundant",

@@ -41,9 +41,12 @@ class LastCall(Generic[_Found]):
 
 
 def freeze(owner: Any, *names: str) -> None:
-    """Replace arrays of a frozen dataclass by read-only copies of its own."""
+    """Replace arrays of a frozen dataclass by read-only copies of its own; None stays."""
     for name in names:
-        own = np.array(getattr(owner, name), dtype=float)
+        value = getattr(owner, name)
+        if value is None:
+            continue
+        own = np.array(value, dtype=float)
         own.setflags(write=False)
         object.__setattr__(owner, name, own)
 

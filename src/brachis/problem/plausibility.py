@@ -22,7 +22,6 @@ from brachis.robot.plausibility import (
     angle_issue,
     distance_hint,
     distances_from_base,
-    find_left_out,
     find_locked_in_degrees,
     issue_above,
     link_lengths,
@@ -30,6 +29,8 @@ from brachis.robot.plausibility import (
 )
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
+from brachis.robot.urdf_bodies import mass_of
+from brachis.robot.urdf_elements import number_of, read_tree
 from brachis.task import LIMIT_KINDS, SpeedTable, Task
 from brachis.task.limit_kinds import FASTEST, UsualLimit
 from brachis.task.points.points import steps_of
@@ -87,6 +88,13 @@ USUAL = {
     "body mass": ("the mass looks like g", 1e3, "kg", _OF_SIZE),
     # Times the mass: bodies 10 m wide.
     "body inertia": ("the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS),
+    # Of a gram at 10 cm: smaller moments do not show in torques.
+    "massless inertia": (
+        "moments of inertia without mass are left out",
+        1e-5,
+        "kg m^2",
+        ", or a mass > 0 kg",
+    ),
 }
 """By key of the task or part of the robot: what a larger figure looks like, the largest usual one, its unit, for what.
 
@@ -251,7 +259,6 @@ def of_robot(robot: Robot) -> tuple[Issue, ...]:
         *_curves(bare),
         *_lengths(robot),
         *_masses(bare),
-        *find_left_out(robot),
         *_payload(robot, bare),
         *find_locked_in_degrees(robot),
     )
@@ -318,6 +325,15 @@ def _masses(robot: Robot) -> Iterator[Issue]:
         moment = float(np.linalg.eigvalsh(body.inertia)[-1])
         yield from _figure("body mass", body.mass, size**2, where)
         yield from _figure("body inertia", moment, body.mass, where)
+    links = read_tree(robot.urdf, robot.source).links
+    for name, (joint, _) in robot.urdf_dynamics.links.items():
+        if joint and robot.has_masses and not mass_of(links[name]):
+            moments = [
+                number_of(links[name], "inertial/inertia", key, 0.0)
+                for key in ("ixx", "iyy", "izz")
+            ]
+            where = f"URDF link {name}"
+            yield from _figure("massless inertia", max(moments), where=where)
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:

@@ -52,7 +52,7 @@ class SharedTorques:
 
     def torque(self, robot: Robot) -> np.ndarray:
         """Joint torques, (K, n)."""
-        return self.torque_of(robot.chain_with_masses)
+        return self.torque_of(_chain_with_masses(robot))
 
     def torque_of(self, chain: Chain) -> np.ndarray:
         """Joint torques of a chain, (K, n)."""
@@ -60,8 +60,14 @@ class SharedTorques:
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
         """Return the derivatives of the joint torques."""
-        chain = robot.chain_with_masses
+        chain = _chain_with_masses(robot)
         return TorqueDerivatives(*self._compute_once(chain.torque_derivatives))
+
+
+def _chain_with_masses(robot: Robot) -> Chain:
+    """Return the chain of a robot whose torques are known."""
+    robot.check_masses("torques")
+    return robot.chain
 
 
 def torque(
@@ -85,12 +91,12 @@ def torque(
     UrdfError
         Masses are missing in the URDF.
     """
-    return robot.chain_with_masses.torques(q, qdot, qddot)
+    return _chain_with_masses(robot).torques(q, qdot, qddot)
 
 
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    chain = robot.chain_with_masses
+    chain = _chain_with_masses(robot)
     return TorqueDerivatives(*chain.torque_derivatives(q, qdot, qddot))

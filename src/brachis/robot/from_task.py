@@ -23,7 +23,6 @@ from brachis.robot.robot import Robot
 from brachis.robot.task_map.choice import with_tool_joints
 from brachis.robot.urdf import read_chain
 from brachis.task import (
-    FROM_URDF,
     LIMIT_KINDS,
     FrictionSettings,
     LimitSpec,
@@ -31,11 +30,7 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
-from brachis.task.limit_models import (
-    map_by_joint,
-    per_joint_values,
-    without_defaults,
-)
+from brachis.task.limit_models import map_by_joint, without_defaults
 
 
 def robot_from_settings(
@@ -255,7 +250,7 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
     )
     if factors:
         used["limits"] = f"{factors} of what is stated (limits.scale)"
-    unlimited = _without_acceleration_limit(robot, qddot)
+    unlimited = _without_limit(robot, "acceleration", qddot)
     if unlimited:
         used["acceleration limits"] = unlimited
     return used | _torques_in_use(robot)
@@ -269,11 +264,9 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
         of_some = f" at {joints}" if len(bodies) < len(robot.urdf_joints) else ""
         return {"torques": f"unknown, the URDF has no masses{of_some}"}
     used = {}
-    unstated = _without_stated_torque(robot)
-    if unstated:
-        used["torque limits"] = (
-            f"not stated for {unstated} (effort in the URDF, or robot.limits.torque)"
-        )
+    unlimited = _without_limit(robot, "torque")
+    if unlimited and robot.settings.limits.torque is not None:
+        used["torque limits"] = unlimited
     if robot.friction.armature.any():
         used["armature"] = _by_joint(robot, "armature")
     titles = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
@@ -286,40 +279,27 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
     return used
 
 
-def _without_acceleration_limit(robot: Robot, qddot: np.ndarray | None) -> str:
-    """Name the joints whose acceleration has no limit, and the largest acceleration among them."""
+def _without_limit(robot: Robot, kind: str, motion: np.ndarray | None = None) -> str:
+    """Name the joints without a limit of a kind, and the largest figure of a motion, (K, n), among them."""
     names = robot.urdf_joints
-    ends = robot.limits.both_ways("acceleration")[:, : len(names)]
+    ends = robot.limits.both_ways(kind)[:, : len(names)]
     is_free = ~np.isfinite(ends).all(axis=0)
     if not is_free.any():
         return ""
     free = [name for name, own in zip(names, is_free, strict=True) if own]
     of_some = "" if is_free.all() else f" for {', '.join(free)}"
-    text = f"none{of_some} (robot.limits.acceleration)"
-    if qddot is None:
+    text = f"none{of_some} (robot.limits.{kind})"
+    if motion is None:
         return text
-    largest = np.abs(qddot[:, : len(names)]).max(axis=0)
+    largest = np.abs(motion[:, : len(names)]).max(axis=0)
     units = np.array(robot.position_units[: len(names)])
     found = []
-    for unit, shown in UNITS["acceleration"].items():
+    for unit, shown in UNITS[kind].items():
         joints = np.flatnonzero(is_free & (units == unit))
         if len(joints):
             joint = joints[np.argmax(largest[joints])]
             found.append(f"{largest[joint]:.4g} {shown}, of {names[joint]}")
     return f"{text}; the largest is {', and '.join(found)}"
-
-
-def _without_stated_torque(robot: Robot) -> str:
-    """Name the joints for which neither the URDF states a torque limit nor the task one, or that there is none."""
-    names = robot.urdf_joints
-    stated = robot.settings.limits.torque
-    listed = per_joint_values("robot.limits.torque", stated, names, FROM_URDF)
-    rows = zip(names, listed, robot.urdf_limits, robot.limits.torque, strict=False)
-    return ", ".join(
-        name
-        for name, given, urdf, limit in rows
-        if given == FROM_URDF and urdf.effort is None and np.isinf(limit)
-    )
 
 
 def _by_joint(robot: Robot, kind: str) -> str:

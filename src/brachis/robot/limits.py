@@ -166,8 +166,6 @@ def resolve_limits(
     joint_names: Sequence[str],
     urdf: Sequence[UrdfLimit],
     speed_override: float = 1.0,
-    *,
-    has_masses: bool = True,
 ) -> Limits:
     """Combine the user's limits with the URDF's.
 
@@ -181,8 +179,6 @@ def resolve_limits(
         The URDF's limits of the same joints.
     speed_override : float, optional
         Factor on velocity limits, beside those of `spec`.
-    has_masses : bool, optional
-        Whether torques are known, so that messages may advise to limit them.
 
     Returns
     -------
@@ -214,16 +210,14 @@ def resolve_limits(
     at_rest = np.array([curve[0][1] if curve else np.inf for curve in curves])
     pairs["torque"] = np.clip(pairs["torque"], -at_rest, at_rest)
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
-    if is_free.any():
-        first, *others = np.flatnonzero(is_free)
-        kinds = ("torque", "acceleration") if has_masses else ("acceleration",)
+    free = [names[i] for i in np.flatnonzero(is_free)]
+    if free:
         raise LimitError(
             "there is neither a torque nor an acceleration limit, so the end time would go to zero",
-            joint=names[first],
-            others=[names[i] for i in others],
-            key=" or ".join(f"robot.limits.{kind}.{names[first]}" for kind in kinds)
-            + " and so on" * bool(others),
-            found=None if urdf[first].effort else "no effort, or 0, in the URDF",
+            joint=free[0],
+            key=f"robot.limits.torque.{free[0]} or robot.limits.acceleration.{free[0]}",
+            found=f"none for {', '.join(free)}",
+            allowed="one of them; an effort of 0 in the URDF is no limit, and torque limits need its masses",
         )
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(

@@ -6,7 +6,7 @@ payload, and friction that the task states. All else is kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,91 +14,51 @@ from brachis.errors import UrdfError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import Limits
 from brachis.robot.urdf_bodies import UrdfDynamics
-from brachis.task import FROM_URDF, LIMIT_KINDS, RobotSettings
-from brachis.task.limit_models import per_joint_values
-
-_MANY = 12
-"""Joints that a message names, no more."""
+from brachis.task import LIMIT_KINDS, RobotSettings
 
 
-def check_masses(
-    dynamics: UrdfDynamics, source: str, users: Collection[str] | None = None
-) -> None:
-    """Refuse what needs dynamics if the body that a joint moves has no mass.
+def list_users(
+    dynamics: UrdfDynamics, limits: Limits, friction: Friction, settings: RobotSettings
+) -> list[str]:
+    """List the keys of the task that need masses; a torque limit may also be an effort of the URDF."""
+    is_user = {
+        f"limits.{kind}": np.isfinite(limits.both_ways(kind)).any()
+        for kind, row in LIMIT_KINDS.items()
+        if row.needs_masses
+    }
+    is_user["limits.torque_speed"] = any(limits.torque_speed)
+    is_user["limits.total_power"] = np.isfinite(limits.total_power)
+    is_user["payload"] = settings.payload is not None
+    for kind in ("armature", "viscous", "coulomb"):
+        figures = getattr(friction, kind)[: len(dynamics.bodies)]
+        is_user[f"friction.{kind}"] = np.any(figures > dynamics.friction.get(kind, 0.0))
+    return [f"robot.{key}" for key, needs_masses in is_user.items() if needs_masses]
+
+
+def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> None:
+    """Refuse users of masses if the body that a joint moves has no mass.
 
     Parameters
     ----------
     dynamics : UrdfDynamics
     source : str
         Name of the URDF, for messages.
-    users : collection of str, optional
-        Keys of the task that need the masses, if any; torques are asked for if it is left out.
+    users : sequence of str
+        What needs masses, see `list_users`; nothing is refused if it is empty.
 
     Raises
     ------
     UrdfError
     """
-    is_asked = users is None or len(users) > 0
-    if not is_asked or not dynamics.without_mass:
+    bodies = dynamics.without_mass
+    if not (bodies and users):
         return
-    hint = "Add the masses to the URDF"
-    if users is not None:
-        hint += "; or leave the keys out, torque as null, and state robot.limits.acceleration"
-    places = [
-        f"{body.joint} ({', '.join(body.links)})" for body in dynamics.without_mass
-    ]
-    more = ", ..." if len(places) > _MANY else ""
+    places = [f"{body.joint} ({', '.join(body.links)})" for body in bodies]
     raise UrdfError(
-        f"torques are unknown without masses, but needed for {', '.join(users)}"
-        if users
-        else "torques are unknown without masses",
+        f"the URDF has no masses, which are needed for {', '.join(users)}",
         where=source,
-        found=f"0 kg in the links that are moved by {', '.join(places[:_MANY])}{more}",
+        found=f"0 kg in the links that are moved by {', '.join(places)}",
         allowed="for every joint a link with <inertial> and mass > 0 kg",
-        hint=hint,
+        hint="Add the masses to the URDF; or plan without torques: set what needs masses to null (an effort in the URDF "
+        "is a limit too), and state robot.limits.acceleration",
     )
-
-
-def list_users(
-    dynamics: UrdfDynamics,
-    limits: Limits,
-    friction: Friction,
-    settings: RobotSettings,
-) -> Iterator[str]:
-    """Name what needs masses, by its key of the task and its joints."""
-    names = [body.joint for body in dynamics.bodies]
-    has_curve = np.array([bool(curve) for curve in limits.torque_speed])
-    if has_curve.any():
-        yield _name("robot.limits.torque_speed", names, has_curve)
-    for kind, row in LIMIT_KINDS.items():
-        if not row.needs_masses:
-            continue
-        is_limited = np.isfinite(limits.both_ways(kind)).any(axis=0)
-        if kind == "torque":
-            is_limited &= ~has_curve
-        if is_limited.any():
-            key = f"robot.limits.{kind}"
-            stated = getattr(settings.limits, kind)
-            listed = per_joint_values(key, stated, names, FROM_URDF)
-            by_urdf = row.urdf and all(
-                value == FROM_URDF
-                for value, limited in zip(listed, is_limited, strict=False)
-                if limited
-            )
-            origin = f" (the URDF's {row.urdf})" if by_urdf else ""
-            yield _name(key, names, is_limited) + origin
-    if np.isfinite(limits.total_power):
-        yield "robot.limits.total_power"
-    if settings.payload is not None:
-        yield "robot.payload"
-    for kind in ("armature", "viscous", "coulomb"):
-        figures = getattr(friction, kind)[: len(names)]
-        is_asked = (figures > 0.0) & (figures != dynamics.friction.get(kind, 0.0))
-        if is_asked.any():
-            yield _name(f"robot.friction.{kind}", names, is_asked)
-
-
-def _name(key: str, names: Sequence[str], chosen: np.ndarray) -> str:
-    """Name a key, and the joints for which it is set unless these are all."""
-    joints = [name for name, is_one in zip(names, chosen, strict=False) if is_one]
-    return key if len(joints) == len(names) else f"{key} of {', '.join(joints)}"

@@ -15,7 +15,6 @@ from brachis.errors import BrachisWarning, PlausibilityError
 from brachis.robot import Robot
 from brachis.robot.joints import TURN
 from brachis.robot.task_map.protocol import AXES
-from brachis.robot.urdf_bodies import inertia_matrix, mass_of
 from brachis.robot.urdf_elements import read_tree
 
 
@@ -176,25 +175,6 @@ def find_locked_in_degrees(robot: Robot) -> Iterator[Issue]:
             yield from angle_issue(
                 f"robot.locked_joints.{name}", value, turns * TURN + 1e-3
             )
-
-
-_LEAST_MOMENT = 1e-5
-"""kg m^2, of a gram at 10 cm: smaller moments do not show in torques."""
-
-
-def find_left_out(robot: Robot) -> Iterator[Issue]:
-    """Look at moments of inertia without mass, which do not count."""
-    links = read_tree(robot.urdf, robot.source).links
-    bodies = robot.urdf_dynamics.bodies if robot.has_masses else ()
-    for name in (link for body in bodies for link in body.links):
-        inertial = links[name].find("inertial")
-        if inertial is None or mass_of(links[name]):
-            continue
-        moment = float(np.linalg.eigvalsh(inertia_matrix(inertial))[-1])
-        if moment > _LEAST_MOMENT:
-            message = "moments of inertia without mass are left out"
-            usual = "0 kg m^2, or a mass > 0 kg"
-            yield Issue(f"URDF link {name}", message, f"{moment:.4g} kg m^2", usual)
 
 
 def link_lengths(robot: Robot) -> list[float]:

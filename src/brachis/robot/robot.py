@@ -224,9 +224,7 @@ class Robot(Summary):
         )
         names = chain.joint_names
         spec = check_limits(without_joints(settings.limits, chain.locked), names)
-        known = not chain.dynamics.without_mass
-        override = settings.speed_override
-        limits = resolve_limits(spec, names, chain.limits, override, has_masses=known)
+        limits = resolve_limits(spec, names, chain.limits, settings.speed_override)
         model = build_model(chain, settings, source)
         friction = Friction.of(names, chain.dynamics.friction, settings.friction)
         friction.check_against(model, limits.torque)
@@ -243,7 +241,7 @@ class Robot(Summary):
             source=source,
             urdf=text,
         )
-        check_masses(chain.dynamics, source, robot.users_of_masses)
+        robot.check_masses()
         return robot
 
     def with_limits(self, **limits: Unpack[LimitKeywords]) -> Robot:
@@ -271,15 +269,13 @@ class Robot(Summary):
         stated = vars(to_spec(self.limits, names))
         check_names("limit", limits, stated, "with_limits")
         spec = check_limits(LimitSpec(**merge(stated, limits)), names)
-        stated_limits = self.urdf_limits[: len(names)]
-        known = self.has_masses
-        resolved = resolve_limits(spec, names, stated_limits, has_masses=known)
+        resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
         resolved = resolved.with_tool_joints(self.tool_joints)
         self.friction.check_against(self.model, resolved.torque)
         changed = {"limits": spec, "speed_override": 1.0}
         settings = self.settings.model_copy(update=changed)
         robot = replace(self, limits=resolved, settings=settings)
-        check_masses(self.urdf_dynamics, self.source, robot.users_of_masses)
+        robot.check_masses()
         return robot
 
     @check_keywords
@@ -334,9 +330,7 @@ class Robot(Summary):
             "tool frame": self.tool_frame,
             "from": self.in_words(limits.position_lower),
             "to": self.in_words(limits.position_upper),
-            "torque": self.in_words(limits.torque, "torque")
-            if self.has_masses
-            else "unknown, the URDF has no masses",
+            "torque": self.in_words(limits.torque, "torque"),
             "velocity": self.in_words(limits.velocity, "velocity"),
             **({} if payload is None else {"payload": f"{payload.mass:g} kg"}),
         }
@@ -356,12 +350,6 @@ class Robot(Summary):
     def has_masses(self) -> bool:
         """Whether the URDF has the masses that torques need."""
         return not self.urdf_dynamics.without_mass
-
-    @property
-    def users_of_masses(self) -> tuple[str, ...]:
-        """Keys of the task that need masses: limits of torques and powers, a payload, friction."""
-        given = self.urdf_dynamics, self.limits, self.friction, self.settings
-        return tuple(list_users(*given))
 
     @property
     def name(self) -> str:
@@ -430,11 +418,16 @@ class Robot(Summary):
         """The chain as the compiled kernel takes it."""
         return chain_of(self.model, self.frame_id, self.friction.table)
 
-    @property
-    def chain_with_masses(self) -> Chain:
-        """The chain, for torques; raises UrdfError if masses are missing."""
-        check_masses(self.urdf_dynamics, self.source)
-        return self.chain
+    def check_masses(self, *users: str) -> None:
+        """Refuse users of masses, by default those of the task, if the URDF lacks masses.
+
+        Raises
+        ------
+        UrdfError
+        """
+        dynamics = self.urdf_dynamics
+        known = users or list_users(dynamics, self.limits, self.friction, self.settings)
+        check_masses(dynamics, self.source, known)
 
     def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
         """Yield Pinocchio's placements of all joints and of the tool frame in postures (K, n), one after the other.

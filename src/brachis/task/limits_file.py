@@ -254,9 +254,7 @@ def _check_joints(
     if missing:
         words = ", ".join(map(repr, missing))
         raise TaskError(
-            f"joint {words}, which moves the tool, has no entry"
-            if len(missing) == 1
-            else f"joints {words}, which move the tool, have no entries",
+            f"no entry for {words}, by which the tool moves",
             found=", ".join(limited),
             where=f"{where}: joint_limits",
             hint=f"Add what is missing, or state it in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",

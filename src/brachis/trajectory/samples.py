@@ -63,8 +63,7 @@ class Samples(Summary):
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""
-        names = [field.name for field in fields(self)]
-        freeze(self, *(name for name in names if getattr(self, name) is not None))
+        freeze(self, *(field.name for field in fields(self)))
 
     @property
     def columns(self) -> dict[str, str]:

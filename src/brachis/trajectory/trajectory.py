@@ -205,8 +205,8 @@ class Trajectory(Summary):
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N. Raises UrdfError if the URDF has no masses."""
-        states = self.position(t), self.velocity(t), self.acceleration(t)
-        tau = dynamics.torque(self.robot, *map(np.atleast_2d, states))
+        motion = self.at(t)
+        tau = dynamics.torque(self.robot, motion.q, motion.qdot, motion.qddot)
         return tau if np.ndim(t) else tau[0]
 
     def at(self, t: ArrayLike) -> Samples:

@@ -23,7 +23,6 @@ from brachis.errors import InputError
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of
 from brachis.robot import Robot, TaskMap
-from brachis.robot.masses import check_masses
 from brachis.task import SpeedTable, Task
 from brachis.trajectory import MotionPhase, Trajectory
 from brachis.trajectory.pieces import values_of
@@ -223,7 +222,7 @@ class MotionStates:
 
     def torque(self, robot: Robot) -> np.ndarray:
         """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
-        check_masses(robot.urdf_dynamics, robot.source)
+        robot.check_masses("torques")
         return self.tau
 
     def only(self, chosen: np.ndarray | slice | list[int]) -> MotionStates:

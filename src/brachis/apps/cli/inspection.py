@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from brachis.task import FitReport, Task
 
 _NONE = "none"
-"""What a table shows for a missing limit, and for a joint without friction."""
+"""What a table shows for a missing limit or mass, and for a joint without friction."""
 _LISTED = 12
 """Choices without a closed form, and pairs that may collide, that are listed on the screen."""
 _OTHER_TASKS = (
@@ -279,7 +279,6 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     limits = robot.limits
     columns = {"range": "position"}
     columns |= {kind.replace("_", " "): kind for kind in MAGNITUDES}
-    massless = {body.joint for body in robot.urdf_dynamics.without_mass}
     rows = []
     for i, (name, unit) in enumerate(
         zip(robot.joint_names, robot.position_units, strict=True)
@@ -299,9 +298,8 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
             if (lower, upper) == (-float("inf"), float("inf")):
                 text = _NONE
             row[key] = text
-        is_known = name not in massless
-        mass = f"{robot.model.inertias[i + 1].mass:.4g} kg"
-        row["mass"] = mass if is_known else "unknown"
+        mass = robot.model.inertias[i + 1].mass
+        row["mass"] = f"{mass:.4g} kg" if mass else _NONE
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]
             row[key] = f"{value:.4g} {UNITS[key][unit]}" if value else _NONE
@@ -355,12 +353,9 @@ def _robot_of_urdf(
         limits=brachis.LimitSpec(torque=None, velocity=None, acceleration=1.0),
     )
     magnitudes = {}
-    for kind in ("acceleration", "velocity", "torque"):
+    for kind in ("acceleration", "velocity", *("torque",) * robot.has_masses):
         stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
-        is_known = robot.has_masses or not brachis.task.LIMIT_KINDS[kind].needs_masses
-        magnitudes[kind] = np.array(
-            [np.inf if x is None or not is_known else x for x in stated]
-        )
+        magnitudes[kind] = np.array([np.inf if x is None else x for x in stated])
     settings = robot.settings.model_copy(update={"limits": brachis.LimitSpec()})
     limits = robot.limits.with_magnitudes(**magnitudes)
     return replace(robot, limits=limits, settings=settings)

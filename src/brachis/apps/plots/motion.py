@@ -27,7 +27,6 @@ from brachis.apps.plots.panels import (
 )
 from brachis.apps.plots.postures import draw_postures, legend_postures
 from brachis.limits import Limit
-from brachis.robot.masses import check_masses
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     >>> from brachis.apps.plots import plot_torques, save_figure
     >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
-    check_masses(trajectory.robot.urdf_dynamics, trajectory.robot.source)
+    trajectory.robot.check_masses("torques")
     samples = dense_samples(trajectory)
     return _stack(
         trajectory, torque_panels(trajectory, samples, limit_ratios(trajectory))
