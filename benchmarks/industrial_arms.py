@@ -8,9 +8,9 @@ abb_experimental, fanuc, fanuc_experimental, kuka_experimental, motoman, staubli
 ROS-Industrial; the DH parameters that Universal Robots publishes (ur5, ur10); the data sheet of the Adept Cobra s600
 (cobra_s600); and round figures of our own for two paint wrists (three_roll_wrist, three_roll_offset).
 
-Every arm becomes a URDF without masses and with efforts of 0. `brachis.apps.starter` finds a posture and a line, which is
-planned again with 8 rad/s^2 or m/s^2 for every joint. An arm of which a joint on the chain follows another is refused;
-that is right, and counted apart.
+Every arm becomes a URDF without masses and with efforts of 0. `brachis.apps.starter` finds a posture and a line, which
+is planned again with 8 rad/s^2 or m/s^2 for every joint. An arm of which a joint on the chain follows another is
+refused; that is right, and counted apart.
 """
 
 from __future__ import annotations

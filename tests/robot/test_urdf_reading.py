@@ -279,8 +279,14 @@ def inertial(mass: float, moments: tuple[float, float, float]) -> str:
     ("text", "words"),
     [
         ("", "found 0 kg in the links that are moved by j2 (tool, link2);"),
-        (inertial(0.0, (0.0, 0.0, 0.0)), "the URDF has no masses, which are needed for robot.limits.torque"),
-        (inertial(0.0, (0.1, 0.1, 0.1)), "the URDF has no masses, which are needed for robot.limits.torque"),
+        (
+            inertial(0.0, (0.0, 0.0, 0.0)),
+            "the URDF has no masses, which are needed for robot.limits.torque",
+        ),
+        (
+            inertial(0.0, (0.1, 0.1, 0.1)),
+            "the URDF has no masses, which are needed for robot.limits.torque",
+        ),
         (
             inertial(-1.0, (0.1, 0.1, 0.1)),
             "link 'link2' has a negative mass; found -1 kg",

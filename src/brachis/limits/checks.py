@@ -153,9 +153,8 @@ def build_user_limits(
         _check_functions(limit, robot, where)
         if has_check(model):
             moments = sample_moments(robot)
-            states = moments.q, moments.qdot, moments.qddot
-            known = robot.has_masses
-            motion = (*states, moments.torque(robot) if known else moments.q[:, :0])
+            tau = moments.torque_of(robot.chain)
+            motion = (moments.q, moments.qdot, moments.qddot, tau)
             few = 1 + len(limit.labels) % 2  # moments, not as many as values
             check_ratios(
                 where, model, robot, [own[:few] for own in motion], len(limit.labels)

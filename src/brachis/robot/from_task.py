@@ -265,7 +265,7 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
         return {"torques": f"unknown, the URDF has no masses{of_some}"}
     used = {}
     unlimited = _without_limit(robot, "torque")
-    if unlimited and robot.settings.limits.torque is not None:
+    if unlimited:
         used["torque limits"] = unlimited
     if robot.friction.armature.any():
         used["armature"] = _by_joint(robot, "armature")

@@ -59,6 +59,6 @@ def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> N
         where=source,
         found=f"0 kg in the links that are moved by {', '.join(places)}",
         allowed="for every joint a link with <inertial> and mass > 0 kg",
-        hint="Add the masses to the URDF; or plan without torques: set what needs masses to null (an effort in the URDF "
-        "is a limit too), and state robot.limits.acceleration",
+        hint="Add the masses to the URDF; or plan without torques: set what needs masses to null (an effort in the "
+        "URDF is a limit too), and state robot.limits.acceleration",
     )

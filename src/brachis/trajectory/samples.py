@@ -68,11 +68,8 @@ class Samples(Summary):
     @property
     def columns(self) -> dict[str, str]:
         """Those of `COLUMNS` that are known."""
-        return {
-            prefix: quantity
-            for prefix, quantity in COLUMNS.items()
-            if getattr(self, quantity) is not None
-        }
+        is_known = self.tau is not None
+        return {key: COLUMNS[key] for key in COLUMNS if is_known or key != "tau"}
 
     def __len__(self) -> int:
         """Return the number of times, K."""

@@ -356,9 +356,7 @@ def _robot_of_urdf(
     for kind in ("acceleration", "velocity", *("torque",) * robot.has_masses):
         stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
         magnitudes[kind] = np.array([np.inf if x is None else x for x in stated])
-    settings = robot.settings.model_copy(update={"limits": brachis.LimitSpec()})
-    limits = robot.limits.with_magnitudes(**magnitudes)
-    return replace(robot, limits=limits, settings=settings)
+    return replace(robot, limits=robot.limits.with_magnitudes(**magnitudes))
 
 
 def _frames(

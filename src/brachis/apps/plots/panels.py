@@ -15,7 +15,6 @@ from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
-from brachis.task import LIMIT_KINDS
 from brachis.trajectory import Samples, Trajectory
 
 MOST_CURVES = 10
@@ -163,6 +162,8 @@ class Row:
         Title of the values over their limits if it is not ``... / limit``.
     is_range : bool
         See `Curve`.
+    needs_masses : bool
+        Whether the values are known only if the URDF has masses.
     only_if_limited : bool
         Whether the row is of interest only if the robot limits it.
     unit : str or None
@@ -180,6 +181,7 @@ class Row:
     prismatic: tuple[str, str] | None = None
     ratio_title: str = ""
     is_range: bool = False
+    needs_masses: bool = False
     only_if_limited: bool = False
     unit: str | None = None
     bounds: Callable[[Trajectory, Samples], tuple[Bound, Bound]] | None = None
@@ -217,7 +219,10 @@ PANELS = {
         only_if_limited=True,
     ),
     "torque": Row(
-        lambda _, samples: samples.tau, r"$\tau$", prismatic=("force", "$F$")
+        lambda _, samples: samples.tau,
+        r"$\tau$",
+        prismatic=("force", "$F$"),
+        needs_masses=True,
     ),
     "path coordinate": Row(
         lambda _, samples: samples.s, "$s$", unit="", ends=(-0.04, 1.04)
@@ -240,19 +245,13 @@ PANELS = {
 """All panels by their titles. Rows without a unit are of joints; their keys are the names of the robot's limits."""
 
 
-def _is_known(trajectory: Trajectory, name: str) -> bool:
-    """Tell whether a row can be shown: torques only with the masses of the robot."""
-    kind = LIMIT_KINDS.get(name)
-    return trajectory.robot.has_masses or kind is None or not kind.needs_masses
-
-
 def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the rows of joints that are of interest for a motion."""
     return tuple(
         name
         for name, row in PANELS.items()
         if row.unit is None
-        and _is_known(trajectory, name)
+        and (trajectory.robot.has_masses or not row.needs_masses)
         and (
             not row.only_if_limited
             or np.isfinite(trajectory.robot.limits.both_ways(name)).any()
@@ -289,9 +288,9 @@ def panels_of(
     """
     found = []
     for name in names:
-        if not _is_known(trajectory, name):
-            continue
         row = PANELS[name]
+        if row.needs_masses and not trajectory.robot.has_masses:
+            continue
         if row.unit is None:
             found += _joint_panels(trajectory, samples, name, degrees=degrees)
             continue
