@@ -321,15 +321,15 @@ def test_strict_refuses_before_anything_is_planned(monkeypatch):
 
 
 def test_a_posture_in_degrees_where_joints_turn_without_end():
-    # 30, -120 and 120 rad are reached all the same: joints of this arm have no range, and may have turned five times.
+    # 30, -120 and 120 rad are reached all the same: joints of this arm have no range.
     degrees = {"start": {"joints": [30.0, -120.0, 120.0]}}
     with pytest.raises(PlausibilityError) as caught:
         brachis.plan(task(**degrees))
     (remark,) = caught.value.remarks
     assert remark.startswith(
-        "start.joints: the position looks like degrees; found j2 -120 rad, j3 120 rad;"
+        "start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;"
     )
-    assert "-120 degrees are -2.0944 rad; in a task file: !degrees -120" in remark
+    assert "30 degrees are 0.523599 rad; in a task file: !degrees 30" in remark
     assert remark.count("!degrees") == 1, "once, not for every joint"
     for way_out in ("strict: false", "strict=False", "--no-strict"):
         assert way_out in caught.value.hint

@@ -161,11 +161,14 @@ def _positions(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
     """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
-    for i in np.flatnonzero(robot.revolute):
-        values = postures.reshape(-1, robot.n)[:, i]
-        value = float(values[np.argmax(np.abs(values))])
-        # A joint without a range may have wound up five times.
-        usual = (2.0 if is_ranged[i] else 5.0) * TURN + 1e-3
+    rows = postures.reshape(-1, robot.n)
+    peaks = rows[np.argmax(np.abs(rows), axis=0), range(robot.n)]
+    # A joint without a range may have wound up five times; of a posture in degrees one joint at least is beyond that.
+    largest = np.where(is_ranged, 2.0, 5.0) * TURN + 1e-3
+    is_suspect = np.any((np.abs(peaks) > largest)[robot.revolute])
+    for i in np.flatnonzero(robot.revolute & is_suspect):
+        usual = (2.0 if is_ranged[i] else 1.0) * TURN + 1e-3
+        value = float(peaks[i])
         of_posture = key in {"start.joints", "end.joints"}
         more = f"; in a task file: !degrees {value:.6g}" if of_posture else ""
         yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
