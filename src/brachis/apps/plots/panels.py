@@ -219,7 +219,7 @@ PANELS = {
         only_if_limited=True,
     ),
     "torque": Row(
-        lambda _, samples: samples.tau,
+        lambda trajectory, samples: trajectory.torque(samples.t),
         r"$\tau$",
         prismatic=("force", "$F$"),
         needs_masses=True,
