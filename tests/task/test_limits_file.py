@@ -409,3 +409,14 @@ def test_a_task_is_not_a_limits_file(loaded):
         match=r"task.yaml: .* another kind; found a task file; allowed: a limits file",
     ):
         loaded({"limits_file": "task.yaml"})
+
+
+def test_all_joints_that_a_file_leaves_out_are_named(loaded, tmp_path):
+    text = "joint_limits:\n  j2: {max_acceleration: 5}\n"
+    (tmp_path / "joint_limits.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(TaskError, match="no entry for 'j1', 'j3', by which the tool"):
+        loaded({"limits_file": "joint_limits.yaml"})
+    more = text + "".join(f"  {name}: {{max_velocity: 5}}\n" for name in ("j7", "j9"))
+    (tmp_path / "joint_limits.yaml").write_text(more, encoding="utf-8")
+    with pytest.raises(UnknownNameError, match="no URDF joint named 'j7' or 'j9'"):
+        loaded({"limits_file": "joint_limits.yaml"})

@@ -29,8 +29,8 @@ from brachis.robot.plausibility import (
 )
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
-from brachis.robot.urdf_bodies import mass_of
-from brachis.robot.urdf_elements import number_of, read_tree
+from brachis.robot.urdf_bodies import inertia_matrix, mass_of
+from brachis.robot.urdf_elements import read_tree
 from brachis.task import LIMIT_KINDS, SpeedTable, Task
 from brachis.task.limit_kinds import FASTEST, UsualLimit
 from brachis.task.points.points import steps_of
@@ -161,14 +161,13 @@ def _positions(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
     """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
-    rows = postures.reshape(-1, robot.n)
-    peaks = rows[np.argmax(np.abs(rows), axis=0), range(robot.n)]
-    # A joint without a range may have wound up five times; of a posture in degrees one joint at least is beyond that.
-    largest = np.where(is_ranged, 2.0, 5.0) * TURN + 1e-3
-    is_suspect = np.any((np.abs(peaks) > largest)[robot.revolute])
-    for i in np.flatnonzero(robot.revolute & is_suspect):
-        usual = (2.0 if is_ranged[i] else 1.0) * TURN + 1e-3
-        value = float(peaks[i])
+    # A joint without a range may have wound up five times; of a posture in degrees one joint is beyond that.
+    farthest = np.abs(postures[..., robot.revolute]).max(initial=0.0)
+    turns = 1.0 if farthest > 5.0 * TURN + 1e-3 else 5.0
+    for i in np.flatnonzero(robot.revolute):
+        values = postures.reshape(-1, robot.n)[:, i]
+        value = float(values[np.argmax(np.abs(values))])
+        usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
         of_posture = key in {"start.joints", "end.joints"}
         more = f"; in a task file: !degrees {value:.6g}" if of_posture else ""
         yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
@@ -331,12 +330,8 @@ def _masses(robot: Robot) -> Iterator[Issue]:
     links = read_tree(robot.urdf, robot.source).links
     for name, (joint, _) in robot.urdf_dynamics.links.items():
         if joint and robot.has_masses and not mass_of(links[name]):
-            moments = [
-                number_of(links[name], "inertial/inertia", key, 0.0)
-                for key in ("ixx", "iyy", "izz")
-            ]
-            where = f"URDF link {name}"
-            yield from _figure("massless inertia", max(moments), where=where)
+            moment = float(inertia_matrix(links[name]).max())
+            yield from _figure("massless inertia", moment, where=f"URDF link {name}")
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:

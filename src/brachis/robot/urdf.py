@@ -97,18 +97,16 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
     """Refuse inertias of moving bodies that no body can have."""
     for body in bodies:
         for name in body.links:
-            inertial = tree.links[name].find("inertial")
-            if inertial is not None:
-                hint = (
-                    f"Correct it in the URDF; or lock the joints from the base to {body.joint} with "
-                    "robot.locked_joints, if they need not move"
-                )
-                _check_inertial(f"link {name!r}", inertial, where, hint)
+            hint = (
+                f"Correct it in the URDF; or lock the joints from the base to {body.joint} with "
+                "robot.locked_joints, if they need not move"
+            )
+            _check_inertial(f"link {name!r}", tree.links[name], where, hint)
 
 
-def _check_inertial(link: str, inertial: Element, where: str, hint: str) -> None:
+def _check_inertial(link: str, element: Element, where: str, hint: str) -> None:
     """Refuse a negative mass, a mass without moments of inertia, and moments that no body can have."""
-    mass = number_of(inertial, "mass", "value", 0.0)
+    mass = mass_of(element)
     if mass < 0.0:
         raise UrdfError(
             f"{link} has a negative mass",
@@ -117,7 +115,7 @@ def _check_inertial(link: str, inertial: Element, where: str, hint: str) -> None
             allowed=">= 0 kg",
             hint=hint,
         )
-    if mass > 0.0 and inertial.find("inertia") is None:
+    if mass > 0.0 and element.find("inertial/inertia") is None:
         raise UrdfError(
             f"{link} has a mass but no <inertia>",
             where=where,
@@ -126,7 +124,7 @@ def _check_inertial(link: str, inertial: Element, where: str, hint: str) -> None
             hint=hint,
         )
     problem = f"{link} has a non-physical inertia"
-    check_inertia(inertia_matrix(inertial), problem, where, UrdfError, hint)
+    check_inertia(inertia_matrix(element), problem, where, UrdfError, hint)
 
 
 @dataclass(frozen=True)

@@ -125,18 +125,17 @@ def _read_body(
     moment = np.zeros(3)
     second = np.zeros((3, 3))
     for link, placed in links.items():
-        weight = mass_of(tree.links[link])
+        element = tree.links[link]
+        weight = mass_of(element)
         if not weight:
             continue
-        inertial = tree.links[link].find("inertial")
-        frame = placed @ origin_of(inertial, "origin")
+        frame = placed @ origin_of(element, "inertial/origin")
         rotation = frame[:3, :3]
         lever = frame[:3, 3]
         mass += weight
         moment += weight * lever
-        second += rotation @ inertia_matrix(inertial) @ rotation.T + weight * _spread(
-            lever
-        )
+        second += rotation @ inertia_matrix(element) @ rotation.T
+        second += weight * _spread(lever)
     com = moment / mass if mass > 0.0 else np.zeros(3)
     return Body(
         joint=name,
@@ -166,10 +165,11 @@ def mass_of(link: Element) -> float:
     return number_of(link, "inertial/mass", "value", 0.0)
 
 
-def inertia_matrix(inertial: Element) -> np.ndarray:
-    """Matrix of moments and products, (3, 3) kg m^2, of a checked <inertial>."""
+def inertia_matrix(link: Element) -> np.ndarray:
+    """Matrix of moments and products, (3, 3) kg m^2, of a checked link; zeros where it states none."""
+    keys = _MOMENTS.ravel()
     return symmetric_matrix(
-        {key: number_of(inertial, "inertia", key, 0.0) for key in _MOMENTS.ravel()}
+        {key: number_of(link, "inertial/inertia", key, 0.0) for key in keys}
     )
 
 

@@ -252,9 +252,8 @@ def _check_joints(
     stated = set(limited).union(robot.locked_joints, *by_name)
     missing = [name for name in moving if name not in stated]
     if missing:
-        words = ", ".join(map(repr, missing))
         raise TaskError(
-            f"no entry for {words}, by which the tool moves",
+            f"no entry for {', '.join(map(repr, missing))}, by which the tool moves",
             found=", ".join(limited),
             where=f"{where}: joint_limits",
             hint=f"Add what is missing, or state it in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
