@@ -380,8 +380,8 @@ def starter_task(
         base_frame = base_frame or limb.base
         tool_frame = limb.tool
     chain = read_chain(text, str(path), tool_frame, base_frame)
-    has_masses = not chain.dynamics.without_mass
-    limits = placeholders(chain.joint_names, chain.limits, has_masses=has_masses)
+    massless = chain.dynamics.without_mass
+    limits = placeholders(chain.joint_names, chain.limits, has_masses=not massless)
     robot = Robot.from_urdf(
         path, tool_frame=tool_frame, base_frame=base_frame, limits=limits
     )

@@ -98,5 +98,5 @@ def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    chain = _chain_with_masses(robot)
-    return TorqueDerivatives(*chain.torque_derivatives(q, qdot, qddot))
+    exact = _chain_with_masses(robot).torque_derivatives(q, qdot, qddot)
+    return TorqueDerivatives(*exact)

@@ -26,9 +26,11 @@ def list_users(
         for kind, row in LIMIT_KINDS.items()
         if row.needs_masses
     }
-    is_user["limits.torque_speed"] = any(limits.torque_speed)
-    is_user["limits.total_power"] = np.isfinite(limits.total_power)
-    is_user["payload"] = settings.payload is not None
+    is_user |= {
+        "limits.torque_speed": any(limits.torque_speed),
+        "limits.total_power": np.isfinite(limits.total_power),
+        "payload": settings.payload is not None,
+    }
     for kind in ("armature", "viscous", "coulomb"):
         figures = getattr(friction, kind)[: len(dynamics.bodies)]
         is_user[f"friction.{kind}"] = np.any(figures > dynamics.friction.get(kind, 0.0))

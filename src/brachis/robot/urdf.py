@@ -94,37 +94,33 @@ def _movable(tree: UrdfTree) -> list[str]:
 
 
 def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
-    """Refuse inertias of moving bodies that no body can have."""
-    for body in bodies:
-        for name in body.links:
-            hint = (
-                f"Correct it in the URDF; or lock the joints from the base to {body.joint} with "
-                "robot.locked_joints, if they need not move"
-            )
-            _check_inertial(f"link {name!r}", tree.links[name], where, hint)
-
-
-def _check_inertial(link: str, element: Element, where: str, hint: str) -> None:
     """Refuse a negative mass, a mass without moments of inertia, and moments that no body can have."""
-    mass = mass_of(element)
-    if mass < 0.0:
-        raise UrdfError(
-            f"{link} has a negative mass",
-            where=where,
-            found=f"{mass:g} kg",
-            allowed=">= 0 kg",
-            hint=hint,
+    for body in bodies:
+        hint = (
+            f"Correct it in the URDF; or lock the joints from the base to {body.joint} with robot.locked_joints, if "
+            "they need not move"
         )
-    if mass > 0.0 and element.find("inertial/inertia") is None:
-        raise UrdfError(
-            f"{link} has a mass but no <inertia>",
-            where=where,
-            found=f"{mass:g} kg",
-            allowed="<inertia> with the moments about the centre of mass",
-            hint=hint,
-        )
-    problem = f"{link} has a non-physical inertia"
-    check_inertia(inertia_matrix(element), problem, where, UrdfError, hint)
+        for name in body.links:
+            element = tree.links[name]
+            mass = mass_of(element)
+            if mass < 0.0:
+                raise UrdfError(
+                    f"link {name!r} has a negative mass",
+                    where=where,
+                    found=f"{mass:g} kg",
+                    allowed=">= 0 kg",
+                    hint=hint,
+                )
+            if mass > 0.0 and element.find("inertial/inertia") is None:
+                raise UrdfError(
+                    f"link {name!r} has a mass but no <inertia>",
+                    where=where,
+                    found=f"{mass:g} kg",
+                    allowed="<inertia> with the moments about the centre of mass",
+                    hint=hint,
+                )
+            problem = f"link {name!r} has a non-physical inertia"
+            check_inertia(inertia_matrix(element), problem, where, UrdfError, hint)
 
 
 @dataclass(frozen=True)

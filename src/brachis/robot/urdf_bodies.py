@@ -70,7 +70,7 @@ class UrdfDynamics(Summary):
     @property
     def without_mass(self) -> tuple[Body, ...]:
         """Bodies of which no link has a mass."""
-        return tuple(body for body in self.bodies if not body.mass > 0.0)
+        return tuple(body for body in self.bodies if not body.mass)
 
 
 def read_dynamics(

@@ -224,9 +224,8 @@ class Trajectory(Summary):
         if stops:
             qdot[-1] = 0.0
             qddot[-1] = 0.0
-        tau = None
-        if self.robot.has_masses:
-            tau = dynamics.torque(self.robot, q, qdot, qddot)
+        robot = self.robot
+        tau = dynamics.torque(robot, q, qdot, qddot) if robot.has_masses else None
         tool = tool_motion(self.robot, q, qdot)
         return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
 
