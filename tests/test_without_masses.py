@@ -12,6 +12,7 @@ import yaml
 
 import brachis
 from brachis.apps import bottleneck
+from brachis.apps.compose import Rail, on_rail
 from brachis.apps.export import write
 from brachis.apps.plots import PLOTS
 from brachis.apps.plots.panels import joint_rows_of
@@ -259,6 +260,16 @@ def test_the_commands(tmp_path, capsys):
     limits = yaml.safe_load(starter.text)["robot"]["limits"]
     assert set(limits["torque"].values()) == {None}
     assert set(limits["acceleration"].values()) == {1.0}
+
+
+def test_an_arm_without_masses_on_a_rail(tmp_path):
+    (tmp_path / "arm.urdf").write_text(six_axes())
+    rail = Rail(range=(-2.0, 2.0), velocity=2.0, force=1500.0, mass=50.0)
+    text = on_rail(tmp_path / "arm.urdf", rail)
+    with pytest.raises(UrdfError, match=r"robot\.limits\.torque; found .* moved by a1"):
+        robot_of(text)
+    robot = robot_of(text, limits={"torque": None, "acceleration": 8.0})
+    assert robot.n == 7
 
 
 @pytest.mark.parametrize("angle", [20.0, -20.0])
