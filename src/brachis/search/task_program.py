@@ -11,8 +11,8 @@ from brachis.errors import PathError
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.extraction import extract_trajectory
 from brachis.optimise.program import Program
-from brachis.optimise.transcription import breaks_of, program_of
-from brachis.search.phase_plane import initial_guess
+from brachis.optimise.transcription import program_of
+from brachis.search.phase_plane import initial_breaks, initial_guess
 from brachis.trajectory import Trajectory
 
 
@@ -31,9 +31,8 @@ class TaskProgram(Program):
     """
 
     def __init__(self, start: InitialGuess) -> None:
-        joint_maps = start.maps_by_leg()
-        breaks = [breaks_of(start.problem)] * len(joint_maps)
-        program = program_of(start.problem, joint_maps, breaks)
+        breaks = initial_breaks(start)
+        program = program_of(start.problem, start.maps_by_leg(), breaks)
         super().__init__(program.phases, program.links)
         self._start = start
 
