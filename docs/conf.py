@@ -47,8 +47,20 @@ html_css_files = ["site.css"]
 
 STARTUP = """\
 import os
+import subprocess
 import warnings
 os.chdir({folder!r})
+
+plain = {{key: value for key, value in os.environ.items() if "COLOR" not in key}}
+
+def system(command):
+    done = subprocess.run(
+        command, shell=True, text=True, stdout=-1, stderr=-2, env=plain
+    )
+    print(done.stdout.rstrip())
+    done.check_returncode()  # a command that fails is an error of its page
+
+get_ipython().system = system
 # Cells have few knot intervals, so that they are quick; a kernel's file names say nothing.
 warnings.filterwarnings("ignore", message=".*the same joint path can be passed in")
 warnings.formatwarning = lambda message, category, *place: f"{{category.__name__}}: {{message}}\\n"
@@ -65,6 +77,8 @@ def _isolated_clone(folder: Path) -> None:
     os.environ["IPYTHONDIR"] = str(folder / ".ipython")
 
 
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+os.environ["COLUMNS"] = "105"  # of tables that commands print
 os.environ.pop(
     "PYTHONDONTWRITEBYTECODE", None
 )  # else every page would compile the package
