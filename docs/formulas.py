@@ -6,7 +6,7 @@ Ziamath typesets them. Screen readers say the LaTeX.
 from __future__ import annotations
 
 from functools import cache
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import ziamath
 from docutils import nodes
@@ -30,7 +30,7 @@ def picture_of(latex: str, *, is_block: bool) -> str:
     picture.set("style", f"vertical-align: {formula.getyofst() / _TEXT:.3f}em")
     picture.set("role", "img")
     picture.set("aria-label", " ".join(latex.split()))
-    return ElementTree.tostring(picture, encoding="unicode")
+    return ET.tostring(picture, encoding="unicode")
 
 
 def write_in_line(writer: HTML5Translator, node: nodes.math) -> None:
