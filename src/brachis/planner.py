@@ -353,8 +353,8 @@ def transcribe(
     -------
     program : TaskProgram
         ``program.guess`` is a point x to begin with, ``program.names`` says what stands where in x, and
-        ``program.trajectory(x)`` is its motion, for `verify_trajectory`. There are as many knot intervals a phase as the
-        task says; with ``intervals: auto`` 10, the first mesh, which `plan` refines.
+        ``program.trajectory(x)`` is its motion, for `verify_trajectory`. There are as many knot intervals a phase as
+        the task says; with ``intervals: auto`` 10, the first mesh, which `plan` refines.
     family : str
         Family of the closed form.
 

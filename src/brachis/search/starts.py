@@ -425,17 +425,17 @@ def first_guess(
     Raises
     ------
     PathError
-        The lattice has no joint path.
+        The lattices have no joint path.
     """
     if isinstance(problem.task_map, JointSpace):
         return joint_space_start(problem)
-    first = next(iter(decompositions), None)
     level = SEARCH_LEVELS["fast"][0]
-    found = (
-        chart_starts(problem, decompositions, level)
-        if first is None
-        else _joint_paths(first, level, 1, NEVER)
-    )
+    if not decompositions:
+        found = chart_starts(problem, decompositions, level)
+    for decomposition in decompositions:
+        found = _joint_paths(decomposition, level, 1, NEVER)
+        if not isinstance(found, DeadEnd):
+            break
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
     return found[0]
