@@ -81,8 +81,6 @@ class Phase:
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
-    evaluations : dict of str to int
-        How often states and Jacobians were computed.
     """
 
     def __init__(
@@ -124,7 +122,6 @@ class Phase:
         self.upper = self._rows.upper
         self._evaluate = LastCall(self._evaluate_anew)
         self._slopes: tuple[Evaluation, np.ndarray] | None = None
-        self.evaluations = {"states": 0, "jacobians": 0}
 
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
         """Return the same phase over another grid, and with other boundary conditions where they are given."""
@@ -305,7 +302,6 @@ class Phase:
         return self._evaluate(x)
 
     def _evaluate_anew(self, x: np.ndarray) -> Evaluation:
-        self.evaluations["states"] += 1
         curves = per_second(self._orders(x, self._control_points(x)), x[0])
         t = self.grid.t_norm_at(self._h(x)) * x[0]
         return self.evaluator.evaluate(*curves, t=t)
@@ -379,7 +375,6 @@ class Phase:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
-        self.evaluations["jacobians"] += 1
         slopes = self.limit_slopes(x)
         is_mean = self.evaluator.is_mean
         if is_mean.any():
