@@ -147,6 +147,8 @@ def killed(source: Path, folder: Path, plans: int) -> str:
 
 
 def on_dask(source: Path, folder: Path, plans: int) -> str:
+    from distributed import Client
+
     def listener(text: str) -> None:
         if text.startswith(f"{plans // 2} of"):
             workers[0].kill()
@@ -154,7 +156,8 @@ def on_dask(source: Path, folder: Path, plans: int) -> str:
     out = folder / "dask"
     with cluster(folder) as (file, workers):
         began = time.perf_counter()
-        brachis.sweep(source, out, scheduler=str(file), listener=listener)
+        with Client(scheduler_file=str(file), set_as_default=False) as client:
+            brachis.sweep(source, out, executor=client, listener=listener)
         took, dead = time.perf_counter() - began, workers[0].poll()
     return f"{took:.1f} s, one of two workers killed half-way ({dead}): {same(out, folder / 'undisturbed')}"
 

@@ -10,6 +10,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import closing
 from pathlib import Path
 from typing import Any, Unpack
@@ -17,7 +18,7 @@ from typing import Any, Unpack
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik
-from brachis.common.arguments import check_callable, count
+from brachis.common.arguments import check_callable, check_executor, count
 from brachis.common.deadline import Deadline
 from brachis.common.interrupts import SigintHandler
 from brachis.common.progress import Listener, ignore, report_progress
@@ -389,10 +390,11 @@ def plan_many(
     tasks: Iterable[Source | tuple[Given, Source]],
     *,
     jobs: int = 1,
+    executor: Executor | None = None,
     progress: bool | OnProgress | None = None,
     **keywords: Unpack[TaskKeywords],
 ) -> list[Outcome]:
-    """Plan many tasks, in several processes; a plan that fails is an error in the list and stops no other.
+    """Plan many tasks, in several processes or by an executor; a plan that fails is an error in the list, no more.
 
     Parameters
     ----------
@@ -400,6 +402,9 @@ def plan_many(
         Each as `plan` takes it.
     jobs : int, optional
         Processes; no more than there are processors are used.
+    executor : Executor, optional
+        Plans in place of them: a Dask client, or any `concurrent.futures.Executor`, such as those of mpi4py and parsl.
+        Tasks are read by its workers: files that they name must be there.
     progress : bool or callable, optional
         True: how many are done, as `plan` shows its progress; left out: in notebooks. A function: called after every
         plan, in the order of the tasks, with the number of those done, the number of all, and the outcome.
@@ -445,13 +450,12 @@ def plan_many(
         )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
     given = list(tasks)
-    work = run_in_processes(
-        _plan_one,
-        given,
-        keywords,
-        jobs=process_count(count(jobs, "jobs")),
-        listener=ignore,
-    )
+    processes = process_count(count(jobs, "jobs"))
+    work = run_in_processes(_plan_one, given, keywords, jobs=processes, listener=ignore)
+    if executor is not None:
+        check_executor(executor)
+        futures = [executor.submit(_plan_one, task, keywords, ignore) for task in given]
+        work = (future.result() for future in futures)
     outcomes: list[Outcome] = []
     with (
         report_progress(None, False if callable(progress) else progress) as report,

@@ -70,6 +70,18 @@ def check_callable(value: object, where: str) -> None:
         raise _wrong_type(value, where, "a function, or None")
 
 
+def check_executor(value: object) -> None:
+    """Raise an error unless the value hands work out as an executor does.
+
+    Raises
+    ------
+    InputError
+    """
+    if not hasattr(value, "submit"):
+        allowed = "an executor, such as concurrent.futures.ProcessPoolExecutor()"
+        raise _wrong_type(value, "executor", allowed)
+
+
 def check_list(value: object, where: str, of: str) -> None:
     """Raise an error unless the value is a list or tuple; `of` names its items in the message.
 

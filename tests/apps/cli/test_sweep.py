@@ -107,3 +107,21 @@ def test_a_wrong_key_is_exit_code_2(run, sweep_file, tmp_path):
     assert done.code == 2
     assert "Did you mean 'length'?" in done.err
     assert not (tmp_path / "out").exists()
+
+
+def test_parts_are_planned_by_themselves_and_merged(run, sweep_file, tmp_path):
+    out = ("--out", tmp_path / "out")
+    first = run("sweep", sweep_file, "--part", "1/2", *out)
+    assert first.code == 0
+    assert "sweep: 2 plans, 2 verified, 0 unverified, 0 failed" in first.out
+    assert f"wrote {tmp_path / 'out/table-1-of-2.csv'}" in "".join(
+        first.out.split("\n")
+    )
+    missing = run("sweep", sweep_file, "--merge", *out)
+    assert missing.code == 2
+    assert "found no result of 2 plans: 1, 3" in missing.err
+    assert run("sweep", sweep_file, "--part", "2/2", *out).code == 0
+    assert not (tmp_path / "out/sweep.png").exists()
+    merged = run("sweep", sweep_file, "--merge", *out, "--json")
+    assert merged.code == 0
+    assert json.loads(merged.out)["plans"] == 4

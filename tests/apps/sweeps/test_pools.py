@@ -5,15 +5,22 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
 
 import brachis
 from brachis.apps.sweeps.plans import Outcome
-from brachis.apps.sweeps.pools import as_completed, on_dask, pool_for
-from brachis.errors import ClusterError, InputError
+from brachis.apps.sweeps.pools import as_completed, on_executor, pool_for
+from brachis.errors import ClusterError, InputError, TaskError
 
 DASK = Path(sys.executable).with_name("dask")
 WAIT = 120.0
@@ -47,13 +54,10 @@ class Processes:
 def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
     processes = Processes({4, 7})
 
-    def wait(futures, *_settings):
-        if not any(future.done() for future in futures):
-            processes.work()
-        return {future for future in futures if future.done()}, None
-
-    monkeypatch.setattr("brachis.apps.sweeps.pools.wait", wait)
-    found = dict(as_completed(range(10), processes.submit, lambda: 3))
+    monkeypatch.setattr(
+        "brachis.apps.sweeps.pools.time.sleep", lambda _: processes.work()
+    )
+    found = dict(as_completed(range(10), processes.submit, 3))
     assert sorted(found) == list(range(10))
     assert processes.most == 3
     assert {
@@ -63,26 +67,114 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
     assert "each worker process ended during this plan" in found[4].facts["message"]
 
 
-def test_what_no_worker_can_run_ends_the_sweep():
+@pytest.mark.parametrize(
+    "failure",
+    [
+        ModuleNotFoundError("No module named 'brachis'"),
+        ConnectionResetError("Connection reset by peer"),
+        CancelledError("lost"),
+    ],
+    ids=type,
+)
+def test_what_no_worker_can_run_ends_the_sweep(failure):
     future = Future()
-    future.set_exception(ModuleNotFoundError("No module named 'brachis'"))
-    with pytest.raises(
-        ClusterError,
-        match="workers failed to make plans; found ModuleNotFoundError: No module",
-    ):
-        next(as_completed([0], lambda _plan: future, lambda: 1))
+    future.set_exception(failure)
+    expected = f"workers failed to make plans; found {type(failure).__name__}: {failure}.*sweep continues"
+    with pytest.raises(ClusterError, match=expected):
+        next(as_completed([0], lambda _plan: future, 1))
+
+
+def test_a_plan_that_its_workers_did_not_survive_fails_alone():
+    """Dask says so by an error that only Dask has."""
+    answers = {0: Future(), 1: Future()}
+    answers[0].set_exception(RuntimeError("killed four workers"))
+    answers[1].set_result(Outcome({"status": "verified"}))
+    found = dict(as_completed([0, 1], answers.get, 2))
+    assert found[0].facts["status"] == "failed"
+    assert found[0].facts["message"] == "killed four workers"
+    assert found[1].facts["status"] == "verified"
+
+
+def test_an_executor_whose_workers_ended():
+    class Executor:
+        def submit(self, *_):
+            raise BrokenExecutor("a child process terminated abruptly")
+
+    expected = "workers ended; found a child process terminated abruptly"
+    with pytest.raises(ClusterError, match=expected):
+        list(on_executor([0], Executor()))
+
+
+def test_plans_that_wait_are_cancelled_with_the_sweep():
+    future = Future()
+    done = Future()
+    done.set_result(Outcome({"status": "verified"}))
+    outcomes = as_completed([0, 1], {0: done, 1: future}.get, 2)
+    next(outcomes)
+    outcomes.close()
+    assert future.cancelled()
 
 
 @pytest.mark.parametrize(
-    ("jobs", "scheduler", "expected"),
+    ("jobs", "executor", "expected"),
     [
         (0, None, "jobs: out of range; found 0; allowed: a whole number >= 1"),
-        (2, "tcp://127.0.0.1:8786", "jobs or scheduler"),
+        (2, ThreadPoolExecutor(1), "jobs or executor"),
+        (
+            None,
+            "tcp://127.0.0.1:8786",
+            "executor: wrong type; found 'tcp://127.0.0.1:8786'; allowed: an executor",
+        ),
     ],
 )
-def test_wrong_pools_are_refused(jobs, scheduler, expected):
+def test_wrong_pools_are_refused(jobs, executor, expected):
     with pytest.raises(InputError, match=expected):
-        pool_for(jobs, scheduler, print)
+        pool_for(jobs, executor)
+
+
+class Job:
+    """What submitit gives: no future, but like one."""
+
+    def __init__(self, outcome):
+        self.outcome, self.looks = outcome, 0
+
+    def done(self):
+        self.looks += 1
+        return self.looks > 2
+
+    def exception(self):
+        return None
+
+    def result(self):
+        return self.outcome
+
+
+class Cluster:
+    """An executor as submitit has, which is none of `concurrent.futures`."""
+
+    def submit(self, function, *arguments):
+        return Job(function(*arguments))
+
+
+def test_any_executor_makes_the_plans(content, tmp_path, same_as_undisturbed):
+    result = brachis.sweep(content, tmp_path / "out", executor=Cluster())
+    assert same_as_undisturbed(result.table)
+
+
+def test_an_executor_plans_many_tasks():
+    tasks = [
+        {"brachis": 1, "path": []},
+        brachis.load_task(brachis.examples.scara_line, changes={"spline.intervals": 6}),
+    ]
+    keywords = {"redundant_joints": ["j1"], "effort": "single"}
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+        wrong, result = brachis.plan_many(tasks, executor=executor, **keywords)
+    assert isinstance(wrong, TaskError)
+    alone = brachis.plan(tasks[1], **keywords)
+    assert result.verified
+    assert result.t_end == pytest.approx(alone.t_end, rel=1e-9)
+    with pytest.raises(InputError, match="executor: wrong type; found 3"):
+        brachis.plan_many(tasks, executor=3)
 
 
 @pytest.fixture
@@ -113,6 +205,8 @@ def cluster(tmp_path):
 def test_a_sweep_on_dask_survives_a_worker_that_is_killed(
     cluster, content, tmp_path, same_as_undisturbed
 ):
+    from distributed import Client
+
     file, workers = cluster
     until = time.monotonic() + WAIT
     while not file.exists():
@@ -123,49 +217,10 @@ def test_a_sweep_on_dask_survives_a_worker_that_is_killed(
         if text.startswith("1 of"):
             workers[0].kill()
 
-    result = brachis.sweep(
-        content, tmp_path / "out", scheduler=str(file), listener=listener
-    )
+    with Client(scheduler_file=str(file), set_as_default=False) as client:
+        result = brachis.sweep(
+            content, tmp_path / "out", executor=client, listener=listener
+        )
     assert same_as_undisturbed(result.table)
     assert workers[0].wait(WAIT) == -9
     assert workers[1].poll() is None
-
-
-def test_no_scheduler_answers(content, tmp_path, monkeypatch):
-    pytest.importorskip(
-        "distributed", reason="Dask is not installed: pip install 'brachis[cluster]'"
-    )
-    monkeypatch.setattr("brachis.apps.sweeps.pools._CONNECTING", 0.1)
-    with pytest.raises(
-        ClusterError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"
-    ):
-        brachis.sweep(content, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
-
-
-def test_a_scheduler_that_is_lost(monkeypatch):
-    """The client says so with an error of its own, whatever it is asked for."""
-    distributed = pytest.importorskip(
-        "distributed", reason="Dask is not installed: pip install 'brachis[cluster]'"
-    )
-
-    class Client:
-        def __init__(self, **_):
-            pass
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
-        def nthreads(self):
-            raise distributed.comm.CommClosedError(
-                "in <TCP (closed)>: Connection reset by peer"
-            )
-
-    monkeypatch.setattr("dask.distributed.Client", Client)
-    with pytest.raises(
-        ClusterError,
-        match=r"tcp://here:1: the connection to the Dask scheduler was lost; found in <TCP .closed.*it continues",
-    ):
-        list(on_dask([], "tcp://here:1", print))

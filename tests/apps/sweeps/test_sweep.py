@@ -272,3 +272,47 @@ def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undistu
         json.loads((folder / "sweep.json").read_text())["settings"]["grid"]
         == content["grid"]
     )
+
+
+def test_parts_are_planned_by_themselves_and_merged(
+    content, tmp_path, here, undisturbed
+):
+    out = tmp_path / "out"
+    lines = {}
+    for part in ("1/4", "2/4", "3/4"):
+        result = brachis.sweep(content, out, part=part)
+        lines[part] = result.table.column("plan").to_pylist()
+        name = f"table-{part.replace('/', '-of-')}"
+        assert [path.name for path in result.files] == [
+            f"{name}.parquet",
+            f"{name}.csv",
+        ]
+        assert all(path.exists() for path in result.files)
+    assert lines == {"1/4": [0, 4], "2/4": [1, 5], "3/4": [2]}
+    assert len(here) == 3
+    with pytest.raises(
+        InputError,
+        match=r"merge: parts of the sweep are missing; found no result of 1 plan: 3\. Run their parts",
+    ):
+        brachis.sweep(content, out, merge=True)
+    assert not (out / "table.parquet").exists()
+    brachis.sweep(content, out, part="4/4")
+    merged = brachis.sweep(content, out, merge=True)
+    assert len(here) == 4
+    assert merged.table.column("plan").to_pylist() == list(range(6))
+    assert brachis.SweepResult.load(out).table.equals(merged.table)
+    ends = [row["t_end_s"] for row in undisturbed.rows()]
+    assert merged.table.column("t_end_s").to_pylist() == pytest.approx(
+        ends, nan_ok=True
+    )
+
+
+@pytest.mark.usefixtures("nothing_runs")
+@pytest.mark.parametrize("part", ["0/2", "3/2", "7/7", "1", "1/", "a/b", "-1/2"])
+def test_wrong_parts_are_refused(content, tmp_path, part):
+    with pytest.raises(
+        InputError,
+        match=f"part: this is not a part of the sweep; found {part}; allowed: i/n.* n <= 6",
+    ):
+        brachis.sweep(content, tmp_path / "out", part=part)
+    assert not (tmp_path / "out").exists()

@@ -251,7 +251,8 @@ def sweep(
     source: Annotated[Path, Argument(metavar="SWEEP")],
     out: Path | None = None,
     jobs: int | None = None,
-    scheduler: str | None = None,
+    part: str | None = None,
+    merge: Annotated[bool, Option("--merge")] = False,
     retry: Annotated[bool, Option("--retry")] = False,
     json: Json = False,
 ) -> None:
@@ -266,8 +267,10 @@ def sweep(
         the file. An interrupted sweep continues there with the missing plans.
     jobs : int, optional
         Number of processes. Default and maximum: the number of processors.
-    scheduler : str, optional
-        Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file.
+    part : str, optional
+        Plan only part i of n, for example 2/8: one job of a cluster's array, all with the same folder.
+    merge : bool, optional
+        Plan nothing: put the plans of all parts together in table.parquet and table.csv; an error if any is missing.
     retry : bool, optional
         Plan failed plans again.
 
@@ -275,16 +278,23 @@ def sweep(
     --------
     brachis sweep lines.yaml --jobs 2
     brachis sweep lines.yaml --retry  # continues a sweep, plans failures again
+    brachis sweep lines.yaml --part 2/8  # and, after all eight, brachis sweep lines.yaml --merge
     """
     from brachis.apps.sweeps.plans import VERIFIED
 
     with end_cleanly(), show_progress(in_logs=True) as listener:
         result = brachis.sweep(
-            source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
+            source,
+            out,
+            jobs=jobs,
+            part=part,
+            merge=merge,
+            retry=retry,
+            listener=listener,
         )
         verified = result.count(VERIFIED) > 0
         figures: dict[str, Writer] = {}
-        if result.varied and verified:
+        if result.varied and verified and part is None:
             figures["sweep.png"] = partial(draw, result.plot)
         drawn, failures = write_files(
             result.folder, {}, figures, listener=listener, stale=("sweep.png",)

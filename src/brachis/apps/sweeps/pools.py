@@ -1,4 +1,4 @@
-"""Where plans are made: processes of this machine or a Dask cluster.
+"""Where plans are made: processes of this machine, or the executor of a cluster.
 
 A pool takes plans and gives each back with its outcome, as soon as there is one, in any order.
 """
@@ -11,21 +11,12 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Future,
-    wait,
-)
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from functools import partial
 
-from brachis.apps.export.rows import require_library
 from brachis.apps.sweeps.plans import Outcome, Plan, run_plan
 from brachis.common import interrupts
-from brachis.common.arguments import count
-from brachis.common.files import is_file
-from brachis.common.progress import Listener
+from brachis.common.arguments import check_executor, count
 from brachis.errors import BrachisError, ClusterError, InputError
 
 Outcomes = Generator[tuple[Plan, Outcome], None, None]
@@ -35,8 +26,9 @@ AHEAD = 2
 """Plans that are handed out for each process, so that none waits for the next one."""
 HEARTBEAT = 1.0
 """Time until Ctrl-C, or the end of the parent process, is noticed, s."""
-_CONNECTING = 10.0
-"""Time in which a scheduler has to answer, s."""
+_POLL = 0.02
+"""Time between two looks at what is done, s; plans take tenths of a second or more."""
+_CONTINUES = "Finished plans are stored: the same sweep continues with the others"
 _ENDED = "each worker process ended during this plan: a crash, or too little memory"
 _ONE_THREAD = dict.fromkeys(
     (
@@ -51,100 +43,99 @@ _ONE_THREAD = dict.fromkeys(
 """Environment of worker processes."""
 
 
-def pool_for(jobs: int | None, scheduler: str | None, listener: Listener) -> Pool:
+def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
     """Choose where plans are made.
 
     Parameters
     ----------
     jobs : int or None
         Processes on this machine; None: as many as it has processors.
-    scheduler : str or None
-        Address of a Dask scheduler (``tcp://host:8786``) or its scheduler file (``scheduler.json``); None: processes on
-        this machine.
-    listener : callable
-        Called with messages about a cluster.
+    executor : Executor or None
+        What makes them in place of processes of this machine.
 
     Raises
     ------
     InputError
         Both are given, or one is wrong.
     """
-    if scheduler is None:
+    if executor is None:
         wanted = None if jobs is None else count(jobs, "jobs")
         return lambda plans: in_processes(plans, wanted)
+    check_executor(executor)
     if jobs is not None:
         raise InputError(
-            "jobs cannot be set for a cluster, which runs one process per worker",
+            "jobs cannot be set for an executor, which has its own workers",
             where="jobs",
             found=jobs,
-            allowed="jobs or scheduler, not both",
+            allowed="jobs or executor, not both",
         )
-    return lambda plans: on_dask(plans, scheduler, listener)
+    return lambda plans: on_executor(plans, executor)
 
 
 def as_completed(
-    plans: Iterable[Plan],
-    submit: Callable[[Plan], Future[Outcome]],
-    width: Callable[[], int],
-    lost: tuple[type[Exception], ...] = (),
+    plans: Iterable[Plan], submit: Callable[[Plan], Future[Outcome]], width: int
 ) -> Iterator[tuple[Plan, Outcome]]:
-    """Hand out plans to an executor, a few more than it has workers, and yield what comes back.
+    """Hand out plans, up to `width` at a time, and yield what comes back.
 
     Plans that were under way when a process ended are made again, one at a time, so that the one that ends it is known.
-
-    Parameters
-    ----------
-    plans : iterable of Plan
-    submit : callable
-    width : callable
-        How many plans may be under way.
-    lost : tuple of exception types
-        With which the executor says that a plan ended its worker time and again.
+    Futures of some clusters have only ``done``, ``exception``, ``result`` and ``cancel``.
     """
     waiting = iter(plans)
     suspects = deque[Plan]()
     tested: Plan | None = None
     running: dict[Future[Outcome], Plan] = {}
-    while True:
-        if not suspects:
-            free = max(0, width() - len(running))
-            running |= {submit(plan): plan for plan in itertools.islice(waiting, free)}
-        elif not running:
-            tested = suspects.popleft()
-            running[submit(tested)] = tested
-        if not running:
-            return
-        done, _ = wait(running, HEARTBEAT, FIRST_COMPLETED)
-        interrupts.check()
-        for future in done:
-            plan = running.pop(future)
-            if isinstance(future.exception(), BrokenExecutor) and plan is not tested:
-                suspects.append(plan)
-            else:
-                yield plan, _outcome_of(future, lost)
+    try:
+        while True:
+            if not suspects:
+                free = itertools.islice(waiting, max(0, width - len(running)))
+                running |= {submit(plan): plan for plan in free}
+            elif not running:
+                tested = suspects.popleft()
+                running[submit(tested)] = tested
+            if not running:
+                return
+            interrupts.check()
+            done = [future for future in running if future.done()]
+            if not done:
+                time.sleep(_POLL)
+            for future in done:
+                plan = running.pop(future)
+                if isinstance(_error_of(future), BrokenExecutor) and plan is not tested:
+                    suspects.append(plan)
+                else:
+                    yield plan, _outcome_of(future)
+    finally:
+        for future in running:
+            future.cancel()
 
 
-def _outcome_of(future: Future[Outcome], lost: tuple[type[Exception], ...]) -> Outcome:
-    error = future.exception()
+def _error_of(future: Future[Outcome]) -> BaseException | None:
+    try:
+        return future.exception()
+    except CancelledError as error:
+        return error
+
+
+def _outcome_of(future: Future[Outcome]) -> Outcome:
+    """Return what came of a plan; `run_plan` makes an outcome of every error but those of the worker itself."""
+    error = _error_of(future)
     if error is None:
         return future.result()
-    if isinstance(error, (BrokenExecutor, *lost)):
+    if isinstance(error, BrokenExecutor):
         return Outcome.of_error(error, message=_ENDED)
     if isinstance(error, BrachisError) or not isinstance(error, Exception):
         raise error
-    found = f"{type(error).__name__}: {error}"
-    raise ClusterError("workers failed to make plans", found=found) from error
+    if isinstance(error, OSError | CancelledError | ImportError):
+        raise ClusterError(
+            "workers failed to make plans",
+            found=f"{type(error).__name__}: {error}",
+            hint=_CONTINUES,
+        ) from error
+    return Outcome.of_error(error)
 
 
-def on_dask(plans: Iterable[Plan], address: str, listener: Listener) -> Outcomes:
-    """Make plans on a Dask cluster; workers may come and go meanwhile.
-
-    Parameters
-    ----------
-    plans : iterable of Plan
-    address : str
-        Of the scheduler, or its scheduler file.
-    listener : callable
+def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
+    """Make plans by an executor, which gets all of them at once.
 
     Yields
     ------
@@ -152,41 +143,16 @@ def on_dask(plans: Iterable[Plan], address: str, listener: Listener) -> Outcomes
 
     Raises
     ------
-    NotInstalledError
-        Dask is not installed.
     ClusterError
-        The scheduler does not answer, or was lost.
+        Its workers ended, cannot be reached, or cannot run brachis.
     """
-    dask = require_library("dask.distributed", "a Dask cluster", extra="cluster")
-    where = {"scheduler_file" if is_file(address) else "address": address}
     try:
-        client = dask.Client(**where, timeout=_CONNECTING, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
+        yield from as_completed(
+            plans, lambda plan: executor.submit(run_plan, plan), len(plans)
+        )
+    except BrokenExecutor as error:
         raise ClusterError(
-            "no Dask scheduler answers", where=address, found=str(error)
-        ) from error
-    try:
-        with client:
-            threads = client.nthreads()
-            if not threads:
-                listener(f"waiting for workers of {address}")
-            if any(number > 1 for number in threads.values()):
-                listener(
-                    "workers with several threads are slower than workers with one thread; start them with --nthreads 1"
-                )
-            executor = client.get_executor(pure=False)
-            yield from as_completed(
-                plans,
-                lambda plan: executor.submit(run_plan, plan),
-                lambda: AHEAD * max(1, sum(client.nthreads().values())),
-                (dask.KilledWorker,),
-            )
-    except (OSError, CancelledError) as error:
-        raise ClusterError(
-            "the connection to the Dask scheduler was lost",
-            where=address,
-            found=str(error),
-            hint="Finished plans are stored: run the same sweep again when the scheduler runs, and it continues",
+            "the executor's workers ended", found=str(error), hint=_CONTINUES
         ) from error
 
 
@@ -231,7 +197,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
                 return processes.submit(run_plan, plan)
 
     try:
-        yield from as_completed(plans, submit, lambda: AHEAD * width)
+        yield from as_completed(plans, submit, AHEAD * width)
     finally:
         with interrupts.defer():
             processes.shutdown(wait=True, kill_workers=True)

@@ -49,7 +49,8 @@ COLUMNS = {
     "motion": "string",
 }
 """Columns of an outcome: names and Arrow types. Times in s; the path error in m or rad, whichever is larger."""
-TABLES = ("table.parquet", "table.csv")
+TABLE = "table"
+"""Name of the table of all plans, without its suffix."""
 _ABOUT = "sweep.json"
 _MARK = "brachis_sweep"
 
@@ -133,29 +134,33 @@ class Store:
     def write_table(
         self,
         keys: Sequence[str],
-        rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
+        rows: Mapping[int, tuple[Mapping[str, Any], Mapping[str, Any]]],
+        name: str,
     ) -> pa.Table:
-        """Write the table of all plans as Parquet and as CSV, and return it.
+        """Write a table of plans as Parquet and as CSV, and return it.
 
         Parameters
         ----------
         keys : sequence of str
             The varied keys.
-        rows : sequence of (mapping, mapping)
-            Values of these keys, and the columns of the outcome; those that are left out are null.
+        rows : mapping of int to (mapping, mapping)
+            By the number of the plan, values of these keys, and the columns of the outcome; those that are left out are
+            null.
+        name : str
+            Of the files, without their suffixes.
         """
         from pyarrow import csv
 
-        columns: dict[str, Any] = {"plan": range(len(rows))}
+        columns: dict[str, Any] = {"plan": list(rows)}
         for key in keys:
-            columns[key] = _column([changes.get(key) for changes, _ in rows])
-        for name, kind in COLUMNS.items():
-            column = [facts.get(name) for _, facts in rows]
-            columns[name] = self._arrow.array(column, kind)
+            columns[key] = _column([changes.get(key) for changes, _ in rows.values()])
+        for title, kind in COLUMNS.items():
+            column = [facts.get(title) for _, facts in rows.values()]
+            columns[title] = self._arrow.array(column, kind)
         table = self._arrow.table(columns)
-        writers = (self._parquet.write_table, csv.write_csv)
-        for name, write in zip(TABLES, writers, strict=True):
-            with atomic_write(self.folder / name) as stream:
+        writers = {"parquet": self._parquet.write_table, "csv": csv.write_csv}
+        for suffix, write in writers.items():
+            with atomic_write(self.folder / f"{name}.{suffix}") as stream:
                 write(table, stream)
         return table
 
@@ -167,7 +172,7 @@ class Store:
         InputError
             It is missing or cannot be read.
         """
-        path = self.folder / TABLES[0]
+        path = self.folder / f"{TABLE}.parquet"
         try:
             return self._parquet.read_table(path)
         except (OSError, self._arrow.ArrowException) as error:
@@ -204,6 +209,8 @@ class SweepResult(Summary):
         ``chosen_branch``, ``chosen_solver``, ``iterations``, ``wall_time_s`` (s), ``error`` (its class) and
         ``message``, ``remarks``, ``motion`` (its file in the folder). Values that are neither numbers nor strings are
         JSON.
+    name : str
+        Of the table's files, without their suffixes; ``table`` unless the sweep was one part.
 
     Examples
     --------
@@ -228,6 +235,7 @@ class SweepResult(Summary):
     folder: Path
     keys: tuple[str, ...]
     table: pa.Table
+    name: str = TABLE
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> SweepResult:
@@ -262,7 +270,9 @@ class SweepResult(Summary):
     @property
     def files(self) -> tuple[Path, ...]:
         """The table as Parquet and as CSV."""
-        return tuple(self.folder / name for name in TABLES)
+        return tuple(
+            self.folder / f"{self.name}.{suffix}" for suffix in ("parquet", "csv")
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table as a pandas data frame."""

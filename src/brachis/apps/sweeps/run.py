@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import brachis
 from brachis.apps.sweeps.plans import FAILED, Outcome, Plan, SweepPlan, load_sweep
-from brachis.apps.sweeps.pools import Pool, pool_for
-from brachis.apps.sweeps.result import Store, SweepResult
+from brachis.apps.sweeps.pools import Outcomes, Pool, pool_for
+from brachis.apps.sweeps.result import TABLE, Store, SweepResult
 from brachis.common import interrupts
 from brachis.common.arguments import check_callable
 from brachis.common.progress import Listener, report_progress
-from brachis.common.words import write_count
+from brachis.common.words import name_first, write_count
+from brachis.errors import InputError
 
 
 def sweep(
@@ -25,7 +29,9 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     *,
     jobs: int | None = None,
-    scheduler: str | None = None,
+    executor: Executor | None = None,
+    part: str | None = None,
+    merge: bool = False,
     retry: bool = False,
     listener: Listener | None = None,
     progress: bool | None = None,
@@ -45,9 +51,14 @@ def sweep(
         Folder; by default one in the current folder, named as the file without its suffix, or ``sweep``.
     jobs : int, optional
         Processes on this machine, no more than it has processors, which is also the default.
-    scheduler : str, optional
-        Makes the plans on a cluster: address of a Dask scheduler, such as ``tcp://host:8786``, or its scheduler file.
-        The workers need brachis, and no files.
+    executor : Executor, optional
+        Makes the plans in place of processes of this machine: a Dask client, or any `concurrent.futures.Executor`, such
+        as those of mpi4py and parsl. Its workers need brachis, and no files.
+    part : str, optional
+        ``"i/n"``: of n parts of the sweep only the i-th, from 1 on, for jobs of a cluster's scheduler that share the
+        folder. It has a table of its own, such as ``table-2-of-8.csv``.
+    merge : bool, optional
+        Whether only to put the plans of all parts together in one table; no plan is made.
     retry : bool, optional
         Whether stored failures are planned again.
     listener : callable, optional
@@ -65,9 +76,9 @@ def sweep(
     TaskError
         The sweep is wrong, or a key is refused in all plans that set it; nothing was run.
     InputError
-        The folder is not a sweep's; or a library is missing.
+        The folder is not a sweep's; a library is missing; or, with `merge`, plans are missing.
     ClusterError
-        The cluster does not answer, or was lost; what was finished is stored.
+        The executor lost its workers, or they cannot run brachis; what was finished is stored.
 
     Examples
     --------
@@ -90,31 +101,73 @@ def sweep(
     with report_progress(listener, progress) as tell:
         tell("checking the sweep")
         planned = load_sweep(source)
-        pool = pool_for(jobs, scheduler, tell)
+        numbers = range(len(planned.rows))
+        table = TABLE
+        if part is not None:
+            first, parts = _read_part(part, len(numbers))
+            numbers = numbers[first - 1 :: parts]
+            table = f"{TABLE}-{first}-of-{parts}"
+        pool = pool_for(jobs, executor)
+        if merge:
+            pool = partial(_refuse_missing, planned)
         name = "sweep" if isinstance(source, Mapping) else Path(source).stem
         store = Store(Path(name if out is None else out))
         settings = planned.settings.model_dump(mode="json", exclude_defaults=True)
         store.describe(
             {"version": brachis.__version__, "settings": settings, "task": planned.base}
         )
-        found = _run(planned, store, pool, retry=retry, tell=tell)
-    rows = []
-    for changes, plan in planned.rows:
+        selected = {number: planned.rows[number] for number in numbers}
+        plans = [plan for _, plan in selected.values() if isinstance(plan, Plan)]
+        found = _run(plans, store, pool, retry=retry, tell=tell)
+    rows = {}
+    for number, (changes, plan) in selected.items():
         facts = (
             found[plan.digest]
             if isinstance(plan, Plan)
             else Outcome.of_error(plan).facts
         )
-        rows.append((changes, facts))
+        rows[number] = (changes, facts)
     keys = planned.settings.keys
-    return SweepResult(store.folder, keys, store.write_table(keys, rows))
+    return SweepResult(store.folder, keys, store.write_table(keys, rows, table), table)
+
+
+def _read_part(part: str, plans: int) -> tuple[int, int]:
+    """Read ``i/n``, of no more parts than plans."""
+    numbers = re.fullmatch(r"([0-9]+)/([0-9]+)", part)
+    first, parts = map(int, numbers.groups()) if numbers else (0, 0)
+    if not 1 <= first <= parts <= plans:
+        raise InputError(
+            "this is not a part of the sweep",
+            where="part",
+            found=part,
+            allowed=f"i/n, such as 2/8: part i of n, 1 <= i <= n <= {plans}",
+        )
+    return first, parts
+
+
+def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
+    """Make no plan; raise an error if there is one to make."""
+    digests = {plan.digest for plan in plans}
+    numbers = [
+        str(number)
+        for number, (_, plan) in enumerate(planned.rows)
+        if isinstance(plan, Plan) and plan.digest in digests
+    ]
+    if numbers:
+        raise InputError(
+            "parts of the sweep are missing",
+            where="merge",
+            found=f"no result of {write_count(len(numbers), 'plan')}: {name_first(numbers, ', ')}",
+            hint="Run their parts in the same folder, or the sweep without merge",
+        )
+    yield from ()
 
 
 def _run(
-    planned: SweepPlan, store: Store, pool: Pool, *, retry: bool, tell: Listener
+    selected: Sequence[Plan], store: Store, pool: Pool, *, retry: bool, tell: Listener
 ) -> dict[str, dict[str, Any]]:
     """Make the plans that are not stored yet, and return the columns of all, by digest."""
-    plans = {plan.digest: plan for _, plan in planned.rows if isinstance(plan, Plan)}
+    plans = {plan.digest: plan for plan in selected}
     found = {}
     for digest in plans:
         facts = store.read(digest)
