@@ -73,7 +73,7 @@ HEAVY = {
     "ipyopt",
     "pyarrow",
     "pandas",
-    "dask",
+    "mujoco",
 }
 MOST_LINES = 500
 

@@ -16,7 +16,7 @@ import os
 from functools import cache
 from pathlib import Path
 
-from brachis.common.files import is_file, shipped_folder, shipped_robots
+from brachis.common.files import ROBOT_SUFFIXES, is_file, shipped_folder, shipped_robots
 from brachis.errors import check_names, no_attribute
 from brachis.robot import Robot
 
@@ -39,11 +39,11 @@ def path_of(name: str) -> Path:
 
 
 def is_robot(given: object) -> bool:
-    """Return whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
+    """Return whether something is a robot: a `Robot`, a URDF or MJCF file, or a name from `names` or like one."""
     if isinstance(given, Robot):
         return True
     return isinstance(given, str | os.PathLike) and (
-        Path(given).suffix.lower() == ".urdf" or _is_name(given)
+        Path(given).suffix.lower() in ROBOT_SUFFIXES or _is_name(given)
     )
 
 

@@ -19,9 +19,8 @@ from brachis.errors import (
 from brachis.problem.plausibility import of_robot
 from brachis.robot import Robot
 from brachis.robot.dynamics import torque
-from brachis.robot.robot import RobotKeywords
 from brachis.robot.urdf import DefaultChain, default_chain
-from brachis.task import RobotSettings
+from brachis.task import RobotKeywords, RobotSettings
 from brachis.verify.mechanics import torques
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 

@@ -334,6 +334,8 @@ def ros_files(within: str) -> list[Path]:
 
 TASK_SUFFIXES = (".yaml", ".yml")
 """Suffixes of task files."""
+ROBOT_SUFFIXES = (".urdf", ".xml")
+"""Suffixes of robots: URDF and MJCF."""
 
 
 class Kind(StrEnum):
@@ -365,7 +367,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     patterns = {
         Kind.RESULT: rb"\APK",
         Kind.FIGURES: rb'\A\{\n  "t_end"',
-        Kind.URDF: rb"(?s)\A\s*(?=<).*<robot\b",
+        Kind.URDF: rb"(?s)\A\s*(?=<).*<(robot|mujoco)\b",
         Kind.SWEEP: rb"(?m)^sweep\s*:",
         Kind.TASK: rb"(?ms)\A(?!.*^```).*^brachis\s*:",  # but not Markdown
     }

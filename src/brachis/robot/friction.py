@@ -59,7 +59,8 @@ class Friction(Summary):
         ----------
         joint_names : sequence of str
         urdf : mapping of str to (n,) ndarray
-            What the URDF states as ``viscous`` and ``coulomb``.
+            What the URDF states as ``viscous``, ``coulomb`` and ``armature``; a rotor inertia of the settings replaces
+            the latter.
         settings : FrictionSettings
 
         Raises
@@ -90,6 +91,8 @@ class Friction(Summary):
                         allowed=f"numbers from 0 to {LARGEST:g}",
                     )
         rotors = terms.pop("rotor_inertia")
+        if settings.armature == FROM_URDF:
+            terms["armature"][rotors > 0.0] = 0.0
         ratios = terms.pop("gear_ratio")
         for i in np.flatnonzero((rotors > 0.0) & (ratios == 0.0)):
             raise InputError(

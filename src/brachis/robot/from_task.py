@@ -267,15 +267,16 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
     unlimited = _without_limit(robot, "torque")
     if unlimited:
         used["torque limits"] = unlimited
-    if robot.friction.armature.any():
-        used["armature"] = _by_joint(robot, "armature")
     titles = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
-    for kind, stated in robot.urdf_dynamics.friction.items():
+    if robot.friction.armature.any():
+        titles["armature"] = "armature"
+    for kind, title in titles.items():
+        stated = robot.urdf_dynamics.friction[kind]
         figures = getattr(robot.friction, kind)[: len(stated)]
         shown = _by_joint(robot, kind) if figures.any() else "none"
         same = np.array_equal(figures, stated)
         origin = "as the URDF states it" if same else "other than the URDF's"
-        used[titles[kind]] = f"{shown} ({origin})"
+        used[title] = f"{shown} ({origin})"
     return used
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self, TypedDict, Unpack
+from typing import Self, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -35,30 +35,15 @@ from brachis.robot.tool_joints import ToolJoint
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import UrdfDynamics, placement_matrix
 from brachis.robot.urdf_elements import read_tree
+from brachis.robot.urdf_writer import write_urdf
 from brachis.task import (
     LimitKeywords,
     LimitSpec,
-    Payload,
-    Placement,
+    RobotKeywords,
     RobotSettings,
     check_robot_settings,
 )
 from brachis.task.fields import merge
-
-
-class RobotKeywords(TypedDict, total=False):
-    """What `Robot.from_urdf` takes besides the URDF."""
-
-    tool_frame: str | None
-    base_frame: str | None
-    gravity: Sequence[float] | np.ndarray
-    locked_joints: Mapping[str, float] | None
-    limits: LimitSpec | LimitKeywords | None
-    friction: Mapping[str, object] | None
-    payload: Mapping[str, object] | Payload | None
-    tool_offset: Mapping[str, object] | Placement | None
-    mounting: str | Mapping[str, object] | Placement
-    speed_override: float
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -138,7 +123,7 @@ class Robot(Summary):
         Parameters
         ----------
         path : path
-            URDF file. Mesh files are not read.
+            URDF file, whose mesh files are not read; or MJCF file.
         urdf_text : str, optional
             Text of the URDF where it is already known; `path` then only names it.
         **keywords
@@ -153,11 +138,9 @@ class Robot(Summary):
         locked_joints : mapping of str to float, optional
             Joints held at a position, rad or m.
         limits : LimitSpec or mapping, optional
-            Limits that override or complete the URDF's; those of joints off the chain, which stand still, have no
-            effect.
+            Limits that override or complete the URDF's; those of joints off the chain have no effect.
         friction : mapping, optional
-            ``armature``, ``viscous``, ``coulomb``, ...: keys of `FrictionSettings`; what it leaves out is taken from
-            the URDF.
+            ``armature``, ``viscous``, ``coulomb``, ...: keys of `FrictionSettings`; the others are taken from the URDF.
         payload : mapping or Payload, optional
             ``mass``, kg; ``com``, (3,) m, and ``inertia`` about it, kg m^2, in the tool frame of the URDF.
         tool_offset : mapping or Placement, optional
@@ -166,10 +149,6 @@ class Robot(Summary):
             Where the URDF's root link is in the world.
         speed_override : float, optional
             Factor in (0, 1] on all velocity limits.
-
-        Returns
-        -------
-        Robot
 
         Raises
         ------
@@ -184,6 +163,39 @@ class Robot(Summary):
             unchecked["limits"] = given.pop("limits")
         settings = check_robot_settings(given).model_copy(update=unchecked)
         return cls.from_settings(settings, str(path), urdf_text)
+
+    @classmethod
+    def from_pinocchio(
+        cls,
+        model: pin.Model,
+        frame: str | None = None,
+        *,
+        geometry: pin.GeometryModel | None = None,
+        **keywords: Unpack[RobotKeywords],
+    ) -> Robot:
+        """Build the robot from a Pinocchio model: its frames, inertias, limits, friction, armature and gravity.
+
+        Parameters
+        ----------
+        model : pinocchio.Model
+            Joints of the chain have one axis; others, such as a free base, are held.
+        frame : str, optional
+            Body or added frame that follows the path, in place of ``tool_frame``.
+        geometry : pinocchio.GeometryModel, optional
+            Solids of the links, for distances.
+        **keywords
+            As for `from_urdf`.
+
+        Examples
+        --------
+        >>> import brachis, pinocchio
+        >>> model = pinocchio.buildModelFromUrdf("robots/scara3/robot.urdf")
+        >>> brachis.Robot.from_pinocchio(model, "link3").joint_names
+        ('j1', 'j2', 'j3')
+        """
+        text = write_urdf(model, geometry)
+        keywords = {"tool_frame": frame, "gravity": model.gravity.linear, **keywords}
+        return cls.from_urdf(f"{model.name}.urdf", urdf_text=text, **keywords)
 
     @classmethod
     def from_settings(

@@ -19,6 +19,7 @@ from lxml import etree
 from brachis.common import files, tolerances
 from brachis.errors import UrdfError, check_names
 from brachis.robot.limits import FARTHEST, UrdfLimit
+from brachis.robot.mjcf import is_mjcf, urdf_of_mjcf
 from brachis.robot.urdf_bodies import (
     Body,
     UrdfDynamics,
@@ -286,22 +287,24 @@ def _unit_of(joint: Element) -> str:
 
 
 def read_file(path: Path) -> str:
-    """Text of a URDF file.
+    """Text of a URDF file; an MJCF file is written as a URDF.
 
     Raises
     ------
     UrdfError
-        The file is missing, not text, another file of brachis, or not a regular file of a size that a URDF may have.
+        The file is missing, not text, another file of brachis, or not a regular file of a size that a URDF may have; or
+        MuJoCo refuses it.
     """
     files.check_kind(path, files.Kind.URDF, UrdfError)
     ours = files.shipped_folder("robots") / path.name / "robot.urdf"
     hint = f"The robot of this name that comes with brachis is {ours}"
-    return files.read_text(
+    text = files.read_text(
         path,
         where=str(path),
         hint=hint if files.is_file(ours) else "",
         error=UrdfError,
     )
+    return urdf_of_mjcf(path) if is_mjcf(text) else text
 
 
 def _leaves(tree: UrdfTree) -> tuple[str, ...]:

@@ -56,7 +56,8 @@ class UrdfDynamics(Summary):
     tool : (4, 4) ndarray
         Placement of the tool frame in the frame of the last joint.
     friction : dict of str to (n,) ndarray
-        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero by default.
+        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N; ``armature``, kg m^2 or kg, which
+        only `write_urdf` writes. Zero by default.
     links : dict of str to tuple of int and (4, 4) ndarray
         Of every link the number of the joint that moves it, from 1 on, and its placement in the joint's frame; 0 and
         the placement in the root link where none does.
@@ -111,7 +112,11 @@ def read_dynamics(
         kind: np.array(
             [number_of(tree.joints[name], "dynamics", word, 0.0) for name in chain]
         )
-        for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
+        for kind, word in (
+            ("viscous", "damping"),
+            ("coulomb", "friction"),
+            ("armature", "armature"),
+        )
     }
     return UrdfDynamics(tuple(bodies), carried[tool][1], friction, in_order)
 

@@ -265,6 +265,7 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
         Entry("mimic", "offset", "rad or m"),
         Entry("dynamics", "damping", "Nm s/rad or N s/m"),
         Entry("dynamics", "friction", "Nm or N"),
+        Entry("dynamics", "armature", "kg m^2 or kg"),
     ),
 }
 """All that is read from links and joints, and what a number there means."""

@@ -1,7 +1,7 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
 from brachis.task.fitted import fit_path
-from brachis.task.keywords import TaskKeywords, check_keywords, task_with
+from brachis.task.keywords import RobotKeywords, TaskKeywords, check_keywords, task_with
 from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
 from brachis.task.limit_models import (
     FROM_URDF,
@@ -86,6 +86,7 @@ __all__ = [
     "Posture",
     "ProcessSpeed",
     "RefinementSettings",
+    "RobotKeywords",
     "RobotSettings",
     "Rotate",
     "Rotation",

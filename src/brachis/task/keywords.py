@@ -38,7 +38,22 @@ Posture = (
 Settings = Mapping[str, Any]
 
 
-class TaskKeywords(TypedDict, total=False):
+class RobotKeywords(TypedDict, total=False):
+    """Keys of the section ``robot`` of a task, without its files."""
+
+    tool_frame: str | None
+    tool_offset: Placement | Settings | Transform | None
+    base_frame: str | None
+    mounting: Placement | Settings | Transform | Literal["floor", "wall", "ceiling"]
+    gravity: Array | Sequence[float]
+    locked_joints: Mapping[str, float] | None
+    payload: Payload | Settings | None
+    limits: LimitSpec | LimitKeywords | Settings | None
+    speed_override: float | str
+    friction: Settings | None
+
+
+class TaskKeywords(RobotKeywords, total=False):
     """Keys of a task; those of its sections ``robot``, ``boundary``, ``spline`` and ``search`` stand for themselves.
 
     A posture may be an array, a list or a mapping by joint name; a path one segment, or an array of points (n, m), of
@@ -68,17 +83,6 @@ class TaskKeywords(TypedDict, total=False):
     margins: Margins | Settings
     custom_limits: Mapping[str, Settings]
     strict: bool | None
-    # robot
-    tool_frame: str | None
-    tool_offset: Placement | Settings | Transform
-    base_frame: str | None
-    mounting: Placement | Settings | Transform | Literal["floor", "wall", "ceiling"]
-    gravity: Array | Sequence[float]
-    locked_joints: Mapping[str, float]
-    payload: Payload | Settings | None
-    limits: LimitSpec | LimitKeywords | Settings
-    speed_override: float | str
-    friction: Settings
     # boundary
     start_speed: float
     end_speed: float

@@ -134,8 +134,9 @@ UrdfFriction = Annotated[
 class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
-    armature: PerJoint = 0.0
-    """Inertia of the drive as seen at the joint, kg m^2 (kg)."""
+    armature: UrdfFriction = FROM_URDF
+    """Inertia of the drive as seen at the joint, kg m^2 (kg). Absent: armature of an MJCF file or Pinocchio model; a
+    URDF has none. Null: none."""
     rotor_inertia: PerJoint = 0.0
     """Inertia of the rotor about its own axis, kg m^2. With gear_ratio it replaces armature: armature = rotor_inertia *
     gear_ratio^2."""

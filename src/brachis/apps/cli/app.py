@@ -17,7 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 import brachis
 from brachis.common import interrupts
-from brachis.common.files import is_file, is_folder
+from brachis.common.files import ROBOT_SUFFIXES, is_file, is_folder
 from brachis.common.interrupts import INTERRUPTED
 from brachis.errors import (
     BrachisError,
@@ -88,7 +88,7 @@ class _Commands(TyperGroup):
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
         """Find a command by its name; where a file stands in its place, name the command that is missing."""
         if self.get_command(ctx, args[0]) is None and is_file(args[0]):
-            command = "inspect" if Path(args[0]).suffix == ".urdf" else "plan"
+            command = "inspect" if Path(args[0]).suffix in ROBOT_SUFFIXES else "plan"
             ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
         return super().resolve_command(ctx, args)
 
