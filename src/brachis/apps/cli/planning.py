@@ -278,7 +278,8 @@ def sweep(
     --------
     brachis sweep lines.yaml --jobs 2
     brachis sweep lines.yaml --retry  # continues a sweep, plans failures again
-    brachis sweep lines.yaml --part 2/8  # and, after all eight, brachis sweep lines.yaml --merge
+    brachis sweep lines.yaml --part 1/2  # the first of two jobs on a cluster
+    brachis sweep lines.yaml --merge  # after all jobs
     """
     from brachis.apps.sweeps.plans import VERIFIED
 
