@@ -53,7 +53,7 @@ def test_lines_and_arcs():
 
 
 def test_units_planes_and_increments():
-    points, _ = points_of("G20 G91 G0 X1 Y0 Z0\nG18\nG1 X1 F60\nG2 X0 Z2 K1\n")
+    points, _ = points_of("G20 G0 X1 Y0 Z0\nG91 G18\nG1 X1 F60\nG2 X0 Z2 K1\n")
     np.testing.assert_allclose(points.position[-1], [0.0508, 0.0, 0.0508], atol=1e-12)
     np.testing.assert_allclose(points.speed[-1], 0.0254)
     half = points.position[points.rows == 4]
@@ -90,7 +90,7 @@ def test_a_program_is_fitted_with_its_corners():
 
 
 MISTAKES = [
-    ("G0 X1 Y1 Z1\nG81 X2", r"line 2: this code is not read; found G81"),
+    ("G0 X1 Y1 Z1\nG81 X2", r"line 2: canned cycles are not read; found G81"),
     (
         "G0 X1 Y1 Z1\nG1 X2 A5 F10",
         r"line 2: axes other than X, Y, Z are not read; found A5",

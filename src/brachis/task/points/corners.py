@@ -18,6 +18,11 @@ from brachis.task.points.points import Array, Indices, Points, PointsAndNotes
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
+_SURE = 5.0
+"""Standard deviations by which scatter may not change the comparison of angles: of 50,000 points none goes so far."""
+_STRAIGHT = 0.7
+"""Least straightness of lines whose directions are compared: an arc of 200 degrees, which turns as if by 160 the other
+way, has less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +71,20 @@ def find_corners(
     near = for_direction ** (1.0 / 3.0)
     width = max(near, 2.0 * tolerance)
     least = 4 if noisy else 1
-    angle, uncertainty = _turning(points.position, u, width, least)
-    wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
-    # Over twice the distance a smooth curve turns by twice the angle, a corner by the same one.
-    sharp = (wide > 0.0) & (wide < 1.5 * angle)
-    # A polygon that turns by this much from one side to the next is not a smooth curve.
-    sharp |= angle > np.deg2rad(50.0)
-    sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * uncertainty)
+    near_turn = _turning(points.position, u, width, least)
+    wide_turn = _turning(points.position, u, 2.0 * width, 2 * least)
+    angle = near_turn.angle
+    # Between lines that are farther apart a smooth curve turns by more in proportion, a corner by the same angle.
+    growth = wide_turn.distance / np.maximum(near_turn.distance, 1e-12)
+    largest = angle * (1.0 + growth) / 2.0
+    doubt = _SURE * scatter.deviation * near_turn.uncertainty * growth
+    sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < largest - doubt)
+    sharp &= wide_turn.straightness > _STRAIGHT
+    if not noisy:
+        # A polygon that turns by this much from one side to the next is not a smooth curve.
+        sharp |= _turning(points.position, u, 0.0, 1).angle > np.deg2rad(50.0)
+    by_scatter = 8.0 * scatter.deviation * near_turn.uncertainty
+    sharp &= angle > np.maximum(LEAST_ANGLE, by_scatter)
     peaks = _peaks(angle, sharp, u, width, least)
     # Lines that are longer than scatter asks for miss the corner where the path bends.
     return tuple(
@@ -81,29 +93,60 @@ def find_corners(
     )
 
 
-def _turning(
-    position: Array, u: Array, width: float, least: int
-) -> tuple[Array, Array]:
-    """Return the angle between the directions before and after every point, (n,), rad; zero at the ends.
+@dataclass(frozen=True, eq=False)
+class _Turning:
+    """How points turn, from straight lines that fit them before and after every one; (n,) each.
 
-    Beside it stands the standard deviation that points which scatter by 1 m give it, (n,), rad.
+    Attributes
+    ----------
+    angle : ndarray
+        Between the two lines, rad; zero at the ends.
+    uncertainty : ndarray
+        Standard deviation that points which scatter by 1 m give the angle, rad.
+    distance : ndarray
+        Between the middles of the two lines, along the path, m.
+    straightness : ndarray
+        Length of the lines over that of the path, the lower of both; 1 if the points are on the lines.
     """
+
+    angle: Array
+    uncertainty: Array
+    distance: Array
+    straightness: Array
+
+
+def _turning(position: Array, u: Array, width: float, least: int) -> _Turning:
+    """Return how points turn at places u, m, between lines through the points within `width`, m, or `least` points."""
     index = np.arange(len(u))
     last = len(u) - 1
     begins = np.minimum(np.searchsorted(u, u - width), index - least)
     ends = np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least)
-    before, uncertainty = _directions(position, u, np.clip(begins, 0, last), index)
-    after, other = _directions(position, u, index, np.clip(ends, 0, last))
-    apart = np.linalg.norm(before - after, axis=1)
-    angle = 2.0 * np.arctan2(apart, np.linalg.norm(before + after, axis=1))
+    before = _lines(position, u, np.clip(begins, 0, last), index)
+    after = _lines(position, u, index, np.clip(ends, 0, last))
+    apart = np.linalg.norm(before.direction - after.direction, axis=1)
+    together = np.linalg.norm(before.direction + after.direction, axis=1)
+    angle = 2.0 * np.arctan2(apart, together)
     angle[(index < least) | (index > last - least)] = 0.0
-    return angle, np.hypot(uncertainty, other)
+    return _Turning(
+        angle,
+        np.hypot(before.uncertainty, after.uncertainty),
+        after.middle - before.middle,
+        np.minimum(before.straightness, after.straightness),
+    )
 
 
-def _directions(
-    position: Array, u: Array, first: Indices, last: Indices
-) -> tuple[Array, Array]:
-    """Return unit vectors along lines that fit points `first` to `last`, (n, p), and how uncertain they are, (n,)."""
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Straight lines that fit points: unit vectors, (n, p), and numbers, (n,), as of `_Turning`."""
+
+    direction: Array
+    uncertainty: Array
+    middle: Array
+    straightness: Array
+
+
+def _lines(position: Array, u: Array, first: Indices, last: Indices) -> _Lines:
+    """Return the lines that fit points `first` to `last`, (n,), of positions (n, p) at places u, (n,)."""
     at = u[:, None]
     moment = np.hstack([np.ones_like(at), at, at**2, position, at * position])
     sums = np.cumsum(np.pad(moment, ((1, 0), (0, 0))), axis=0)
@@ -114,7 +157,8 @@ def _directions(
     spread = np.maximum(part[:, 2:3] - count * mean**2, 1e-24)
     slope = (part[:, 3 + dimension :] - mean * part[:, 3 : 3 + dimension]) / spread
     sizes = np.maximum(np.linalg.norm(slope, axis=1), 1e-24)
-    return slope / sizes[:, None], 1.0 / np.sqrt(spread[:, 0])
+    uncertainty = 1.0 / np.sqrt(spread[:, 0])
+    return _Lines(slope / sizes[:, None], uncertainty, mean[:, 0], sizes)
 
 
 def _peaks(

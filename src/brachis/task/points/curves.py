@@ -24,7 +24,7 @@ from brachis.task.points.corners import (
     fill_gaps,
     find_corners,
 )
-from brachis.task.points.fit import Fit, deviations, fit_points
+from brachis.task.points.fit import Fit, fit_points
 from brachis.task.points.points import Array, Points, sum_up
 
 if TYPE_CHECKING:
@@ -45,8 +45,6 @@ class FittedCurve:
     given : slice
         Those that are the user's, without the corners.
     fit : Fit
-    distances, angles : ndarray
-        How far the given points are from the curve, m and rad.
     blend : float or None
         What the blend at its end takes from it and from the next curve, m; None at the last one.
     """
@@ -54,8 +52,6 @@ class FittedCurve:
     points: Points
     given: slice
     fit: Fit
-    distances: Array
-    angles: Array
     blend: float | None = None
 
     @property
@@ -72,6 +68,16 @@ class FittedCurve:
     def sigma(self) -> Array:
         """Where the given points are."""
         return self.fit.sigma[self.given]
+
+    @property
+    def distances(self) -> Array:
+        """How far the given points are from the curve, m."""
+        return self.fit.position_errors[self.given]
+
+    @property
+    def angles(self) -> Array:
+        """How far the given orientations are from the curve's, rad."""
+        return self.fit.turning_errors[self.given]
 
     @property
     def speeds(self) -> tuple[Run, ...]:
@@ -108,37 +114,8 @@ def _fit_between(
         if end is not None:
             whole.position[-1] = end.place
         fit = _fit_one(whole, tolerance, scatter, note)
-        distances, angles = _measure_deviations(whole, fit, tolerance)
-        curves.append(FittedCurve(whole, given, fit, distances[given], angles[given]))
+        curves.append(FittedCurve(whole, given, fit))
     return curves
-
-
-def _measure_deviations(
-    points: Points, fit: Fit, tolerance: FitTolerance
-) -> tuple[Array, Array]:
-    """Return distances and angles of points from their fit, by another formula than the fit's.
-
-    Raises
-    ------
-    TaskError
-        A point is farther away than the tolerance allows.
-    """
-    distances, angles = deviations(points, fit.spline)
-    for found, allowed, per, unit in (
-        (distances, tolerance.position, 1e-3, "mm"),
-        (angles, tolerance.orientation, np.pi / 180.0, "deg"),
-    ):
-        i = int(np.argmax(found))
-        # `deviations` may overestimate by a thousandth of the tolerance and by 1e-8.
-        if found[i] > allowed * (1.0 + 1e-3) + 1e-8:
-            raise points.wrong(
-                i,
-                "the fitted curve does not pass the points within the tolerance",
-                found=f"{points.describe(i)}, {found[i] / per:.4g} {unit} off",
-                allowed=f"{allowed / per:.4g} {unit}",
-                hint="Raise the tolerance, or cut the path into several",
-            )
-    return distances, angles
 
 
 def _blend_between(
@@ -178,16 +155,7 @@ def _fit_one(
     ------
     TaskError
     """
-    try:
-        fit = fit_points(points, tolerance, scatter)
-    except ValueError as error:
-        raise points.wrong(
-            0,
-            "no smooth curve follows these points",
-            found=f"{error}, from {points.describe(0)}",
-            allowed="points that move on from each to the next",
-            hint=note or "Does the path turn back, or stand still, near there?",
-        ) from error
+    fit = fit_points(points, tolerance, scatter)
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + 1e-6:

@@ -1,8 +1,9 @@
 """G-code: rapid and straight moves, arcs, feed rates (G0, G1, G2, G3, F), in any plane, absolute or incremental.
 
 Moves become points on them: lines are straight between their ends, arcs are met within a micrometre. What does not say
-where the tool goes (spindle, coolant, one work offset) is skipped and told; what would (cycles, cutter compensation,
-rotary axes, subprograms, a change of the work offset) is refused. M2 and M30 end the program.
+where the tool's tip goes (spindle, coolant, the tool's length, one work offset) is skipped and reported; what would
+(cycles, cutter compensation, rotary axes, subprograms, a change of the work offset) is refused, and so is a letter that
+may change the path. M2 and M30 end the program.
 """
 
 from __future__ import annotations
@@ -24,15 +25,47 @@ from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _COMMENT = re.compile(r"\([^)]*\)|;.*$|%")
-_PLANES: Final = {"G17": [0, 1, 2], "G18": [2, 0, 1], "G19": [1, 2, 0]}
-"""Axes of the plane of arcs, then the one along its normal, by G code."""
+_MODES: Final = {
+    **{f"G{number}": ("motion", f"G{number}") for number in range(4)},
+    "G17": ("plane", [0, 1, 2]),
+    "G18": ("plane", [2, 0, 1]),
+    "G19": ("plane", [1, 2, 0]),
+    "G90": ("absolute", True),
+    "G91": ("absolute", False),
+    "G90.1": ("absolute_centres", True),
+    "G91.1": ("absolute_centres", False),
+}
+"""What codes set. Of a plane: the axes of its arcs, then the one along its normal."""
 _UNITS: Final = {"G20": 0.0254, "G21": 1e-3}
-_IGNORED: Final = {"G40", "G49", "G61", "G64", "G80", "G91.1", "G94"}
+_IGNORED: Final = {"G8", "G15", "G40", "G43", "G49", "G61", "G64", "G69", "G80", "G94"}
+_OFFSET_CHANGES: Final = (
+    "the work offset changes within the program: where the tool goes is not known"
+)
+_CYCLE: Final = "canned cycles are not read"
+_REFUSED: Final = {
+    "G4": "a dwell is not read: cut the file there and set dwell on the segment",
+    "G7": "X would be a diameter: write radii (G8)",
+    "G10": _OFFSET_CHANGES,
+    "G28": "the machine's reference position is not known",
+    "G30": "the machine's reference position is not known",
+    "G41": "cutter compensation is not read",
+    "G42": "cutter compensation is not read",
+    "G52": _OFFSET_CHANGES,
+    "G53": "places in machine coordinates are not known in the work frame",
+    "G73": _CYCLE,
+    "G76": _CYCLE,
+    **dict.fromkeys((f"G{number}" for number in range(81, 90)), _CYCLE),
+    **dict.fromkeys(("M97", "M98", "M99"), "subprograms are not read"),
+}
+"""Codes that lead the tool to where this reader does not know, with the reason."""
 _OFFSETS: Final = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _PIECES = 4
 """Fewest points on a move."""
 _ROUND = 2e-3
 """How much the radii of an arc at its start and end may differ, as a fraction of it."""
+
+_MOST_TURNS: Final = 1_000
+"""Of one arc: with a radius of 1 m its points take 53 MB."""
 
 
 @dataclass
@@ -46,20 +79,23 @@ class _Machine:
     at: Array
     line: int = 0
     motion: str | None = None
-    plane: list[int] = field(default_factory=lambda: _PLANES["G17"])
+    plane: list[int] = field(default_factory=lambda: [0, 1, 2])
     unit: float = 1e-3
     unit_stated: bool = False
     offset: str = "G54"
     ended: bool = False
     absolute: bool = True
+    absolute_centres: bool = False
     feed: float = nan
     skipped: set[str] = field(default_factory=set)
     moves: list[tuple[Array, float, int]] = field(default_factory=list)
 
-    def wrong(self, problem: str, found: str, allowed: str) -> TaskError:
+    def wrong(
+        self, problem: str, found: str, allowed: str, hint: str | None = None
+    ) -> TaskError:
         """Return the error that the line is wrong."""
         where = f"{self.source}: line {self.line}"
-        return TaskError(problem, found=found, allowed=allowed, where=where)
+        return TaskError(problem, found=found, allowed=allowed, where=where, hint=hint)
 
 
 def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
@@ -127,94 +163,131 @@ def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
 
 def _obey(machine: _Machine, code: str) -> None:
     """Obey one line, without its comments."""
-    rest = _WORD.sub("", code).strip()
-    if rest:
-        raise machine.wrong(
-            "this is not understood",
-            repr(rest[:40]),
-            "G-code words, such as G1 X10 F600",
-        )
-    values: dict[str, float] = {}
-    for letter, text in _WORD.findall(code):
-        if letter in "GM":
-            _set_mode(machine, f"{letter}{float(text):g}")
-        elif letter in "XYZIJKRF":
-            values[letter] = float(text)
-        elif letter in "ABCUVW":
-            raise machine.wrong(
-                "axes other than X, Y, Z are not read",
-                letter + text,
-                "X, Y, Z, I, J, K, R, F",
-            )
-        elif letter != "N":
-            machine.skipped.add(letter)
+    values, codes = _read_words(machine, code)
+    for mode in codes:
+        _set_mode(machine, mode)
     if "F" in values:
         feed = values.pop("F")
         if not feed > 0.0:
             allowed = "more than 0"
             raise machine.wrong("a feed rate must be positive", f"F{feed:g}", allowed)
         machine.feed = feed * machine.unit / 60.0
-    if values:
-        _move(machine, values)
+    if not set("XYZIJKR") & set(values):
+        machine.skipped |= set(values)
+        return
+    sets_place = "G92" in codes
+    if sets_place and machine.moves:
+        raise machine.wrong(_OFFSET_CHANGES, "G92", "G92 before the first move")
+    motion = "G0" if sets_place else machine.motion
+    _move(machine, motion, values, machine.absolute or sets_place)
+
+
+def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[str]]:
+    """Return the numbers of a line by their letters, and its codes, such as G1 or M30."""
+    rest = _WORD.sub("", code).strip()
+    if rest:
+        is_switched = rest.startswith("/")
+        raise machine.wrong(
+            "this is not understood",
+            repr(rest[:40]),
+            "G-code words, such as G1 X10 F600",
+            "/ is a switch of the machine: remove it, or the line" * is_switched
+            or None,
+        )
+    values: dict[str, float] = {}
+    codes = []
+    for letter, text in _WORD.findall(code):
+        if letter in "GM":
+            codes.append(f"{letter}{float(text):g}")
+        elif letter in "ABCUVW":
+            allowed = "X, Y, Z, I, J, K, R, F"
+            raise machine.wrong(
+                "axes other than X, Y, Z are not read", letter + text, allowed
+            )
+        elif letter in values:
+            raise machine.wrong(
+                "a letter stands twice in a line", letter + text, "once"
+            )
+        elif letter in "XYZIJKRFPLQ":
+            values[letter] = float(text)
+        elif letter != "N":
+            machine.skipped.add(letter)
+    return values, codes
 
 
 def _set_mode(machine: _Machine, code: str) -> None:
     """Obey a preparatory function, such as G1, or a miscellaneous one, such as M30."""
-    if code in {"G0", "G1", "G2", "G3"}:
-        machine.motion = code
-    elif code in _PLANES:
-        machine.plane = _PLANES[code]
+    if code in _MODES:
+        name, value = _MODES[code]
+        setattr(machine, name, value)
     elif code in _UNITS:
         machine.unit = _UNITS[code]
         machine.unit_stated = True
-    elif code in {"G90", "G91"}:
-        machine.absolute = code == "G90"
-    elif code in {"M97", "M98", "M99"}:
-        allowed = "a program without calls"
-        raise machine.wrong("subprograms are not read", code, allowed)
+    elif code in _REFUSED:
+        raise machine.wrong(_REFUSED[code], code, "moves and arcs (G0 to G3)")
     elif code[0] == "M" or code in _IGNORED | _OFFSETS:
         if code in _OFFSETS:
             if machine.moves and machine.offset != code:
-                raise machine.wrong(
-                    "the work offset changes within the program: where the tool goes is not known",
-                    code,
-                    "one work offset",
-                )
+                raise machine.wrong(_OFFSET_CHANGES, code, "one work offset")
             machine.offset = code
         machine.ended |= code in {"M2", "M30"}
         machine.skipped.add(code)
-    else:
+    elif code != "G92":  # which is obeyed with the places of its line
         raise machine.wrong(
             "this code is not read",
             code,
-            "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94",
+            "G0 to G3, G17 to G21, G40, G43, G49, G54 to G59, G61, G64, G80, G90 to G92, G94",
         )
 
 
-def _move(machine: _Machine, values: dict[str, float]) -> None:
-    """Go on to the place that a line names."""
+def _move(
+    machine: _Machine, motion: str | None, values: dict[str, float], absolute: bool
+) -> None:
+    """Go on to the place that a line names.
+
+    Raises
+    ------
+    TaskError
+        There is no motion, a letter may change the path in a way that is not known, or the place is not known.
+    """
+    if motion is None:
+        raise machine.wrong(
+            "a move before G0, G1, G2 or G3", "coordinates", "a motion first"
+        )
+    understood = set("XYZ")
+    if motion in {"G2", "G3"}:
+        understood |= {"P", "R", *("IJK"[axis] for axis in machine.plane[:2])}
+    for letter in sorted(set(values) - understood):
+        raise machine.wrong(
+            f"the letter {letter} of this {motion} is not read, and may change the path",
+            f"{letter}{values[letter]:g}",
+            ", ".join(sorted(understood)),
+        )
     start = machine.at
     end = start.copy()
     for i, axis in enumerate("XYZ"):
         if axis in values:
-            base = 0.0 if machine.absolute else np.nan_to_num(start[i])
+            if not absolute and np.isnan(start[i]):
+                raise machine.wrong(
+                    f"{axis} is incremental (G91), but where the tool is before this move is not known",
+                    f"{axis}{values[axis]:g}",
+                    "an absolute place before G91",
+                    "Begin with G90 G0 and the place where the tool is; with relative: true any place will do",
+                )
+            base = 0.0 if absolute else start[i]
             end[i] = base + values[axis] * machine.unit
-    if machine.motion is None:
-        raise machine.wrong(
-            "a move before G0, G1, G2 or G3", "coordinates", "a motion first"
-        )
     machine.at = end
     if np.isnan(end).any():
         return
     if np.isnan(start).any():
         places = end[None]
-    elif machine.motion in {"G0", "G1"}:
+    elif motion in {"G0", "G1"}:
         length = float(np.linalg.norm(end - start))
         count = max(_PIECES, ceil(length / max(1e-3, length / 200.0))) if length else 0
         places = start + _shares(count) * (end - start)
     else:
         places = _arc(machine, start, end, values)
-    speed = nan if machine.motion == "G0" else machine.feed
+    speed = nan if motion == "G0" else machine.feed
     machine.moves.append((places, speed, machine.line))
 
 
@@ -233,8 +306,9 @@ def _arc(
     if "R" in values:
         centre = _centre(machine, one, other, values["R"] * machine.unit)
     else:
-        offsets = [values.get("IJK"[axis], 0.0) * machine.unit for axis in plane]
-        centre = one + complex(*offsets)
+        stated = complex(*(values.get("IJK"[axis], 0.0) for axis in plane))
+        origin = 0.0 if machine.absolute_centres else one
+        centre = origin + stated * machine.unit
     radius = abs(one - centre)
     at_end = abs(other - centre)
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
@@ -247,6 +321,11 @@ def _arc(
     swept = (phase(other - centre) - phase(one - centre)) % turn  # of the sign of turn
     if min(abs(swept), abs(swept - turn)) < 1e-9:
         swept = turn
+    turns = values.get("P", 1.0)
+    if not 1.0 <= turns <= _MOST_TURNS or turns % 1.0:
+        allowed = f"a whole number from 1 to {_MOST_TURNS}"
+        raise machine.wrong("invalid number of turns of an arc", f"P{turns:g}", allowed)
+    swept += (turns - 1.0) * turn
     count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
     shares = _shares(count)
     growth = 1.0 + (at_end / radius - 1.0) * shares
