@@ -345,6 +345,7 @@ EULER = {
     "staubli_xyz": ("rx,ry,rz", "XYZ"),
     "fanuc_wpr": ("w,p,r", "xyz"),
     "rpy": ("rx,ry,rz", "xyz"),
+    "euler_zyz": ("o,a,t", "ZYZ"),
 }
 
 

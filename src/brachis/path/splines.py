@@ -26,7 +26,7 @@ from brachis.path.rotations import (
 )
 from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
-from brachis.task.points.points import steps_of, sum_up
+from brachis.task.points.points import is_repeated, steps_of, sum_up
 from brachis.task.points.units import quaternions_of
 from brachis.task.segments import BSplineCurve, SplineThrough
 
@@ -229,17 +229,18 @@ def _chord_knots(
     """
     if np.all(chords < tolerances.LENGTH):
         chords = otherwise
-    stands_still = chords < tolerances.LENGTH
-    if stands_still.all():
+    if np.all(chords < tolerances.LENGTH):
         raise context.zero_length(".through", [list(each) for each in shape.through])
-    if stands_still.any():
-        before = len(shape.through) - len(chords)
-        repeated = int(np.argmax(stands_still)) + before
+    repeats = is_repeated(chords)
+    if repeats.any():
+        i = int(np.argmax(repeats))
+        repeated = i + len(shape.through) - len(chords)
         raise context.wrong(
             "a waypoint repeats the one before",
             f".through[{repeated}]",
-            found=list(shape.through[repeated]),
+            found=f"{list(shape.through[repeated])}, {chords[i]:.3g} (m or rad) away",
             allowed="waypoints that differ from their predecessors in the position rows",
+            hint="Remove one of both",
         )
     return sum_up(chords)
 

@@ -91,6 +91,7 @@ class Attitude(Model):
     kuka_abc_deg: Vector3 | None = _about("kuka_abc")
     staubli_xyz_deg: Vector3 | None = _about("staubli_xyz")
     fanuc_wpr_deg: Vector3 | None = _about("fanuc_wpr")
+    euler_zyz_deg: Vector3 | None = _about("euler_zyz")
 
     @model_validator(mode="before")
     @classmethod

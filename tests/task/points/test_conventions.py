@@ -19,6 +19,7 @@ EXPECTED = {
     "kuka_abc": Z(A) * Y(B) * X(C),
     "staubli_xyz": X(A) * Y(B) * Z(C),
     "fanuc_wpr": Z(C) * Y(B) * X(A),
+    "euler_zyz": Z(A) * Y(B) * Z(C),
 }
 # First 90 degrees about one axis, then 90 degrees about another one: columns are where x, y and z of the tool point.
 QUARTERS = {
@@ -35,6 +36,7 @@ QUARTERS = {
         [90, 0, 90],
         [[0, -1, 0], [0, 0, -1], [1, 0, 0]],
     ),  # x of the tool to z, its y to -x
+    "euler_zyz": ([90, 90, 0], [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]),
 }
 
 

@@ -18,6 +18,7 @@ from brachis.task.points.points import (
     Points,
     PointsAndNotes,
     angles_between,
+    is_repeated,
     project_on_sides,
     sum_up,
 )
@@ -138,15 +139,15 @@ def _residuals(values: Array, chords: Array) -> Array:
     return (values[inner] - foreseen) / scale[:, None]
 
 
-def without_repetitions(points: Points) -> PointsAndNotes:
-    """Leave out points that repeat their predecessors, and say which.
+def without_repetitions(points: Points, tolerance: float = 0.0) -> PointsAndNotes:
+    """Leave out points that repeat their predecessors, much more exactly than a tolerance, m, and say which.
 
     Raises
     ------
     TaskError
         The position stands still while the tool turns, or throughout.
     """
-    again = 1 + np.flatnonzero(points.steps < SAME)
+    again = 1 + np.flatnonzero(is_repeated(points.steps, 0.01 * tolerance))
     turned = angles_between(points.turning[again], points.turning[again - 1])
     for i in again[turned > SAME].tolist():
         raise points.wrong(
@@ -186,10 +187,11 @@ def refuse_repetitions(points: Points) -> None:
     steps = points.steps
     if still:
         steps = angles_between(points.turning[1:], points.turning[:-1])
-    for i in np.flatnonzero(steps < SAME).tolist():
+    for i in np.flatnonzero(is_repeated(steps)).tolist():
         raise points.wrong(
             i + 1,
             f"the row repeats {points.name_row(i)}",
+            found=f"{points.describe(i + 1)}, {steps[i]:.3g} (m or rad) from there",
             allowed=f"rows that differ from their predecessors in {'orientation' if still else 'position'}",
             hint="Set a tolerance to leave out repeated rows",
         )

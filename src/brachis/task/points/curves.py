@@ -236,7 +236,7 @@ def fit_curves(
         Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     count = len(points)
-    points, repeated = without_repetitions(points)
+    points, repeated = without_repetitions(points, tolerance.position)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = fill_gaps(points)

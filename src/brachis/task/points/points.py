@@ -8,6 +8,7 @@ from typing import Any, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
 from brachis.errors import Details, TaskError
 from brachis.task.point_data import FileUnits
@@ -110,6 +111,20 @@ PointsAndNotes = tuple[Points, tuple[str, ...]]
 def steps_of(position: Array) -> Array:
     """Return the distances, (n - 1,), of successive positions, (n, p)."""
     return np.linalg.norm(np.diff(position, axis=0), axis=1)
+
+
+def is_repeated(
+    steps: Array, largest: float = tolerances.WRITTEN
+) -> npt.NDArray[np.bool_]:
+    """Tell which of n - 1 steps, m or rad, lead to no other place.
+
+    They are shorter than rounding, or shorter than `largest` and than a hundredth of the steps before and after: a
+    curve through both places would swing into the direction from one to the other, which says nothing.
+    """
+    around = np.pad(steps, 1, mode="reflect")
+    shorter = np.minimum(around[:-2], around[2:])
+    is_short = (steps < largest) & (steps < 0.01 * shorter)
+    return np.asarray(is_short | (steps < tolerances.LENGTH))
 
 
 def sum_up(steps: npt.ArrayLike) -> Array:

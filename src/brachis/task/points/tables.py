@@ -188,8 +188,12 @@ _ORIENTATIONS: Final = {
     ("a", "b", "c"): ("kuka_abc", "rpy"),
     ("w", "p", "r"): ("fanuc_wpr",),
     ("roll", "pitch", "yaw"): ("rpy",),
+    ("o", "a", "t"): ("euler_zyz",),
+    ("a", "e", "r"): ("euler_zyz",),
+    ("i", "j", "k"): (),
 }
-"""Columns of orientations, and the conventions that each may be in: the numbers of a convention are in this order."""
+"""Columns of orientations, and the conventions that each may be in: the numbers of a convention are in this order. The
+tool's axis has none."""
 _SPEED: Final = "feed"
 _SPEED_NAMES: Final = ("feed", "feedrate", "f", "speed", "v")
 _HEADING = re.compile(
@@ -342,8 +346,8 @@ def read_points(
     Raises
     ------
     TaskError
-        Columns are missing or unknown, units are missing or contradict each other, a quaternion has no unit length, or
-        a feed rate is not positive.
+        Columns are missing or unknown, units are missing or contradict each other, a quaternion or an axis has no unit
+        length, or a feed rate is not positive.
     """
     table = read_table(text, source, _allowed_columns(rows))
     places, names, convention = _read_columns(table, rows, settings.orientation)
@@ -369,7 +373,8 @@ def read_points(
     others = names[len(position) :]
     lengths = read(position, "length")
     speed = read([_SPEED], "speed")[:, 0] if _SPEED in places else None
-    if convention and convention.startswith("quaternion"):
+    has_axis = others == ("i", "j", "k")
+    if has_axis or (convention and convention.startswith("quaternion")):
         turning = table.values[:, [places[name][0] for name in others]]
     else:
         turning = read(others, "angle")
@@ -377,6 +382,17 @@ def read_points(
     if convention:
         points = _with_quaternions(points, convention)
         notes.append(f"orientations: {CONVENTIONS[convention].meaning}")
+    if has_axis:
+        if rows == "pose":
+            raise TaskError(
+                "the columns i, j, k give the tool's axis, and leave its roll open",
+                found="task_space pose",
+                allowed="task_space pose_free_roll",
+                where=table.where,
+                hint="Give orientations, such as qw,qx,qy,qz, if the roll matters",
+            )
+        points = _with_rolls(points)
+        notes.append("orientations: i, j, k are the direction of the tool's z axis")
     if speed is not None:
         for i in np.flatnonzero(speed <= 0.0).tolist():
             raise points.wrong(
@@ -388,17 +404,50 @@ def read_points(
     return points, tuple(notes)
 
 
+def _check_lengths(points: Points, name: str) -> None:
+    """Refuse the first row of `turning` that has no unit length."""
+    lengths = np.linalg.norm(points.turning, axis=1)
+    for i in np.flatnonzero(np.abs(lengths - 1.0) > 0.01).tolist():
+        raise points.wrong(
+            i,
+            f"the {name}'s length is {lengths[i]:.6g}",
+            found=str(points.turning[i].tolist()),
+            allowed=f"a{'n' * (name == 'axis')} {name} of length 1",
+        )
+
+
 def _with_quaternions(points: Points, convention: str) -> Points:
     """Return points with quaternions w, x, y, z for orientations in a convention, angles in rad."""
-    values = points.turning
     if convention.startswith("quaternion"):
-        lengths = np.linalg.norm(values, axis=1)
-        for i in np.flatnonzero(np.abs(lengths - 1.0) > 0.01).tolist():
-            raise points.wrong(
-                i,
-                f"the quaternion's length is {lengths[i]:.6g}",
-                found=str(values[i].tolist()),
-                allowed="a quaternion of length 1",
-            )
-    quaternions = quaternions_of(rotation_by(convention, values))
+        _check_lengths(points, "quaternion")
+    quaternions = quaternions_of(rotation_by(convention, points.turning))
     return replace(points, turning=with_like_signs(quaternions))
+
+
+def _with_rolls(points: Points) -> Points:
+    """Return points with quaternions w, x, y, z for directions of the tool's z axis.
+
+    From each to the next the tool turns about the normal of both axes: it never rolls about its own.
+    """
+    from scipy.spatial.transform import Rotation
+
+    _check_lengths(points, "axis")
+    axes = points.turning / np.linalg.norm(points.turning, axis=1)[:, None]
+    is_down = bool(axes[0, 2] < 0.0)
+    upright = Rotation.from_rotvec([np.pi * is_down, 0.0, 0.0])
+    before = np.concatenate([upright.apply([[0.0, 0.0, 1.0]]), axes[:-1]])
+    cosines = np.sum(before * axes, axis=1)
+    for i in np.flatnonzero(cosines < -1.0 + 1e-6).tolist():
+        raise points.wrong(
+            i,
+            "the tool's axis turns by half a turn from one row to the next",
+            allowed="axes that say which way the tool turns",
+            hint="Add rows in between",
+        )
+    half_turns = np.column_stack([np.cross(before, axes), 1.0 + cosines])
+    turns = Rotation.from_quat(half_turns)
+    step = 1
+    while step < len(axes):  # the products of the first 1, 2, 3, ... turns
+        turns = turns.concatenate([turns[:step], turns[step:] * turns[:-step]])
+        step *= 2
+    return replace(points, turning=with_like_signs(quaternions_of(turns * upright)))

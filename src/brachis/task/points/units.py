@@ -77,6 +77,11 @@ CONVENTIONS: Final = {
     "fanuc_wpr": Convention(
         "W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"
     ),
+    "euler_zyz": Convention(
+        "O about z, A about the new y, T about the new z axis",
+        "Kawasaki, Comau (A, E, R), Adept",
+        "ZYZ",
+    ),
 }
 """Conventions by name."""
 
