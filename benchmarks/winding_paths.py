@@ -203,19 +203,20 @@ def distances_from(
     return distances
 
 
-def deviations(path: WindingPath, curves: list[BSpline]) -> tuple[float, float]:
+def deviations(
+    path: WindingPath, curves: list[BSpline], sides: int = DRAWN, count: int = 4_000
+) -> tuple[float, float]:
     """Return the largest distances of the points from the fit, and of this from the true curve, over the tolerance."""
-    sides = int(DRAWN * path.turns)
-    fine = np.linspace(0.0, 1.0, sides)
+    fine = np.linspace(0.0, 1.0, int(sides * path.turns))
     true = path.true(fine)
     drawn = np.concatenate([curve(fine * curve.t[-1]) for curve in curves])
     window = 0.3 / path.turns
-    some = np.unique(np.linspace(0, len(path.t) - 1, 4_000).astype(int))
+    some = np.unique(np.linspace(0, len(path.t) - 1, count).astype(int))
     at_points = np.interp(path.t[some], fine, shares_of_length(true))
     of_points = distances_from(drawn, path.points[some], at_points, window)
-    some_drawn = drawn[:: max(1, len(drawn) // 4_000)]
-    at_drawn = shares_of_length(drawn)[:: max(1, len(drawn) // 4_000)]
-    of_curve = distances_from(true, some_drawn, at_drawn, window)
+    every = max(1, len(drawn) // count)
+    at_drawn = shares_of_length(drawn)[::every]
+    of_curve = distances_from(true, drawn[::every], at_drawn, window)
     return of_points.max() / path.tolerance, of_curve.max() / path.tolerance
 
 

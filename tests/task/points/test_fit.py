@@ -193,6 +193,40 @@ def test_what_there_is_too_little_room_for_is_said():
         fit_curves(points(position), tolerance(0.3 * MM, corner=0.1 * MM))
 
 
+@pytest.mark.parametrize("radius", [0.7, 2.0, 7.0, 60.0])
+@pytest.mark.parametrize("scatter", [0.0, 0.003])
+def test_arcs_have_no_corners_up_to_their_ends(radius, scatter):
+    """However small they are beside the tolerance of corners."""
+    angle = np.linspace(0.0, 1.7 * np.pi, 400)
+    arc = radius * MM * np.column_stack([np.cos(angle), np.sin(angle)])
+    arc += (
+        np.random.default_rng(3).normal(size=arc.shape) * scatter * MM * radius / 60.0
+    )
+    _, report = fit_curves(
+        points(arc), tolerance(0.02 * MM, corner=1.0 * MM), stops=True
+    )
+    assert report.corners == ()
+
+
+def test_an_arc_between_lines_is_no_corner_and_where_arcs_meet_is_one():
+    angle = np.linspace(0.0, np.pi, 200)
+    arc = 7.0 * MM * np.column_stack([np.cos(angle), np.sin(angle)])
+    line = np.linspace([7.0 * MM, -20.0 * MM], [7.0 * MM, 0.0], 200)[:-1]
+    there = np.concatenate([line, arc])
+    _, report = fit_curves(
+        points(there), tolerance(0.02 * MM, corner=1.0 * MM), stops=True
+    )
+    assert report.corners == ()
+    other = [-14.0 * MM, 0.0] + arc[1:]
+    _, report = fit_curves(
+        points(np.concatenate([there, other * [1.0, 1.0]])),
+        tolerance(0.02 * MM, corner=1.0 * MM),
+        stops=True,
+    )
+    assert [corner.row for corner in report.corners] == [398]
+    assert np.rad2deg(report.corners[0].angle) == pytest.approx(180.0, abs=20.0)
+
+
 def rounds(count, n=2_000):
     """A circle of 0.2 m that is gone round several times, with a yaw that goes on over all rounds."""
     t = np.linspace(0.0, count, n)
@@ -206,3 +240,14 @@ def test_every_round_is_compared_with_its_own(count):
     _, report = fit_curves(points(position, yaw), tolerance(0.1 * MM, np.deg2rad(1.0)))
     assert report.orientation_error < np.deg2rad(0.1)
     assert report.position_error <= 0.1 * MM
+
+
+@pytest.mark.parametrize("tolerance_mm", [0.02, 0.2])
+def test_few_points_that_nearly_repeat_count_once(tolerance_mm):
+    """A curve through both would swing into the direction from one to the other."""
+    three = np.array([[0.0, 0.0], [0.5, 0.02], [1.0, 0.0]])
+    four = np.insert(three, 2, three[1] + [0.0, 1e-9], axis=0)
+    (one,), _ = fit_curves(points(three), tolerance(tolerance_mm * MM))
+    (other,), report = fit_curves(points(four), tolerance(tolerance_mm * MM))
+    np.testing.assert_allclose(other.spline.c, one.spline.c, atol=1e-12)
+    assert "left out 1 row" in report.told[0]

@@ -109,6 +109,35 @@ MISTAKES = [
     ("G0 X1 Y1", r"a.nc: the program contains no motion; found 0 places.*Z is missing"),
     ("G0 X1 Y1 Z1\nM98 P1000", r"line 2: subprograms are not read; found M98"),
     (
+        "G0 X1 Y1 Z1\nG91 G28 Z0",
+        r"line 2: the machine's reference position .*; found G28",
+    ),
+    ("G0 X1 Y1 Z1\nG4 P2", r"line 2: a dwell is not read: .*; found G4"),
+    ("G7 G18\nG0 X1 Y1 Z1", r"line 1: X would be a diameter: .*; found G7"),
+    ("G0 X1 Y1 Z1\n/G1 X2 F10", r"line 2: this is not understood; .*/ is a switch"),
+    ("G0 X1 Y1 Z1\nG1 X2 X3 F10", r"line 2: a letter stands twice .*; found X3"),
+    ("G0 X1 Y1 Z1\nG1 X2 P2 F10", r"line 2: the letter P of this G1 .*; found P2"),
+    ("G0 X1 Y1 Z1\nG1 X2 L2 F10", r"line 2: the letter L of this G1 .*; found L2"),
+    ("G0 X1 Y1 Z1\nG1 X2 I5 F10", r"line 2: the letter I of this G1 .*; found I5"),
+    (
+        "G0 X1 Y1 Z1\nG2 X1 Y1 Z3 I5 K1 F10",
+        r"line 2: the letter K of this G2 .*; found K1; allowed: I, J, P, R, X, Y, Z",
+    ),
+    (
+        "G0 X1 Y1 Z1\nG2 X1 Y1 I5 P2.5 F10",
+        r"line 2: invalid number of turns of an arc; found P2.5; allowed: a whole number from 1 to 1000",
+    ),
+    ("G0 X1 Y1 Z1\nG2 X1 Y1 I5 P1000000", r"line 2: invalid number of turns"),
+    (
+        "G91\nG1 X20 F300",
+        r"line 2: X is incremental \(G91\), but where the tool is .*Begin with G90 G0",
+    ),
+    (
+        "G90 G0 X1 Y1\nG91 Z-1",
+        r"line 2: Z is incremental",
+    ),
+    ("G0 X1 Y1 Z1\nG92 X0", r"line 2: the work offset changes within the program"),
+    (
         "G54 G0 X1 Y1 Z1\nG1 X2 F10\nG55\nG1 X3",
         r"line 3: the work offset changes within the program",
     ),
@@ -147,3 +176,46 @@ def test_an_arc_that_begins_backwards_is_told_with_its_line(end):
         TaskError, match=r"line 3: the path turns back, by 17.* degrees"
     ):
         fit_curves(points, FitTolerance(position=5e-5, orientation=0.5, corner=5e-3))
+
+
+@pytest.mark.parametrize("turns", [1, 2, 7])
+def test_arcs_of_several_turns(turns):
+    """A helix of 12 mm that descends by 8 mm in all: each turn is sqrt((2 pi 12)^2 + (8 / turns)^2) mm long."""
+    points, told = points_of(f"G0 X0 Y12 Z0\nG2 X0 Y12 Z-8 I0 J-12 P{turns} F600\n")
+    length = np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum()
+    exact = turns * np.hypot(2.0 * np.pi * 0.012, 0.008 / turns)
+    assert length == pytest.approx(exact, rel=1e-4)
+    assert points.position[1, 0] > 0.0  # clockwise
+    assert not any("skipped" in one for one in told)
+
+
+def test_a_turn_is_added_to_part_of_a_turn():
+    points, _ = points_of("G0 X0 Y0 Z0\nG3 X10 Y10 I0 J10 P2 F600\n")
+    steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(2.5 * np.pi * 0.01, rel=1e-4)
+
+
+def test_centres_may_be_absolute():
+    arcs = (
+        "G3 X20 Y20 I0 J10",
+        "G90.1 G3 X20 Y20 I20 J10",
+        "G18 G90.1 G17 G91.1 G3 X20 Y20 J10",
+    )
+    one, *others = (points_of(f"G0 X20 Y0 Z0\n{arc} F60\n")[0] for arc in arcs)
+    for other in others:
+        np.testing.assert_allclose(other.position, one.position, atol=1e-15)
+
+
+def test_a_place_that_is_set_is_where_the_path_begins():
+    points, _ = points_of("G92 X5 Y0 Z1\nG91\nG1 X2 F60\n")
+    np.testing.assert_allclose(
+        points.position[[0, -1]], [[5e-3, 0, 1e-3], [7e-3, 0, 1e-3]]
+    )
+
+
+def test_what_leaves_the_path_of_the_tip_as_it_is_is_skipped():
+    points, told = points_of(
+        "O1000\nT1 M6\nG64 P0.01\nG43 H1 G0 X0 Y0 Z5 S1000 M3\nG1 X10 F60 E1\n"
+    )
+    np.testing.assert_allclose(points.position[-1], [0.01, 0.0, 0.005])
+    assert "skipped E, G43, G64, H, M3, M6, O, P, S, T" in told

@@ -76,13 +76,16 @@ def find_corners(
     angle = near_turn.angle
     # Between lines that are farther apart a smooth curve turns by more in proportion, a corner by the same angle.
     growth = wide_turn.distance / np.maximum(near_turn.distance, 1e-12)
-    largest = angle * (1.0 + growth) / 2.0
-    doubt = _SURE * scatter.deviation * near_turn.uncertainty * growth
-    sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < largest - doubt)
+    share = (2.0 + growth) / 3.0
+    doubt = _SURE * scatter.deviation * near_turn.uncertainty
+    sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < share * (angle - doubt))
     sharp &= wide_turn.straightness > _STRAIGHT
+    fine_angle = _turning(points.position, u, near, least).angle
     if not noisy:
         # A polygon that turns by this much from one side to the next is not a smooth curve.
-        sharp |= _turning(points.position, u, 0.0, 1).angle > np.deg2rad(50.0)
+        sharp |= fine_angle > np.deg2rad(50.0)
+    # A smooth arc, however small it is beside the tolerance, turns little from one side to the next.
+    sharp &= fine_angle > np.maximum(LEAST_ANGLE, angle / 4.0)
     by_scatter = 8.0 * scatter.deviation * near_turn.uncertainty
     sharp &= angle > np.maximum(LEAST_ANGLE, by_scatter)
     peaks = _peaks(angle, sharp, u, width, least)

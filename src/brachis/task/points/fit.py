@@ -134,23 +134,29 @@ class _Fitter:
         return self.measure(spline)
 
     def measure(self, spline: BSpline) -> Fit:
-        """Return the fit with the places on the curve near `lengths` that are nearest to the points."""
-        dimension = self.points.dimension
-        low = np.maximum(self.lengths - _REACH * self.tolerance.position, 0.0)
-        high = np.minimum(
-            low + 2.0 * _REACH * self.tolerance.position, self.lengths[-1]
-        )
+        """Return the fit with the places on the curve near `lengths` that are nearest to the points.
+
+        Distances and angles count by their tolerances: of points that scatter, angles tell better where they are.
+        """
+        points = self.points
+        dimension = points.dimension
+        reach = _REACH * self.tolerance.position
+        low = np.maximum(self.lengths - reach, 0.0)
+        high = np.minimum(self.lengths + reach, self.lengths[-1])
+        sizes = np.full(points.columns.shape[1], self.tolerance.orientation)
+        sizes[:dimension] = self.tolerance.position
         sigma = self.lengths.copy()
         for _ in range(2):  # of Newton's method
-            tangent = spline(sigma, nu=1)[:, :dimension]
-            off = self.points.position - spline(sigma)[:, :dimension]
+            tangent = spline(sigma, nu=1) / sizes
+            off = points.columns / sizes - spline(sigma) / sizes
             along = np.sum(off * tangent, axis=1)
             sigma += along / np.maximum(np.sum(tangent**2, axis=1), 1e-12)
             np.clip(sigma, low, high, out=sigma)
             sigma[[0, -1]] = self.lengths[[0, -1]]
         values = spline(sigma)
-        distances = np.linalg.norm(values[:, :dimension] - self.points.position, axis=1)
-        angles = angles_between(values[:, dimension:], self.points.turning)
+        off = values[:, :dimension] - points.position
+        distances = np.linalg.norm(off, axis=1)
+        angles = angles_between(values[:, dimension:], points.turning)
         return Fit(spline, np.unique(spline.t), sigma, distances, angles)
 
     def count_in(self, breaks: Array) -> Indices:
@@ -240,7 +246,7 @@ def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
         if fit.ratios(tolerance).max() <= 1.0:
             return _use_fewest_knots(fitter, _remove_knots(fitter, fit))
         fits.append(fit)
-    if not is_noisy and len(points) <= 2_000:
+    if least == 1 and len(points) <= 2_000:
         return fitter.interpolate()
     return min(fits, key=lambda fit: float(fit.ratios(tolerance).max()))
 
@@ -274,20 +280,29 @@ def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
 
 
 def _add_knots(fitter: _Fitter, least: int) -> Fit:
-    """Halve the intervals in which the tolerance is exceeded, until none is or none can be.
+    """Halve the intervals in which the tolerance is exceeded, or their points, until none is or none can be.
 
-    No interval gets fewer points than `least`.
+    No interval gets fewer points than `least`. One that cannot be halved has its neighbours halved.
     """
-    breaks = fitter.lengths[[0, -1]]
+    lengths = fitter.lengths
+    breaks = lengths[[0, -1]]
     while True:
         fit = fitter.fit(breaks)
-        halves = spread(breaks, 2)
-        has_points = fitter.count_in(halves).reshape(-1, 2).min(axis=1) >= least
-        halved = (fit.worst(fitter.tolerance) > 1.0) & has_points
+        firsts = np.append(0, np.cumsum(fitter.count_in(breaks)))
+        middles = (firsts[1:] + firsts[:-1]) // 2
+        bad = fit.worst(fitter.tolerance) > 1.0
+        has_points = np.diff(firsts) >= 2 * least
+        stuck = np.pad(bad & ~has_points, 1)
+        halved = (bad | stuck[:-2] | stuck[2:]) & has_points
         count = len(breaks) - 1 + np.count_nonzero(halved)
-        if not halved.any() or count + DEGREE > len(fitter.points):
+        if not halved.any() or count + DEGREE > len(lengths):
             return fit
-        breaks = np.union1d(breaks, halves[1::2][halved])
+        between = (lengths[middles[halved] - 1] + lengths[middles[halved]]) / 2.0
+        middle = (breaks[:-1] + breaks[1:])[halved] / 2.0
+        before = np.searchsorted(lengths, middle) - firsts[:-1][halved]
+        is_even = np.minimum(before, np.diff(firsts)[halved] - before) >= least
+        knots = np.where(is_even, middle, between)
+        breaks = np.union1d(breaks, knots)
 
 
 def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
