@@ -275,7 +275,10 @@ of the joints (rad, m); `units` and `tolerance` are not allowed there. For poses
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
-- `x,y,z,roll,pitch,yaw`, or `x,y,z,w,p,r` (Fanuc): positions and angles;
+- `x,y,z,i,j,k`: positions and directions of the tool's z axis, of length 1; for `task_space: pose_free_roll`. Where
+  CAM's axis points out of the workpiece and the tool's z axis into it, change the signs;
+- `x,y,z,roll,pitch,yaw`, `x,y,z,w,p,r` (Fanuc), `x,y,z,o,a,t` (Kawasaki) or `x,y,z,a,e,r` (Comau): positions and
+  angles;
 - `x,y,z,rx,ry,rz`, `x,y,z,a,b,c` or `x,y,z,q1,q2,q3,q4`: positions and orientations. Their meaning depends on the
   robot's maker, so `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`;
   `kuka_abc` or `rpy` (Mitsubishi) for `a,b,c`; `quaternion_wxyz` (ABB) or `quaternion_xyzw` for `q1` to `q4`.
@@ -295,12 +298,13 @@ because the motion would have to stop there. A file in which the position never 
 rounded or noisy are refused if the curvature of a curve through them is only noise; then give a tolerance.
 
 **With a tolerance** the path is a quintic B-spline (C4) with few knots. It passes through the first and last point and
-within the tolerance of all others (100,000 and more). Repeated points are left out and reported. Spikes and changes of
-unit are refused, with their line. If the distance between two points is more than five times the usual one, the path
+within the tolerance of all others (100,000 and more). The path may wind, cross itself or be passed several times: a
+helix takes about six knot intervals a turn. Repeated points are left out and reported. Spikes and changes of unit are
+refused, with their line. If the distance between two points is more than five times the usual one, the path
 between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`.
 The smaller this tolerance, the slower the robot passes them. With `corner: stop` the tool stops at them instead, with
-or without a tolerance; corners are changes of direction of more than 12 degrees at one place. A formula that the fit
-does not use measures the distance of every point from the curve. `brachis inspect TASK` and `brachis plan` print the
+or without a tolerance; corners are changes of direction of more than 12 degrees at one place. The reported distance
+of a point is that from a place of the curve on the same turn. `brachis inspect TASK` and `brachis plan` print the
 findings; they are also in `result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
 
 ```yaml
@@ -315,9 +319,10 @@ path:
       corner: blend
 ```
 
-G-code files (`.nc`, `.ngc`, `.gcode`, `.tap`) are read in the same way: G0 to G3 with I, J, K or R, G17 to G21, G90,
-G91 and F. The default unit is mm. Commands that do not move the tool are skipped and reported. Cycles, cutter
-compensation and rotary axes are refused.
+G-code files (`.nc`, `.ngc`, `.gcode`, `.tap`) are read in the same way: G0 to G3 with I, J, K or R and with turns (P),
+G17 to G21, G90, G91, G90.1, G91.1 and F. The default unit is mm. Commands that leave the path as it is are skipped and
+reported. Cycles, cutter compensation, dwells, rotary axes, changes of the work offset, and letters that may change the
+path are refused, with their line. So is a move in G91 from a place that is not known: begin with G90 G0, or G92.
 
 Feed rates are largest speeds of the tool, linear between the first and the last point that has one. They hold in
 addition to those of `tool_limits`.

@@ -217,9 +217,9 @@ def test_an_arc_between_lines_is_no_corner_and_where_arcs_meet_is_one():
         points(there), tolerance(0.02 * MM, corner=1.0 * MM), stops=True
     )
     assert report.corners == ()
-    other = [-14.0 * MM, 0.0] + arc[1:]
+    other = arc[1:] - [14.0 * MM, 0.0]
     _, report = fit_curves(
-        points(np.concatenate([there, other * [1.0, 1.0]])),
+        points(np.concatenate([there, other])),
         tolerance(0.02 * MM, corner=1.0 * MM),
         stops=True,
     )
