@@ -136,6 +136,17 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
         ["path[0].spline.through[1]: a waypoint repeats the one before"],
     ),
     (
+        {
+            "spline": {"through": [[1, 0, 0], [1, 1e-9, 0], [2, 1, 0]]},
+            "orientation": "fixed",
+        },
+        [
+            "path[0].spline.through[1]: a waypoint repeats the one before; found ",
+            "1e-09 (m or rad) away",
+            "Remove one of both",
+        ],
+    ),
+    (
         {"spline": {"through": [[0, 0, 0]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
         ["path[0].spline.through: the segment has zero length"],
     ),

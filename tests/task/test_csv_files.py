@@ -264,6 +264,10 @@ MISTAKES: list[tuple[str, list[str]]] = [
     ),
     ("x,y,z\n0,0,0\n0,0,0\n1,1,1\n", ["line 3: the row repeats line 2"]),
     (
+        "x,y,z\n0,0,0\n1,1,1\n1,1,1.000000001\n2,0,1\n",
+        ["line 4: the row repeats line 3", "1e-09 (m or rad) from there"],
+    ),
+    (
         "x,y,z,rx,ry,rz\n0,0,0,0,0,0\n1,1,1,0,0,0\n1,1,1,0,0,1\n",
         ["line 4: the row repeats line 3", "in position"],
     ),
@@ -361,6 +365,47 @@ def test_angles_of_the_makers_are_read(convention: str) -> None:
         if one is not None
     ]
     np.testing.assert_allclose(turns, QUATERNIONS, atol=1e-12)
+
+
+def test_the_tools_axis_leaves_the_roll_open() -> None:
+    """The tool's z axis is where the columns say, and the tool does not roll about it between the rows."""
+    axes = TURNS.apply([0.0, 0.0, 1.0])
+    write("x,y,z,i,j,k", np.hstack([POINTS, axes]))
+    spline = spline_of(task("pose_free_roll"))
+    assert spline.starts_oriented is not None
+    turns = [
+        one.rotation for one in (spline.starts_oriented, *(spline.orientations or ()))
+    ]
+    for turn, axis in zip(turns, axes, strict=True):
+        np.testing.assert_allclose(turn.apply([0.0, 0.0, 1.0]), axis, atol=1e-12)
+    for one, other, axis in zip(turns, turns[1:], axes, strict=False):
+        assert (other * one.inv()).as_rotvec() @ axis == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(
+        TaskError, match=r"i, j, k give the tool's axis, .*allowed: .*pose_free_roll"
+    ):
+        task("pose")
+
+
+AXES = [
+    ("0,0,1\n1,0,0,0,0,2", r"line 3: the axis's length is 2"),
+    ("0,0,1\n1,0,0,0,0,-1", r"line 3: the tool's axis turns by half a turn .*rows in"),
+]
+
+
+@pytest.mark.parametrize(("rows", "message"), AXES)
+def test_wrong_axes_are_named(rows: str, message: str) -> None:
+    Path("poses.csv").write_text(f"x,y,z,i,j,k\n0,0,0,{rows}\n")
+    with pytest.raises(TaskError, match=message):
+        task("pose_free_roll")
+
+
+def test_a_tool_that_points_down_may_stay_so() -> None:
+    write("x,y,z,i,j,k", np.hstack([POINTS, np.tile([0.0, 0.0, -1.0], (4, 1))]))
+    spline = spline_of(task("pose_free_roll"))
+    assert spline.starts_oriented is not None
+    down = spline.starts_oriented.rotation.apply([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(down, [0.0, 0.0, -1.0], atol=1e-12)
+    assert set(spline.orientations or ()) == {spline.starts_oriented}
 
 
 def test_quaternions_of_numbered_columns() -> None:

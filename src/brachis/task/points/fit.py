@@ -296,7 +296,7 @@ def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
 def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
     """Halve the intervals in which the tolerance is exceeded, or their points, until none is or none can be.
 
-    It begins with `breaks`. No interval gets fewer points than `least`. One that cannot be halved has its neighbours halved.
+    It begins with `breaks`. No interval gets fewer points than `least`; one that has too few has its neighbours halved.
     """
     lengths = fitter.lengths
     while True:
