@@ -80,14 +80,13 @@ def find_corners(
     doubt = _SURE * scatter.deviation * near_turn.uncertainty
     sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < share * (angle - doubt))
     sharp &= wide_turn.straightness > _STRAIGHT
-    fine_angle = _turning(points.position, u, near, least).angle
-    if not noisy:
-        # A polygon that turns by this much from one side to the next is not a smooth curve.
-        sharp |= fine_angle > np.deg2rad(50.0)
+    # A polygon that turns by this much from one side to the next is not a smooth curve.
+    sides = _turning(points.position, u, 0.0, 1)
+    by_scatter = 8.0 * scatter.deviation * sides.uncertainty
+    sharp |= sides.angle > np.maximum(np.deg2rad(50.0), by_scatter)
     # A smooth arc, however small it is beside the tolerance, turns little from one side to the next.
-    sharp &= fine_angle > np.maximum(LEAST_ANGLE, angle / 4.0)
-    by_scatter = 8.0 * scatter.deviation * near_turn.uncertainty
-    sharp &= angle > np.maximum(LEAST_ANGLE, by_scatter)
+    fine_angle = _turning(points.position, u, near, least).angle
+    sharp &= np.minimum(angle, fine_angle) > np.maximum(LEAST_ANGLE, angle / 4.0)
     peaks = _peaks(angle, sharp, u, width, least)
     # Lines that are longer than scatter asks for miss the corner where the path bends.
     return tuple(

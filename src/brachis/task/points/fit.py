@@ -2,7 +2,7 @@
 
 The curve is a quintic B-spline, C4, through the first and the last point, over about the arc length; of all with the
 same knots it has the least sum of squared distances. Intervals in which the tolerance is exceeded are halved; then
-knots that are not needed are taken away, and fewer ones spread in the same proportion are tried.
+knots that are not needed are taken away.
 
 How far along the curve a point is follows from the points alone, and is then corrected by no more than a few
 tolerances. So a path may wind, cross itself, or be passed several times: no point is taken to another turn, neither by
@@ -22,7 +22,6 @@ from brachis.task.point_data import FitTolerance
 from brachis.task.points.checks import Scatter
 from brachis.task.points.points import (
     Array,
-    Indices,
     Points,
     angles_between,
     steps_of,
@@ -80,13 +79,9 @@ class Fit:
     def worst(self, tolerance: FitTolerance) -> Array:
         """Return the largest of `ratios` in every interval, (N,)."""
         worst = np.zeros(len(self.breaks) - 1)
-        np.maximum.at(worst, self.intervals, self.ratios(tolerance))
+        interval = np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
+        np.maximum.at(worst, interval, self.ratios(tolerance))
         return worst
-
-    @property
-    def intervals(self) -> np.ndarray:
-        """The interval of every point, (n,)."""
-        return np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,11 +155,6 @@ class _Fitter:
         distances = np.linalg.norm(off, axis=1)
         angles = angles_between(values[:, dimension:], points.turning)
         return Fit(spline, np.unique(spline.t), sigma, distances, angles)
-
-    def count_in(self, breaks: Array) -> Indices:
-        """Return how many points every interval contains, (N,)."""
-        intervals = np.searchsorted(breaks[1:-1], self.lengths, side="right")
-        return np.bincount(intervals, minlength=len(breaks) - 1)
 
 
 def lengths_along(position: Array, deviation: float) -> Array:
@@ -250,7 +240,7 @@ def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
         if worst <= 1.0:
             aim = _scale(tolerance, max(worst, share))
             rough = replace(rough, tolerance=aim)
-            fit = _use_fewest_knots(rough, _remove_knots(rough, fit))
+            fit = _remove_knots(rough, fit)
         fit = _add_knots(fitter, fit.breaks, least)
         if fit.ratios(tolerance).max() <= 1.0:
             return fit
@@ -301,8 +291,8 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
     lengths = fitter.lengths
     while True:
         fit = fitter.fit(breaks)
-        firsts = np.append(0, np.cumsum(fitter.count_in(breaks)))
-        middles = (firsts[1:] + firsts[:-1]) // 2
+        firsts = np.searchsorted(lengths, breaks)
+        firsts[-1] = len(lengths)
         bad = fit.worst(fitter.tolerance) > 1.0
         has_points = np.diff(firsts) >= 2 * least
         stuck = np.pad(bad & ~has_points, 1)
@@ -310,12 +300,17 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
         count = len(breaks) - 1 + np.count_nonzero(halved)
         if not halved.any() or count + DEGREE > len(lengths):
             return fit
-        between = (lengths[middles[halved] - 1] + lengths[middles[halved]]) / 2.0
-        middle = (breaks[:-1] + breaks[1:])[halved] / 2.0
-        before = np.searchsorted(lengths, middle) - firsts[:-1][halved]
-        is_even = np.minimum(before, np.diff(firsts)[halved] - before) >= least
-        knots = np.where(is_even, middle, between)
-        breaks = np.union1d(breaks, knots)
+        middles = (breaks[1:] + breaks[:-1]) / 2.0
+        # In the middle, or as near to it as leaves enough points on both sides.
+        seconds = np.searchsorted(lengths, middles).clip(
+            firsts[:-1] + least, firsts[1:] - least
+        )
+        low = lengths[seconds - 1]
+        high = lengths[seconds]
+        knots = np.where(
+            (low < middles) & (middles <= high), middles, (low + high) / 2.0
+        )
+        breaks = np.union1d(breaks, knots[halved])
 
 
 def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
@@ -342,23 +337,3 @@ def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
             back |= not back.any()
             needed = np.append(needed, removed[back])
             removed = removed[~back]
-
-
-def _use_fewest_knots(fitter: _Fitter, fit: Fit) -> Fit:
-    """Spread fewer knots as densely in proportion as long as all points are within the tolerance.
-
-    Their number is halved between one that will do and one that will not.
-    """
-    breaks = fit.breaks
-    most = len(breaks) - 1
-    fewest = most // 2
-    while most - fewest > 1:
-        count = (most + fewest) // 2
-        fewer = np.quantile(breaks, np.linspace(0.0, 1.0, count + 1))
-        trial = fitter.fit(fewer) if fitter.count_in(fewer).min() else None
-        if trial is not None and trial.ratios(fitter.tolerance).max() <= 1.0:
-            most = count
-            fit = trial
-        else:
-            fewest = count
-    return fit

@@ -41,20 +41,15 @@ _IGNORED: Final = {"G8", "G15", "G40", "G43", "G49", "G61", "G64", "G69", "G80",
 _OFFSET_CHANGES: Final = (
     "the work offset changes within the program: where the tool goes is not known"
 )
-_CYCLE: Final = "canned cycles are not read"
 _REFUSED: Final = {
     "G4": "a dwell is not read: cut the file there and set dwell on the segment",
     "G7": "X would be a diameter: write radii (G8)",
-    "G10": _OFFSET_CHANGES,
-    "G28": "the machine's reference position is not known",
-    "G30": "the machine's reference position is not known",
-    "G41": "cutter compensation is not read",
-    "G42": "cutter compensation is not read",
-    "G52": _OFFSET_CHANGES,
-    "G53": "places in machine coordinates are not known in the work frame",
-    "G73": _CYCLE,
-    "G76": _CYCLE,
-    **dict.fromkeys((f"G{number}" for number in range(81, 90)), _CYCLE),
+    **dict.fromkeys(("G28", "G30"), "the machine's reference position is not known"),
+    **dict.fromkeys(("G41", "G42"), "cutter compensation is not read"),
+    **dict.fromkeys(
+        ("G73", "G76", *(f"G{number}" for number in range(81, 90))),
+        "canned cycles are not read",
+    ),
     **dict.fromkeys(("M97", "M98", "M99"), "subprograms are not read"),
 }
 """Codes that lead the tool to where this reader does not know, with the reason."""
