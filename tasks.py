@@ -8,6 +8,7 @@
     python3 tasks.py check       test, lint, types and docs
     python3 tasks.py bench       timings (minutes)
     python3 tasks.py size        how large and how dense the package is
+    python3 tasks.py resolve     does pip find wheels of all dependencies on every platform? (network, minutes)
 
 Arguments after the task's name go to the command. Only the standard library is needed to run this file.
 """
@@ -33,6 +34,7 @@ INSTALL = {
     "bench": ".[benchmark]",
     "docs": ".[docs]",
     "size": ".[all]",
+    "resolve": ".[lint]",
 }
 COMMANDS = {
     "demo": [["brachis", "plan", "examples/01_scara_line.yaml", "--out", "out"]],
@@ -44,6 +46,7 @@ COMMANDS = {
         ["python", "benchmarks/growth.py"],
     ],
     "size": [["python", "benchmarks/size.py"]],
+    "resolve": [["python", "platforms.py"]],
     "docs": [
         [
             "python",

@@ -1,6 +1,6 @@
 """A seven-joint arm, straight from the package example-robot-data: the Panda draws a circle without turning its hand.
 
-Needs the URDFs: pip install "brachis[robots]".
+Needs the URDFs: pip install ".[robots]" in a clone of brachis.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ def panda() -> brachis.Robot:
     for folder in map(Path, sys.path):
         if (folder / URDF).is_file():
             return brachis.Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp")
-    raise SystemExit("the URDFs are not installed: pip install 'brachis[robots]'")
+    raise SystemExit(
+        "the URDFs are not installed: pip install '.[robots]' in a clone of brachis"
+    )
 
 
 def main() -> dict[str, brachis.Result]:

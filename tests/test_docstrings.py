@@ -54,3 +54,14 @@ def test_names_are_found_by_completion():
     )
     assert "scara3" in dir(brachis.robots)
     assert "scara_line" in dir(brachis.examples)
+
+
+@pytest.mark.parametrize("name", sorted(brachis._MODULES))
+def test_public_modules_show_public_names_only(name):
+    module = getattr(brachis, name)
+    names = dir(module)
+    assert names
+    for shown in names:
+        assert not shown.startswith("_")
+        home = getattr(getattr(module, shown), "__module__", "brachis")
+        assert home.startswith(("brachis", "pathlib")), f"{shown} is of {home}"

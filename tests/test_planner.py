@@ -13,11 +13,12 @@ import pytest
 
 import brachis
 from brachis.common.deadline import Deadline
-from brachis.errors import StartError
+from brachis.errors import NotInstalledError, StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.search.continuation import MARGINS, solve_by_margin_continuation
 from support.effort import QUICK
+from support.solvers import INSTALLED
 from support.starts import starting_points
 
 ROOT = Path(__file__).parents[1]
@@ -144,14 +145,18 @@ def test_every_solve_is_reported():
     )
 
 
-def test_missing_solver_is_said_and_the_next_one_taken(monkeypatch):
-    monkeypatch.setitem(sys.modules, "unopy", None)
-    result = brachis.plan(robot(), task(spline={"intervals": 8}))
-    assert result.verified
-    assert result.solver_report.solver == "ipopt"
-    assert any(
-        "uno: not installed" in candidate.status for candidate in result.candidates
-    )
+@pytest.mark.parametrize("name", ["auto", "uno_interior"])
+def test_without_ipopt_plans_are_made_by_what_uno_brings(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipyopt", None)
+    spec = task(spline={"intervals": 8}, solver={"name": name})
+    assert brachis.plan(robot(), spec).verified
+
+
+def test_a_solver_that_is_not_installed_is_an_error_that_names_the_others(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipyopt", None)
+    others = r"Linux on x86_64.*auto, uno, uno_interior or slsqp; .*\[ipopt\]"
+    with pytest.raises(NotInstalledError, match=f"solver.name: ipopt.*{others}"):
+        brachis.plan(robot(), task(solver={"name": "ipopt"}))
 
 
 def test_path_start_is_checked():
@@ -205,7 +210,7 @@ def test_full_turns_are_counted_even_between_few_points():
     assert times == pytest.approx(times[:1] * 3, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])
+@pytest.mark.parametrize("name", INSTALLED)
 def test_ctrl_c_reaches_the_user(name):
     """A real signal while the solver works."""
     program, _ = brachis.transcribe(

@@ -116,5 +116,5 @@ def test_a_table_has_the_samples(result):
 
 def test_a_missing_pandas_is_said(result, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(brachis.errors.NotInstalledError, match=r"brachis\[pandas\]"):
+    with pytest.raises(brachis.errors.NotInstalledError, match=r"whl\[pandas\]"):
         result.to_dataframe(0.1)

@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 import zipfile
 from pathlib import Path
 
@@ -85,6 +86,10 @@ def test_an_installed_wheel_plans_its_example(tmp_path, source, quick_compiler):
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
+    built = {path.name for path in (tmp_path / "site/brachis/kernel").iterdir()}
+    assert {"kernel_baseline.so", "kernel_baseline.sha256"} <= built
+    tag = sysconfig.get_platform().partition("-")[0]  # linux or macosx
+    assert f"-py3-none-{tag}" in wheel.name
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
     command = [sys.executable, "-c", SCRIPT]
     done = subprocess.run(

@@ -5,6 +5,7 @@ The tree of errors::
     BrachisError                    exit code 1
     |-- PlanningError               the input was sound, and no plan could be made
     |-- ClusterError                a cluster cannot be reached, was lost, or cannot run plans
+    |-- NotBuiltError               the compiled kernel is missing or damaged
     |-- UnreachableError            a trial point of the optimiser is outside the branch
     `-- InputError                  the input is wrong; exit code 2
         |-- TaskError               a task file or task mapping
@@ -35,7 +36,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Self, TypedDict, Unpack
+
+PIP = "python -m pip install"
 
 
 @dataclass(frozen=True)
@@ -385,8 +389,16 @@ class NotInstalledError(InputError):
     def __init__(self, user: str, library: str, extra: str) -> None:
         self.library = library
         self.extra = extra
-        hint = f'Run python -m pip install "brachis[{extra}]" in the Python environment that runs brachis'
+        hint = f'In a clone of brachis run {PIP} ".[{extra}]"; from its wheel {PIP} "brachis-....whl[{extra}]"'
         super().__init__(f"{user} needs {library}, which is not installed", hint=hint)
+
+
+class NotBuiltError(BrachisError):
+    """The compiled kernel is missing, damaged, or made of other source."""
+
+    def __init__(self, problem: str, script: Path) -> None:
+        hint = f"Run python {script}; without a C compiler first {PIP} ziglang"
+        super().__init__(f"the kernel is not built: {problem}", hint=hint)
 
 
 class UnreachableError(BrachisError):
@@ -481,3 +493,9 @@ def no_attribute(
         f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}"
         + (f". {hint}" if hint else "")
     )
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    homes = {key: getattr(value, "__module__", "") for key, value in globals().items()}
+    return [key for key, home in homes.items() if home == __name__ and key[0] != "_"]

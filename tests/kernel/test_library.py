@@ -1,29 +1,56 @@
 """The compiled library: where it is missing or belongs to other source, the message says so and what to do."""
 
+import ctypes
+import shutil
+
 import numpy as np
 import pytest
 
 import brachis
+from brachis.errors import NotBuiltError
 from brachis.kernel import Spline, library
 from brachis.kernel import compile as compiling
 
 
-def test_a_missing_library(tmp_path):
-    with pytest.raises(ImportError, match=r"missing.*compiles it"):
-        library._open(tmp_path / "kernel_baseline.so")
+@pytest.fixture
+def built(tmp_path):
+    """Copies of the library and its record, which a test may damage."""
+    library_file = compiling.library_path("baseline")
+    for file in (library_file, compiling.record_path(library_file)):
+        shutil.copy(file, tmp_path)
+    return tmp_path / library_file.name
 
 
-def test_a_file_that_is_no_library(tmp_path):
-    path = tmp_path / "kernel_baseline.so"
-    path.write_bytes(b"no library")
-    with pytest.raises(ImportError, match=r"missing.*compiles it"):
-        library._open(path)
+@pytest.mark.parametrize("suffix", [".so", ".sha256"])
+def test_a_missing_library(built, suffix):
+    built.with_suffix(suffix).unlink()
+    missing = f"not built: kernel_baseline{suffix} is missing"
+    with pytest.raises(NotBuiltError, match=rf"{missing}. Run python \S*/compile\.py"):
+        library._open(built)
 
 
-def test_a_library_of_other_source(monkeypatch):
+@pytest.mark.parametrize("change", ["truncated", "other"])
+def test_a_damaged_library_is_not_loaded(built, change, monkeypatch):
+    content = built.read_bytes()
+    changed = {"truncated": content[:9000], "other": content[:-1] + b"?"}[change]
+    built.write_bytes(changed)
+    monkeypatch.delattr(ctypes, "CDLL")  # loading it might end the interpreter
+    sizes = f"it has {len(changed)} bytes, .* instead of {len(content)} bytes"
+    with pytest.raises(NotBuiltError, match=f"damaged: {sizes}"):
+        library._open(built)
+
+
+def test_a_file_that_is_no_library(built):
+    built.write_bytes(b"no library")
+    compiling.record_path(built).write_text(compiling.describe_file(built))
+    with pytest.raises(NotBuiltError, match="another kind of machine"):
+        library._open(built)
+
+
+def test_a_library_of_other_source(built, monkeypatch):
     monkeypatch.setattr(library, "source_digest", lambda: "0123")
-    with pytest.raises(ImportError, match=r"other source.*compiles it"):
-        library._open(compiling.library_path("baseline"))
+    with pytest.raises(NotBuiltError, match="other source"):
+        library._open(built)
 
 
 def test_all_variants_give_the_same_digits(monkeypatch):

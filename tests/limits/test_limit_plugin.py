@@ -464,3 +464,21 @@ def test_two_processes_take_it_as_well():
         command, env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["True", "True"]
+
+
+def test_an_object_with_the_methods_of_a_limit_does_not_do():
+    """Not inherited: it has no defaults of the optional members."""
+
+    class Alike:
+        kind = "alike"
+
+        def values(self, motion):
+            return motion.q
+
+    class Model:
+        def bind(self, _robot):
+            return Alike()
+
+    inherits = r"the class Alike; allowed: .* inherits brachis\.limits\.Limit"
+    with pytest.raises(InputError, match=inherits):
+        brachis.plan(brachis.examples.scara_line, own_limits=[Model()])

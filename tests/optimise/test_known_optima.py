@@ -21,6 +21,7 @@ import pytest
 
 import brachis
 from support.chains import INERTIAL, Joint, chain_urdf
+from support.solvers import INSTALLED
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
@@ -365,7 +366,7 @@ def test_two_slides_along_one_line_recoil_against_each_other(slides):
         redundant=["j1"],
         joints=[0.0, 0.0],
         robot=held,
-        solver="ipopt",
+        solver="uno_interior",
     )
     result = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0])
     assert result.verified
@@ -380,7 +381,7 @@ def test_two_slides_along_one_line_recoil_against_each_other(slides):
     assert stiff.t_end == pytest.approx(2.0 * np.sqrt(MASS * LENGTH / weak), rel=0.02)
 
 
-@pytest.mark.parametrize("solver", ["uno", "ipopt", "slsqp"])
+@pytest.mark.parametrize("solver", INSTALLED)
 def test_every_solver_finds_the_optimum(slides, solver):
     urdf = slides([X, Y], [FORCE, FORCE])
     result = plan(urdf, ["x", "y"], [LENGTH, 0.0], intervals=10, solver=solver)

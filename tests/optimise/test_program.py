@@ -35,6 +35,7 @@ from brachis.task import SplineSettings
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.jacobians import dense
 from support.phases import phase_of, reachable_points
+from support.solvers import INSTALLED
 
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 FREE = np.nan
@@ -91,7 +92,7 @@ def bang_bang(*distances):
     return sum(2.0 * np.sqrt(distance * MASS / FORCE) for distance in distances)
 
 
-@pytest.mark.parametrize("solver", ["uno", "ipopt", "slsqp"])
+@pytest.mark.parametrize("solver", INSTALLED)
 def test_a_given_stop(solver):
     program = two_moves()
     report = solvers_for(solver)[0].solve(

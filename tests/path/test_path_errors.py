@@ -77,6 +77,18 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
         X,
         ["path[0].arc: an arc needs 2 or 3 position rows"],
     ),
+    *(
+        (
+            shape,
+            XYZ,
+            ["too many turns", "found 1e+06 turns; allowed: at most 1000", "periodic"],
+        )
+        for shape in (
+            {"circle": {"center": [1, 0, 0], "turns": 1e6, "normal": [0, 0, 1]}},
+            {"helix": {"center": [1, 0, 0], "turns": -1e6, "pitch": 0.001}},
+            {"arc": {"center": [1, 0, 0], "angle_deg": 3.6e8, "normal": [0, 0, 1]}},
+        )
+    ),
     (
         {"circle": {"center": [1]}},
         X,

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.errors import TaskError
+from brachis.errors import InputError, TaskError
 from brachis.problem.plausibility import of_task
 from brachis.robot.from_task import robot_for
 from brachis.scene import scene_of
@@ -275,3 +275,75 @@ def test_a_urdf_that_is_no_cell_is_refused(tmp_path, text, message):
     task = brachis.load_task({**TASK, "scene": [cell]})
     with pytest.raises(brachis.BrachisError, match=message):
         scene_of(robot_for(None, task.robot), task)
+
+
+def scene_with(**keys):
+    task = brachis.load_task({**TASK, **keys})
+    return scene_of(robot_for(None, task.robot), task)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"scene": [{"box": [0.1, 1e300, 0.1]}]},
+        {"scene": [{"sphere": 1e300}]},
+        {"scene": [{"cylinder": {"radius": 0.1, "length": 1e300}}]},
+        {"scene": [{"mesh": "body.stl", "scale": 1e300}]},
+        {"scene": [{"half_space": {"normal": [0, 0, 1], "offset": 1e300}}]},
+        {"scene": [{"sphere": 0.1, "position": [0, 0, 1e300]}]},
+        {"collisions": {"clearance": 1e300}},
+        {"collisions": {"padding": {"link_3": 1e300}}},
+        {"robot": {"urdf": str(IIWA), "payload": {"mass": 1e300}}},
+    ],
+    ids=str,
+)
+def test_lengths_and_masses_whose_squares_overflow_are_refused(keys):
+    with pytest.raises(TaskError, match=r"out of range; found 1e\+300; allowed: <= 1e"):
+        brachis.load_task({**TASK, **keys})
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"box": [0.1, 1e5, 0.1]},
+        {"sphere": 1e5},
+        {"capsule": {"radius": 0.1, "length": 1e5}},
+        {"mesh": "body.stl", "scale": 1e5},
+        {"urdf": "cell.urdf"},
+    ],
+    ids=str,
+)
+def test_bodies_that_are_too_large_for_exact_distances_are_refused(
+    body, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "body.stl").write_text(TETRAHEDRON)
+    box = '<geometry><box size="1 1 1e300"/></geometry>'
+    cell = f'<link name="cell"><collision>{box}</collision></link>'
+    (tmp_path / "cell.urdf").write_text(f'<robot name="cell">{cell}</robot>')
+    with pytest.raises(InputError, match=r"too large .*allowed: at most 10000 m"):
+        scene_with(scene=[body])
+
+
+def test_padding_that_makes_a_link_too_large_is_refused():
+    names = brachis.robots.iiwa14.urdf_dynamics.links
+    link = next(name for name in names if name.endswith("3"))
+    with pytest.raises(InputError, match=f"{link}.*: the body is too large"):
+        scene_with(collisions={"mode": "avoid", "padding": {link: 1e6}})
+
+
+def test_a_mesh_file_is_not_read_if_it_is_too_large(tmp_path):
+    file = tmp_path / "sparse.stl"
+    with file.open("wb") as stream:
+        stream.truncate(4_000_000_000)
+    with pytest.raises(TaskError, match=r"found 4000 MB; allowed: at most 32 MB"):
+        scene_with(scene=[{"mesh": str(file)}])
+
+
+@pytest.mark.parametrize(
+    ("count", "what"), [(1650, "pairs of bodies"), (4001, "bodies")]
+)
+def test_more_bodies_than_a_plan_has_memory_for_are_refused(count, what):
+    bodies = [{"sphere": 0.01, "position": [4.0, 0.0, 0.01 * i]} for i in range(count)]
+    with pytest.raises(TaskError, match=rf"too many {what} .*allowed: at most 4000"):
+        scene_with(scene=bodies)

@@ -11,6 +11,7 @@ import pytest
 
 from brachis import examples
 from brachis.common.deadline import NEVER, Deadline
+from brachis.errors import UnreachableError
 from brachis.optimise import improve
 from brachis.optimise.backends import TABLE, SolverReport, SolveStatus
 from brachis.optimise.retiming import COARSE, ROUGH
@@ -20,6 +21,7 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.search import screening
 from brachis.search import starts as module
 from brachis.task import load_task
+from support.solvers import INTERIOR
 
 MOST = 2
 URDF = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
@@ -74,12 +76,12 @@ def test_few_starts_are_improved_too(starts):
     assert better.estimate < starts[0].estimate
 
 
-def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatch):
+def test_without_time_or_motion_starts_are_kept_as_they_come(starts, monkeypatch):
     late = screening.screen(starts, MOST, Deadline(0.0), quiet)
     assert [start.origin for start in late] == [start.origin for start in starts[:MOST]]
 
     def missing(*_arguments: object) -> None:
-        raise ImportError("unopy")
+        raise UnreachableError("out of reach")
 
     monkeypatch.setattr(screening, "improve_guess", missing)
     without = screening.screen(starts, MOST, NEVER, quiet)
@@ -95,7 +97,7 @@ def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeyp
     def once(*arguments: object) -> object:
         if next(solved):
             return honest(*arguments)
-        raise ImportError("unopy")
+        raise UnreachableError("out of reach")
 
     monkeypatch.setattr(screening, "improve_guess", once)
     first, *others = screening.screen(starts, MOST, NEVER, quiet)
@@ -191,10 +193,10 @@ def test_large_programs_over_the_path_go_to_an_interior_point_first(
     def give_up(monitor, x):
         none = np.zeros(len(monitor.problem.lower))
         status = SolveStatus.ITERATION_LIMIT
-        return SolverReport("ipopt", status, x, 9.0, 9.0, none, 0, 0.0, "given up")
+        return SolverReport(INTERIOR, status, x, 9.0, 9.0, none, 0, 0.0, "given up")
 
-    failing = dataclasses.replace(TABLE["ipopt"], run=give_up)
-    monkeypatch.setitem(TABLE, "ipopt", failing)
+    failing = dataclasses.replace(TABLE[INTERIOR], run=give_up)
+    monkeypatch.setitem(TABLE, INTERIOR, failing)
     again = screening.screen(starts[:2], MOST, NEVER, quiet)
     assert set(solvers) == {"uno"}
     assert again[0].estimate == pytest.approx(plain[0].estimate, rel=1e-2)

@@ -49,3 +49,8 @@ __all__ = [
     "ik_family",
     "missing_eaik",
 ]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

@@ -18,7 +18,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-FOLDER = Path(__file__).resolve().parent
+SCRIPT = Path(__file__).resolve()
+FOLDER = SCRIPT.parent
 VARIANTS = {"baseline": (), "avx2": ("-mavx2",)}
 """Names of the libraries, and what they may use of the processor."""
 # No contraction: all variants give the same digits.
@@ -29,6 +30,17 @@ _QUIET = ("-Wno-psabi",)
 def library_path(variant: str) -> Path:
     """Return where the library of a variant is, or is to be."""
     return FOLDER / f"kernel_{variant}.so"
+
+
+def record_path(library: Path) -> Path:
+    """Return where the size and the digest of a library are noted when it is made."""
+    return library.with_suffix(".sha256")
+
+
+def describe_file(library: Path) -> str:
+    """Return the size and the digest of a library."""
+    content = library.read_bytes()
+    return f"{len(content)} bytes, SHA-256 {hashlib.sha256(content).hexdigest()}"
 
 
 def source_digest() -> str:
@@ -68,7 +80,7 @@ def compile_kernel() -> list[Path]:
     Returns
     -------
     list of path
-        The libraries, beside this file.
+        The libraries and their records, beside this file.
 
     Raises
     ------
@@ -102,8 +114,10 @@ def compile_kernel() -> list[Path]:
             raise RuntimeError(
                 f"the C compiler fails: {shlex.join(command)}\n{run.stderr.strip()}"
             )
+        record = record_path(library)
+        record.write_text(describe_file(aside), encoding="ascii")
         aside.replace(library)
-        made.append(library)
+        made += [library, record]
     return made
 
 

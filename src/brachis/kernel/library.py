@@ -11,9 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kernel.compile import library_path, source_digest
+from brachis.errors import NotBuiltError
+from brachis.kernel.compile import (
+    SCRIPT,
+    describe_file,
+    library_path,
+    record_path,
+    source_digest,
+)
 
-_REMEDY = "install brachis again, which compiles it; in a clone: python src/brachis/kernel/compile.py"
 _KINDS = {
     "p": ctypes.c_void_p,
     "l": ctypes.c_long,
@@ -63,8 +69,8 @@ def load() -> ctypes.CDLL:
 
     Raises
     ------
-    ImportError
-        It was not compiled, or belongs to other source.
+    NotBuiltError
+        It was not compiled, is damaged, or belongs to other source.
     """
     baseline = _open(library_path("baseline"))
     faster = library_path("avx2")
@@ -74,18 +80,24 @@ def load() -> ctypes.CDLL:
 
 
 def _open(path: Path) -> ctypes.CDLL:
+    record = record_path(path)
+    for file in (path, record):
+        if not file.exists():
+            raise NotBuiltError(f"{file.name} is missing", SCRIPT)
+    size = describe_file(path)
+    built_size = record.read_text(encoding="ascii")
+    if size != built_size:
+        problem = f"{path.name} is damaged: it has {size} instead of {built_size}"
+        raise NotBuiltError(problem, SCRIPT)
     try:
         library = ctypes.CDLL(str(path))
     except OSError as error:
-        raise ImportError(
-            f"the compiled part of brachis is missing, or is of another kind of machine: {error}; {_REMEDY}"
-        ) from error
+        problem = f"{path.name} is for another kind of machine ({error})"
+        raise NotBuiltError(problem, SCRIPT) from error
     library.brachis_source.restype = ctypes.c_char_p
     found = library.brachis_source().decode()
     if found != source_digest():
-        raise ImportError(
-            f"the compiled part of brachis, {path.name}, was made of other source than this; {_REMEDY}"
-        )
+        raise NotBuiltError(f"{path.name} was made of other source", SCRIPT)
     for name, kinds in FUNCTIONS.items():
         function = getattr(library, name)
         returned, _, taken = kinds.partition(" ")

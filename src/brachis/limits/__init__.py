@@ -135,3 +135,8 @@ __all__ = [
     "joint_limits_of",
     "limits_of",
 ]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

@@ -25,9 +25,11 @@ from brachis.errors import UnreachableError
 from brachis.limits.joint import reciprocals_near
 from brachis.optimise.backends import (
     FEASIBLE,
+    Solver,
     SolverOptions,
     SolverReport,
     SolveStatus,
+    solver_for_large,
     solvers_for,
 )
 from brachis.optimise.candidate import Candidate, refine_and_verify
@@ -45,8 +47,6 @@ _WORTH_IT = 0.05
 _MANY = 200
 """Number of variables above which active sets take tenths of a second an iteration, or seconds. No smoother motion that
 is as fast is then looked for."""
-_FOR_MANY = "ipopt"
-"""Backend for more variables, where the motion may be slower."""
 _OPTIONS = SolverOptions(
     tolerance=1e-6,
     max_iterations=60,
@@ -140,8 +140,10 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
-    name = _FOR_MANY if count > _MANY else task.solver.name
-    solve = _session(name, soon, listener)
+    # Beyond `_MANY` variables only where the motion may be slower.
+    for_large = solver_for_large("auto") if count > _MANY else None
+    backend = for_large or solvers_for(task.solver.name)[0]
+    solve = _session(backend, soon, listener)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
     if not first.status.usable:
@@ -214,9 +216,8 @@ def least_acceleration(
     return replace(objective, weights=weights / np.sqrt(size or 1.0))
 
 
-def _session(name: str, deadline: Deadline, listener: Listener) -> SolverSession:
+def _session(backend: Solver, deadline: Deadline, listener: Listener) -> SolverSession:
     """Make a session of a backend; any feasible motion will do, however the solve ended."""
-    backend = solvers_for(name)[0]
 
     def progress(iteration: int, objective: float) -> None:
         rms = 100.0 * objective**0.5

@@ -23,6 +23,9 @@ from brachis.task.segments import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
+_MOST_TURNS = 1000
+"""Turns of an arc. They have four knots each; a plan of 100 turns takes half a minute and 1.1 GB of memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class SplineCurve:
@@ -224,6 +227,13 @@ def _about_center(
     context.need_rows("an arc", 2, 3)
     center = context.coordinates(shape.center, "center", context.positions)
     outward = context.position - center
+    if abs(angle) > 2.0 * np.pi * _MOST_TURNS:
+        raise context.wrong(
+            "the arc has too many turns for one path",
+            found=f"{abs(angle) / (2.0 * np.pi):g} turns",
+            allowed=f"at most {_MOST_TURNS}",
+            hint="Plan some turns, and repeat them (boundary.periodic)",
+        )
     if np.linalg.norm(outward) < tolerances.LENGTH:
         raise context.wrong(
             "the arc has zero length: its centre is at its start",

@@ -126,7 +126,8 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
         raise InputError(
             "bind did not return a brachis.limits.Limit",
             where=where,
-            found=type(limit).__name__,
+            found=f"an object of the class {type(limit).__name__}",
+            allowed="an object of a class that inherits brachis.limits.Limit; its methods alone are not enough",
         )
     object.__setattr__(limit, "origin", where)  # it may be frozen
     return limit

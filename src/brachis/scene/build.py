@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sized
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from brachis.scene.scene import Scene
 from brachis.scene.solids import build_capsules, build_solids, read_solids
 from brachis.task import Task
 
+_MOST_PAIRS = 4000
+"""Pairs of bodies whose distances a plan looks at: all take 0.9 GB of memory and half a minute."""
 _POSTURES = 100
 """Random postures in which links that always touch are found."""
 
@@ -51,6 +54,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         )
     solids = (*own, *itertools.chain(*map(build_solids, task.scene)))
     mounted = placement_matrix(robot.settings.mounting)
+    _check_count(solids, "bodies")
     joints = np.zeros(len(solids), dtype=int)
     placements = np.array([solid.placement for solid in solids])
     for number, solid in enumerate(solids):
@@ -77,9 +81,23 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
             for pair in itertools.product(names[first], names[second])
         )
     ]
+    _check_count(pairs, "pairs of bodies")
     numbers = np.reshape(pairs, (-1, 2)).astype(int)
     scene = Scene(solids, joints, placements, numbers, len(own))
     return scene.with_pairs(_find_hazards(scene, robot, tree, task))
+
+
+def _check_count(items: Sized, what: str) -> None:
+    """Refuse more bodies, or pairs of them, than a plan has memory for."""
+    if len(items) > _MOST_PAIRS:
+        raise TaskError(
+            f"the scene has too many {what} that keep apart",
+            where="scene",
+            found=len(items),
+            allowed=f"at most {_MOST_PAIRS}",
+            hint="Leave out bodies that the robot cannot reach, join small ones in one mesh, or disable pairs "
+            "(collisions.disable)",
+        )
 
 
 def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.ndarray:

@@ -98,11 +98,8 @@ def solve_candidate(
     except UnreachableError as error:
         return Candidate.of(start, str(error))
     session = _open_session(start, deadline, listener)
-    try:
-        planned = solve_over_path(start, target, session)
-        return planned or _solve_over_time(start, target, session)
-    except ImportError as error:
-        return Candidate.of(start, f"{start.solver}: not installed ({error})")
+    planned = solve_over_path(start, target, session)
+    return planned or _solve_over_time(start, target, session)
 
 
 def _solve_over_time(
@@ -266,14 +263,9 @@ def _refine_if_fast(
     done = None
     for backend in dict.fromkeys((first, session.backend)):
         own = replace(session, backend=backend)
-        try:
-            tried = refine_and_verify(
-                candidate, adapted.program, adapted.reports, own, options
-            )
-        except ImportError:
-            if backend is session.backend:
-                raise
-            continue
+        tried = refine_and_verify(
+            candidate, adapted.program, adapted.reports, own, options
+        )
         if done is None or tried.is_settled:
             done = tried
         if done.is_settled or options.deadline.passed:

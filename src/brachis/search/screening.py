@@ -163,7 +163,7 @@ def _improve(
         maps = start.maps_by_leg()
         program = program_of(problem, maps, [breaks_of(problem)] * len(maps))
         better = improve_guess(start, program, session, effort, charts)
-    except (ImportError, UnreachableError):  # the plan says which backend is missing
+    except UnreachableError:
         return start
     return better.start
 

@@ -235,8 +235,11 @@ Version = Annotated[Literal[1], BeforeValidator(_check_version)]
 # Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
 # are accepted as real ones.
 Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Strict(), Field(gt=0)]
-NonNegative = Annotated[float, Strict(), Field(ge=0)]
+AnyPositive = Annotated[float, Strict(), Field(gt=0)]
+AnyNonNegative = Annotated[float, Strict(), Field(ge=0)]
+# Those of drives may be any: the robot refuses them by their joints.
+Positive = Annotated[AnyPositive, Field(le=LARGEST)]
+NonNegative = Annotated[AnyNonNegative, Field(le=LARGEST)]
 Count = Annotated[int, Strict()]
 _PERCENT = r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$"
 Share = Annotated[float, Strict(), WithUnit({"%": 0.01}, "50 %", _PERCENT)]

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal, Protocol, TypedDict
 
 from pydantic import Field, create_model
 
-from brachis.task.fields import Model, Positive
+from brachis.task.fields import AnyPositive, Model
 
 
 class Array(Protocol):
@@ -205,7 +205,7 @@ StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | 
 
 _FACTORS: dict[str, Any] = {
     row.name: (
-        Positive,
+        AnyPositive,
         Field(default=1.0, description=f"Factor on all {row.scale}."),
     )
     for row in _ROWS

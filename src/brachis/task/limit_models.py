@@ -27,6 +27,7 @@ from brachis.errors import InputError, check_names
 from brachis.task.fields import (
     LARGEST,
     LEAST,
+    AnyPositive,
     ByForm,
     CheckedModel,
     Mistake,
@@ -35,7 +36,6 @@ from brachis.task.fields import (
     NonEmpty,
     NonNegative,
     Number,
-    Positive,
     must,
     plain,
 )
@@ -62,21 +62,21 @@ _Pair = Annotated[
     ),
 ]
 _Entry = Annotated[
-    Positive | _Pair, ByForm("a number > 0, or a pair [lower, upper] around zero")
+    AnyPositive | _Pair, ByForm("a number > 0, or a pair [lower, upper] around zero")
 ]
 _EntryOrNull = Annotated[
-    Positive | _Pair | None,
+    AnyPositive | _Pair | None,
     ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
 ]
 UrdfLimit = Annotated[
-    Literal["urdf"] | Positive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
+    Literal["urdf"] | AnyPositive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
     ByForm(
         "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
         "zero or null; null (no limit), urdf (as in the URDF)"
     ),
 ]
 OwnLimit = Annotated[
-    Positive | NonEmpty[Positive] | dict[Name, Positive | None] | None,
+    AnyPositive | NonEmpty[AnyPositive] | dict[Name, AnyPositive | None] | None,
     ByForm(
         "a number > 0 for all joints, a list of numbers > 0, "
         "a mapping of joint name to number > 0 or null, null (no limit)"
@@ -142,7 +142,7 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
-    total_power: Positive | None = None
+    total_power: AnyPositive | None = None
     """Largest sum of the powers of all joints, drawn or returned, W. Null: none."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
@@ -222,7 +222,7 @@ def map_by_joint(
     return {name: each for name, each in pairs if each != missing}
 
 
-Speed = Annotated[Positive, Field(ge=LEAST, le=LARGEST)]
+Speed = Annotated[AnyPositive, Field(ge=LEAST, le=LARGEST)]
 _PathCoordinates = Annotated[
     tuple[Annotated[Number, Field(ge=0.0, le=1.0)], ...], BeforeValidator(plain)
 ]

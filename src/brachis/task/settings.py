@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from brachis.task.fields import (
+    AnyNonNegative,
     ByForm,
     CheckedModel,
     Count,
@@ -107,7 +108,7 @@ Mounting = Annotated[
 
 
 PerJoint = Annotated[
-    NonNegative | NonEmpty[NonNegative] | dict[Name, NonNegative],
+    AnyNonNegative | NonEmpty[AnyNonNegative] | dict[Name, AnyNonNegative],
     ByForm(
         "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"
     ),
@@ -120,9 +121,9 @@ PerJointPositive = Annotated[
 ]
 UrdfFriction = Annotated[
     Literal["urdf"]
-    | NonNegative
-    | NonEmpty[NonNegative]
-    | dict[Name, NonNegative]
+    | AnyNonNegative
+    | NonEmpty[AnyNonNegative]
+    | dict[Name, AnyNonNegative]
     | None,
     ByForm(
         "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number, null (none), "
@@ -277,7 +278,7 @@ class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
     name: Name = "auto"
-    """Name of the solver; auto takes the best one installed."""
+    """Name of the solver: auto, uno, ipopt (if ipyopt is installed), uno_interior or slsqp. auto begins with uno."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
     time_limit: Positive = Field(default=60.0, le=1e6)

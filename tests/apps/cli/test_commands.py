@@ -19,6 +19,7 @@ import brachis
 from brachis import __version__, planner
 from brachis.apps import plots
 from brachis.apps.cli import folder, main
+from brachis.apps.plots.style import figure_class
 from brachis.errors import InputError
 from brachis.optimise import candidate
 from brachis.search import candidates
@@ -139,6 +140,19 @@ def test_without_figures_none_is_drawn_and_older_ones_go(
     assert outcome.code == 0
     assert sorted(path.name for path in out.iterdir()) == ["result.json", "result.npz"]
     assert len(json.loads(outcome.out)["files"]) == 2
+
+
+def test_without_matplotlib_the_result_is_written_and_the_figures_are_not(
+    run, task, write, tmp_path, monkeypatch
+):
+    figure_class.cache_clear()
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    task["spline"]["intervals"] = 10
+    outcome = run("plan", write(task), "--out", tmp_path / "out")
+    assert outcome.code == 0
+    assert "its figures are not: a figure needs Matplotlib" in outcome.err
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"result.npz", "result.json"}
 
 
 def test_a_result_survives_a_full_disk_while_figures_are_written(

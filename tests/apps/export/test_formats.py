@@ -340,7 +340,7 @@ def test_without_its_library_a_format_is_refused(
 ):
     for module, suffix in (("pyarrow", ".parquet"), ("mcap_ros2.writer", ".mcap")):
         monkeypatch.setitem(__import__("sys").modules, module, None)
-        with pytest.raises(InputError, match=r'pip install "brachis\[export\]"'):
+        with pytest.raises(InputError, match=r'pip install "\.\[export\]"'):
             export.write(line_trajectory, tmp_path / f"motion{suffix}")
     assert list(tmp_path.iterdir()) == []
 

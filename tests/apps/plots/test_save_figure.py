@@ -183,5 +183,5 @@ def test_without_matplotlib_the_error_says_what_to_install(
 ):
     style.figure_class.cache_clear()
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    with pytest.raises(NotInstalledError, match=r'Matplotlib.*"brachis\[plots\]"'):
+    with pytest.raises(NotInstalledError, match=r'Matplotlib.*"\.\[plots\]"'):
         plot_torques(line_trajectory)

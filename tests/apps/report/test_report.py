@@ -390,6 +390,6 @@ def test_what_is_not_installed_is_said(module, name, planar, monkeypatch):
     _plotly.cache_clear()
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(
-        NotInstalledError, match=rf"{name}, which is not installed.*brachis\[report\]"
+        NotInstalledError, match=rf"{name}, which is not installed.*whl\[report\]"
     ):
         make_report(planar)

@@ -120,6 +120,6 @@ def test_without_viser_the_error_says_what_to_install(monkeypatch):
         lambda name: None if name == "viser" else find(name),
     )
     with pytest.raises(
-        NotInstalledError, match=r'needs viser, .*pip install "brachis\[view\]"'
+        NotInstalledError, match=r'needs viser, .*pip install "\.\[view\]"'
     ):
         require_viser()

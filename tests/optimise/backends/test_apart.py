@@ -20,6 +20,7 @@ from brachis.optimise.backends import (
     uno,
 )
 from support.programs import disc
+from support.solvers import INSTALLED
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"),
@@ -46,7 +47,7 @@ def solve(options=OPTIONS, progress=None, name="uno"):
     return solvers_for(name)[0].solve(disc(), START, options, progress)
 
 
-@pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])
+@pytest.mark.parametrize("name", INSTALLED)
 def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch):
     calls: dict[str, list] = {"apart": [], "here": []}
     far = solve(progress=lambda *call: calls["apart"].append(call), name=name)

@@ -6,7 +6,9 @@ import dataclasses
 import os
 import subprocess
 import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -19,18 +21,20 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolveStatus,
     residual,
+    solver_for_large,
     solvers_for,
     uno,
 )
 from brachis.optimise.backends.monitor import SolveMonitor
 from support.programs import bounded, corner, curved, disc, impossible
+from support.solvers import INSTALLED
 
 ROOT = Path(__file__).parents[3]
 OPTIONS = SolverOptions()
-MULTIPLIERS = ("uno", "ipopt")
+MULTIPLIERS = ("uno", "ipopt", "uno_interior")
 
 
-@pytest.fixture(params=TABLE)
+@pytest.fixture(params=INSTALLED)
 def name(request):
     return request.param
 
@@ -99,7 +103,7 @@ def test_start_is_not_overwritten(name):
     np.testing.assert_array_equal(start, [4.0, 0.5])
 
 
-@pytest.mark.parametrize("name", ["uno", "ipopt"])
+@pytest.mark.parametrize("name", [name for name in INSTALLED if name != "slsqp"])
 @pytest.mark.parametrize("edge", [0.99, 0.9])
 def test_backs_off_from_points_that_cannot_be_evaluated(name, edge):
     refusals = 0
@@ -233,10 +237,21 @@ def test_nothing_is_printed(name, make, capfd):
     assert (captured.out, captured.err) == ("", "")
 
 
-def test_registry():
-    assert NAMES == ("auto", "uno", "ipopt", "slsqp")
-    assert [backend.name for backend in solvers_for("auto")] == list(TABLE)
-    for each in TABLE:
+@pytest.mark.parametrize(
+    ("is_installed", "interior"), [(True, "ipopt"), (False, "uno_interior")]
+)
+def test_registry(is_installed, interior, monkeypatch):
+    module = ModuleType("ipyopt")
+    module.__spec__ = ModuleSpec("ipyopt", None)
+    monkeypatch.setitem(sys.modules, "ipyopt", module if is_installed else None)
+    assert NAMES == ("auto", "uno", "ipopt", "uno_interior", "slsqp")
+    automatic = [backend.name for backend in solvers_for("auto")]
+    assert automatic == ["uno", interior, "slsqp"]
+    large = solver_for_large("auto")
+    assert large is TABLE[interior]
+    assert large.is_interior
+    assert solver_for_large("uno") is None
+    for each in {*TABLE} - {"ipopt"}:
         assert solvers_for(each) == (TABLE[each],)
     with pytest.raises(UnknownNameError, match="Did you mean 'ipopt'") as caught:
         solvers_for("ipop")

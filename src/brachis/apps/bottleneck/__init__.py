@@ -57,3 +57,8 @@ __all__ = [
     "sensitivities",
     "solve_again",
 ]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

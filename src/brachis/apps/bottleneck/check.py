@@ -281,10 +281,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     """
     answers = []
     for solver in solvers_for("auto"):
-        try:
-            report = solver.solve(program, x, SolverOptions(tolerance=1e-8), None)
-        except ImportError:
-            continue
+        report = solver.solve(program, x, SolverOptions(tolerance=1e-8), None)
         if report.violation > _FEASIBLE:
             continue
         if _stationarity(program, report.x) <= 1e-5:

@@ -104,7 +104,7 @@ def solve_again(
                 if is_timed:
                     solved = adapt_mesh(solved, solve, task.spline, options)
                 refined = refine(solved.program, solved.report, solve, options)
-            except (ImportError, UnreachableError):
+            except UnreachableError:
                 continue
             if not refined.converged:
                 continue

@@ -194,10 +194,7 @@ def _plan_on_mesh(
     is_rough = program.phases[0].degree == _PARABOLAS
     for backend in reversed(backends) if is_rough else backends:
         solve = partial(solve_with, backend)
-        try:
-            first = solve(program, x)
-        except ImportError:
-            continue
+        first = solve(program, x)
         is_faster = first.feasible and program.end_time(first.x) < fastest.t_end
         if is_faster and not first.status.usable:
             first = dataclasses.replace(first, status=SolveStatus.ACCEPTABLE)

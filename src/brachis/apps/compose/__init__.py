@@ -11,3 +11,8 @@ True
 from brachis.apps.compose.rail import Rail, on_rail
 
 __all__ = ["Rail", "on_rail"]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

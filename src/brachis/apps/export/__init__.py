@@ -22,3 +22,8 @@ __all__ = [
     "samples_schema",
     "write",
 ]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

@@ -57,3 +57,8 @@ __all__ = [
     "plot_torques",
     "save_figure",
 ]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

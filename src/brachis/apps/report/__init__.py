@@ -12,3 +12,8 @@ Examples
 from brachis.apps.report.page import Report, check_report_name, make_report
 
 __all__ = ["Report", "check_report_name", "make_report"]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return __all__

@@ -103,7 +103,7 @@ def make_report(
     Raises
     ------
     NotInstalledError
-        Jinja2 or Plotly is not installed: ``pip install "brachis[report]"``.
+        Jinja2 or Plotly is not installed.
 
     Examples
     --------

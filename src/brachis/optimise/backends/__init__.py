@@ -1,7 +1,9 @@
 """Solver backends: a file for each, and a line in `TABLE`; libraries are imported when used."""
 
-from brachis.errors import UnknownNameError
-from brachis.optimise.backends import ipopt, slsqp, uno
+from importlib.util import find_spec
+
+from brachis.errors import NotInstalledError, UnknownNameError
+from brachis.optimise.backends import ipopt, slsqp, uno, uno_interior
 from brachis.optimise.backends.child_process import Solver
 from brachis.optimise.backends.monitor import objective_at, residual
 from brachis.optimise.backends.protocol import (
@@ -30,15 +32,15 @@ __all__ = [
     "solvers_for",
 ]
 TABLE = {
-    backend.NAME: Solver(backend.NAME, backend.run, is_interior=backend is ipopt)
-    for backend in (uno, ipopt, slsqp)
+    backend.NAME: Solver(backend.NAME, backend.run, backend in (ipopt, uno_interior))
+    for backend in (uno, ipopt, uno_interior, slsqp)
 }
-"""Backends by name, in the order in which ``auto`` tries them."""
+"""Backends by name, in the order in which ``auto`` tries them; of the two interior-point methods it takes one."""
 NAMES = ("auto", *TABLE)
 
 
 def solvers_for(name: str) -> tuple[Solver, ...]:
-    """Backends to try for a name, in order: one, or all for ``auto``.
+    """Backends to try for a name, in order: one, or for ``auto`` one of each method.
 
     Parameters
     ----------
@@ -47,12 +49,24 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
     Raises
     ------
     UnknownNameError
+    NotInstalledError
+        It is ``ipopt``, whose package has wheels for one platform alone.
     """
     if name == "auto":
-        return tuple(TABLE.values())
+        return TABLE["uno"], _interior(), TABLE["slsqp"]
     if name not in TABLE:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
+    if name == "ipopt" and _interior() is not TABLE[name]:
+        library = "ipyopt (it has wheels for Linux on x86_64 alone)"
+        error = NotInstalledError("solver.name: ipopt", library, "ipopt")
+        error.put_advice("Set solver.name: auto, uno, uno_interior or slsqp")
+        raise error
     return (TABLE[name],)
+
+
+def _interior() -> Solver:
+    """Return IPOPT where it is installed, else Uno's interior-point method."""
+    return TABLE["ipopt" if find_spec("ipyopt") else "uno_interior"]
 
 
 def solver_for_large(name: str) -> Solver | None:
@@ -61,4 +75,4 @@ def solver_for_large(name: str) -> Solver | None:
     The effort of an interior-point method grows with the entries of the Jacobian, that of an active-set method with the
     square of the variables at least.
     """
-    return TABLE["ipopt"] if name == "auto" else None
+    return _interior() if name == "auto" else None

@@ -16,7 +16,12 @@ from typing import Any
 import numpy as np
 
 from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
-from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    Problem,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 from brachis.optimise.backends.secant import SecantHessian
 
 NAME = "uno"
@@ -37,6 +42,7 @@ _STOPPED = {
     "ITERATION_LIMIT": SolveStatus.ITERATION_LIMIT,
     "TIME_LIMIT": SolveStatus.TIME_LIMIT,
     "EVALUATION_ERROR": SolveStatus.EVALUATION_ERROR,
+    "USER_TERMINATION": SolveStatus.ITERATION_LIMIT,
 }
 
 
@@ -52,7 +58,7 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
-    _solve_first_problem()
+    solve_first_problem()
     learnt = monitor.options.learnt
     with monitor:
         for radius, scaled in _RESTARTS:
@@ -64,29 +70,41 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             x = units * np.array(result.primal_solution)
             ending = result.optimization_status.name
             found = result.solution_status.name
-            if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
-                monitor.failure = KeyboardInterrupt()
             small = found == "FEASIBLE_SMALL_STEP"
             has_failed = stall.seen or small or ending == "ALGORITHMIC_ERROR"
             if not has_failed or monitor.is_beaten or monitor.must_stop():
                 break
-    status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
+    status = None
     if stall.seen:
         status = SolveStatus.STALLED
     elif stall.is_lost:
         status = SolveStatus.INFEASIBLE
-    elif ending == "USER_TERMINATION":
-        status = SolveStatus.ITERATION_LIMIT
-    message = f"{ending.lower()}, {found.lower()}"
-    multipliers = np.array(result.constraint_dual_solution)
-    report = monitor.report(NAME, status, x, multipliers, message)
+    report = report_result(monitor, NAME, result, x, status)
     if hessian is None or not report.status.usable:
         return report
     return replace(report, learnt=hessian.learnt)
 
 
+def report_result(
+    monitor: SolveMonitor,
+    name: str,
+    result: Any,
+    x: np.ndarray,
+    status: SolveStatus | None = None,
+) -> SolverReport:
+    """Report Uno's result, with x, (v,), as the answer; `status` replaces Uno's own."""
+    ending = result.optimization_status.name
+    solution = result.solution_status.name
+    if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
+        monitor.failure = KeyboardInterrupt()
+    status = status or _STOPPED.get(ending) or _STATUS.get(solution, SolveStatus.FAILED)
+    message = f"{ending.lower()}, {solution.lower()}"
+    multipliers = np.array(result.constraint_dual_solution)
+    return monitor.report(name, status, x, multipliers, message)
+
+
 @cache
-def _solve_first_problem() -> None:
+def solve_first_problem() -> None:
     """Minimise x^2, once in a process.
 
     Rounding within Uno depends on the first problem that a process has solved: without this one, answers would
@@ -102,15 +120,15 @@ def _solve_first_problem() -> None:
     )
     model.set_objective(unopy.MINIMIZE, lambda point: float(point[0] ** 2), write_slope)
     model.set_initial_primal_iterate([0.5])
-    _backend({}).optimize(model)
+    make_backend("filtersqp", {}).optimize(model)
 
 
-def _backend(settings: dict[str, Any]) -> Any:
-    """Uno's own solver with settings, silent."""
+def make_backend(preset: str, settings: dict[str, Any]) -> Any:
+    """Make Uno's solver with a preset and settings, silent."""
     import unopy
 
     backend = unopy.UnoSolver()
-    backend.set_preset("filtersqp")
+    backend.set_preset(preset)
     backend.set_logger_stream(io.StringIO())  # Uno would print to standard output
     silent = {"logger": "SILENT", "print_solution": False}
     for key, value in (silent | settings).items():
@@ -181,10 +199,43 @@ def _run(
     terminate: _Stall,
 ) -> Any:
     """One call of Uno, which is untyped; its variables are x in units."""
+    options = monitor.options
+    model = build_model(monitor, x, units, min(options.widening, options.tolerance))
+    if hessian is not None:
+        _set_hessian(model, partial(monitor.hessian, hessian), units)
+    settings = take_settings(options) | {"TR_radius": radius * options.first_step}
+    backend = make_backend("filtersqp", settings)
+    backend.set_termination_callback(terminate)
+    return backend.optimize(model)
+
+
+def take_settings(options: SolverOptions) -> dict[str, Any]:
+    """Return the options that all presets of Uno have."""
+    return {
+        "primal_tolerance": options.tolerance,
+        "dual_tolerance": options.tolerance,
+        "max_iterations": options.max_iterations,
+        "time_limit": float(options.time_limit),
+    }
+
+
+def build_model(
+    monitor: SolveMonitor, x: np.ndarray, units: np.ndarray, widening: float
+) -> Any:
+    """Build Uno's model of the monitor's problem, which begins at x.
+
+    Parameters
+    ----------
+    monitor : SolveMonitor
+    x : (v,) ndarray
+    units : (v,) ndarray
+        The model's variables are x in these units.
+    widening : float
+        See `_spread_bounds`.
+    """
     import unopy
 
     problem = monitor.problem
-    options = monitor.options
     model = unopy.Model(
         unopy.PROBLEM_NONLINEAR,
         len(x),
@@ -206,8 +257,7 @@ def _run(
         lambda point: monitor.objective(units * point),
         scale(monitor.gradient, units),
     )
-    most = min(options.widening, options.tolerance)
-    lower, upper = _spread_bounds(problem.lower, problem.upper, most)
+    lower, upper = _spread_bounds(problem.lower, problem.upper, widening)
     model.set_constraints(
         len(lower),
         scale(monitor.rows, 1.0),
@@ -218,19 +268,8 @@ def _run(
         problem.jacobian_columns.tolist(),
         scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
-    if hessian is not None:
-        _set_hessian(model, partial(monitor.hessian, hessian), units)
     model.set_initial_primal_iterate((x / units).tolist())
-    settings = {
-        "primal_tolerance": options.tolerance,
-        "dual_tolerance": options.tolerance,
-        "TR_radius": radius * options.first_step,
-        "max_iterations": options.max_iterations,
-        "time_limit": float(options.time_limit),
-    }
-    backend = _backend(settings)
-    backend.set_termination_callback(terminate)
-    return backend.optimize(model)
+    return model
 
 
 def _spread_bounds(

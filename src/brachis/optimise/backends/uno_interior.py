@@ -1,0 +1,59 @@
+"""Uno's interior-point method, with MUMPS: where IPOPT is asked for by ``auto`` and not installed.
+
+IPOPT's Python package has wheels for Linux on x86_64 alone; Uno's wheels bring MUMPS everywhere. The Hessian is Uno's
+limited-memory approximation, as IPOPT's is.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from brachis.optimise.backends.monitor import SolveMonitor, objective_at, residual
+from brachis.optimise.backends.protocol import SolverReport
+from brachis.optimise.backends.uno import (
+    build_model,
+    make_backend,
+    report_result,
+    solve_first_problem,
+    take_settings,
+)
+
+NAME = "uno_interior"
+_FIRST_GAP = 0.3
+"""What the first barrier parameter makes of the objective, summed over all rows.
+
+Programs over the path begin within 1 % of their optimum. With Uno's 0.1 a solve first moves away from it, and 3 of 8
+are not back after 100 iterations; with a third of this, 2 of 8 end up to 0.7 % slower.
+"""
+_SMALL_BARRIER = 1e-5
+"""Largest complementarity at which iterates show whether the solve has settled, as for IPOPT."""
+
+
+def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
+    """Solve the monitor's problem from `x`."""
+    solve_first_problem()
+    problem = monitor.problem
+
+    def terminate(point: np.ndarray, *rest: Any) -> bool:
+        """Tell whether to stop after an iteration."""
+        *_, objective_multiplier, _infeasibility, _stationarity, complementarity = rest
+        iterate = np.array(point[: len(x)])  # a restoration appends variables
+        objective = objective_at(problem, iterate)
+        violation = residual(problem, iterate)  # Uno's is of scaled rows
+        if objective_multiplier > 0.0:
+            monitor.keep(iterate, objective, violation)
+        if objective_multiplier == 0.0 or complementarity > _SMALL_BARRIER:
+            violation = np.inf
+        stop = monitor.between_iterations(objective)
+        return monitor.has_settled(objective, violation) or stop
+
+    share = _FIRST_GAP / max(len(problem.lower), 1)
+    barrier = float(np.clip(share * objective_at(problem, x), 1e-9, 0.1))
+    settings = {"barrier_initial_parameter": barrier}
+    backend = make_backend("ipopt", take_settings(monitor.options) | settings)
+    backend.set_termination_callback(terminate)
+    with monitor:
+        result = backend.optimize(build_model(monitor, x, np.ones(len(x)), 0.0))
+    return report_result(monitor, NAME, result, np.array(result.primal_solution))

@@ -1,0 +1,11 @@
+"""The solver backends of this environment: ipyopt has wheels for Linux on x86_64 alone."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from brachis.optimise.backends import TABLE
+
+INSTALLED = tuple(name for name in TABLE if name != "ipopt" or find_spec("ipyopt"))
+INTERIOR = "ipopt" if "ipopt" in INSTALLED else "uno_interior"
+"""The interior-point method that ``auto`` takes."""
