@@ -16,7 +16,7 @@ from brachis.kernel import compile as compiling
 def built(tmp_path):
     """Copies of the library and its record, which a test may damage."""
     library_file = compiling.library_path("baseline")
-    for file in (library_file, compiling.record_path(library_file)):
+    for file in (library_file, library_file.with_suffix(".sha256")):
         shutil.copy(file, tmp_path)
     return tmp_path / library_file.name
 
@@ -24,7 +24,7 @@ def built(tmp_path):
 @pytest.mark.parametrize("suffix", [".so", ".sha256"])
 def test_a_missing_library(built, suffix):
     built.with_suffix(suffix).unlink()
-    missing = f"not built: kernel_baseline{suffix} is missing"
+    missing = rf"not built: .*No such file.*kernel_baseline{suffix}'"
     with pytest.raises(NotBuiltError, match=rf"{missing}. Run python \S*/compile\.py"):
         library._open(built)
 
@@ -42,8 +42,8 @@ def test_a_damaged_library_is_not_loaded(built, change, monkeypatch):
 
 def test_a_file_that_is_no_library(built):
     built.write_bytes(b"no library")
-    compiling.record_path(built).write_text(compiling.describe_file(built))
-    with pytest.raises(NotBuiltError, match="another kind of machine"):
+    built.with_suffix(".sha256").write_text(compiling.describe_file(built))
+    with pytest.raises(NotBuiltError, match=r"not built: .*kernel_baseline\.so: "):
         library._open(built)
 
 

@@ -341,9 +341,11 @@ def test_a_mesh_file_is_not_read_if_it_is_too_large(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("count", "what"), [(1650, "pairs of bodies"), (4001, "bodies")]
+    ("count", "what"), [(1650, "pairs that keep apart"), (4001, "bodies")]
 )
 def test_more_bodies_than_a_plan_has_memory_for_are_refused(count, what):
     bodies = [{"sphere": 0.01, "position": [4.0, 0.0, 0.01 * i]} for i in range(count)]
-    with pytest.raises(TaskError, match=rf"too many {what} .*allowed: at most 4000"):
+    with pytest.raises(
+        InputError, match=rf"too many bodies; .*at most 4000 {what}\. Leave"
+    ):
         scene_with(scene=bodies)

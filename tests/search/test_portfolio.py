@@ -523,12 +523,12 @@ def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
     reason="what is patched here is only forked there",
 )
 def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
-    honest = uno._run
+    honest = uno.call_uno
 
     def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
         return time.sleep(1e6) if len(x) > 60 else honest(watch, x, *rest)
 
-    monkeypatch.setattr(uno, "_run", hanging)
+    monkeypatch.setattr(uno, "call_uno", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
     jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
     arm = brachis.Robot.from_urdf(

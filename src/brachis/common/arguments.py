@@ -181,3 +181,18 @@ def count(value: int, where: str) -> int:
     if value < 1:
         raise InputError("out of range", where=where, found=value, allowed=allowed)
     return int(value)
+
+
+def check_most(
+    value: float, most: float, unit: str, problem: str, where: str, hint: str = ""
+) -> None:
+    """Refuse a size or a count, in a unit, above what a plan has time and memory for.
+
+    Raises
+    ------
+    InputError
+    """
+    if value > most:
+        found = f"{value:.4g} {unit}"
+        allowed = f"at most {most:g} {unit}"
+        raise InputError(problem, where=where, found=found, allowed=allowed, hint=hint)

@@ -49,8 +49,4 @@ __all__ = [
     "ik_family",
     "missing_eaik",
 ]
-
-
-def __dir__() -> list[str]:
-    """Names for completion."""
-    return __all__
+__dir__ = __all__.copy  # what completion shows

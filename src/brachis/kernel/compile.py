@@ -32,13 +32,8 @@ def library_path(variant: str) -> Path:
     return FOLDER / f"kernel_{variant}.so"
 
 
-def record_path(library: Path) -> Path:
-    """Return where the size and the digest of a library are noted when it is made."""
-    return library.with_suffix(".sha256")
-
-
 def describe_file(library: Path) -> str:
-    """Return the size and the digest of a library."""
+    """Return the size and the digest of a library, which are noted beside it when it is made."""
     content = library.read_bytes()
     return f"{len(content)} bytes, SHA-256 {hashlib.sha256(content).hexdigest()}"
 
@@ -114,7 +109,7 @@ def compile_kernel() -> list[Path]:
             raise RuntimeError(
                 f"the C compiler fails: {shlex.join(command)}\n{run.stderr.strip()}"
             )
-        record = record_path(library)
+        record = library.with_suffix(".sha256")
         record.write_text(describe_file(aside), encoding="ascii")
         aside.replace(library)
         made += [library, record]

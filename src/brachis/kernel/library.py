@@ -16,7 +16,6 @@ from brachis.kernel.compile import (
     SCRIPT,
     describe_file,
     library_path,
-    record_path,
     source_digest,
 )
 
@@ -80,20 +79,15 @@ def load() -> ctypes.CDLL:
 
 
 def _open(path: Path) -> ctypes.CDLL:
-    record = record_path(path)
-    for file in (path, record):
-        if not file.exists():
-            raise NotBuiltError(f"{file.name} is missing", SCRIPT)
-    size = describe_file(path)
-    built_size = record.read_text(encoding="ascii")
-    if size != built_size:
-        problem = f"{path.name} is damaged: it has {size} instead of {built_size}"
-        raise NotBuiltError(problem, SCRIPT)
     try:
+        size = describe_file(path)
+        built_size = path.with_suffix(".sha256").read_text(encoding="ascii")
+        if size != built_size:
+            problem = f"{path.name} is damaged: it has {size} instead of {built_size}"
+            raise NotBuiltError(problem, SCRIPT)
         library = ctypes.CDLL(str(path))
-    except OSError as error:
-        problem = f"{path.name} is for another kind of machine ({error})"
-        raise NotBuiltError(problem, SCRIPT) from error
+    except OSError as error:  # missing, or of another kind of machine
+        raise NotBuiltError(str(error), SCRIPT) from error
     library.brachis_source.restype = ctypes.c_char_p
     found = library.brachis_source().decode()
     if found != source_digest():

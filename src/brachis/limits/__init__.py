@@ -135,8 +135,4 @@ __all__ = [
     "joint_limits_of",
     "limits_of",
 ]
-
-
-def __dir__() -> list[str]:
-    """Names for completion."""
-    return __all__
+__dir__ = __all__.copy  # what completion shows

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sized
 from pathlib import Path
 
 import numpy as np
 from lxml import etree
 
+from brachis.common.arguments import check_most
 from brachis.common.files import read_text
 from brachis.errors import TaskError, check_names
 from brachis.robot import Robot
@@ -54,7 +54,11 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         )
     solids = (*own, *itertools.chain(*map(build_solids, task.scene)))
     mounted = placement_matrix(robot.settings.mounting)
-    _check_count(solids, "bodies")
+    hint = (
+        "Leave out bodies that the robot cannot reach, or join small ones in one mesh"
+    )
+    problem = "the scene has too many bodies"
+    check_most(len(solids), _MOST_PAIRS, "bodies", problem, "scene", hint)
     joints = np.zeros(len(solids), dtype=int)
     placements = np.array([solid.placement for solid in solids])
     for number, solid in enumerate(solids):
@@ -81,23 +85,10 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
             for pair in itertools.product(names[first], names[second])
         )
     ]
-    _check_count(pairs, "pairs of bodies")
+    check_most(len(pairs), _MOST_PAIRS, "pairs that keep apart", problem, "scene", hint)
     numbers = np.reshape(pairs, (-1, 2)).astype(int)
     scene = Scene(solids, joints, placements, numbers, len(own))
     return scene.with_pairs(_find_hazards(scene, robot, tree, task))
-
-
-def _check_count(items: Sized, what: str) -> None:
-    """Refuse more bodies, or pairs of them, than a plan has memory for."""
-    if len(items) > _MOST_PAIRS:
-        raise TaskError(
-            f"the scene has too many {what} that keep apart",
-            where="scene",
-            found=len(items),
-            allowed=f"at most {_MOST_PAIRS}",
-            hint="Leave out bodies that the robot cannot reach, join small ones in one mesh, or disable pairs "
-            "(collisions.disable)",
-        )
 
 
 def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.ndarray:

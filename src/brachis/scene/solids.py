@@ -14,6 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from brachis.common.arguments import check_most
 from brachis.common.files import mesh_file, read_text
 from brachis.errors import InputError, TaskError, UrdfError
 from brachis.robot.urdf_bodies import origin_of, placement_matrix
@@ -29,8 +30,8 @@ from brachis.task.scene import Round, SceneBody
 _LARGEST = 1e4
 """Largest radius of a ball around a body, m. Distances from a rod of 100 km are off by more than 0.1 mm: plans near it
 end unverified; near one of 10 km they do not."""
-_LARGEST_FILE = 32_000_000
-"""Size of a mesh file that is read, bytes: its hull takes 20 s and 0.8 GB of memory."""
+_LARGEST_FILE = 32.0
+"""Size of a mesh file that is read, MB: its hull takes 20 s and 0.8 GB of memory."""
 _HULL = (True, "Qt")
 """Keep the triangles; options of Qhull."""
 _THICKNESS = 0.02
@@ -228,32 +229,22 @@ def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[fl
     return found
 
 
-def _check_size(geometry: Geometry, name: str, padding: float = 0.0) -> None:
-    """Refuse a body that is too large for exact distances."""
+def _check_size(geometry: Geometry, where: str, padding: float = 0.0) -> None:
+    """Refuse a body that is too large; a half-space is infinite."""
     geometry.computeLocalAABB()
-    radius = geometry.aabb_radius + padding
-    if radius > _LARGEST and not isinstance(geometry, coal.Halfspace):
-        raise InputError(
-            "the body is too large for exact distances",
-            where=name,
-            found=f"{radius:.3g} m from its middle to its end",
-            allowed=f"at most {_LARGEST:g} m",
-        )
+    if not isinstance(geometry, coal.Halfspace):
+        radius = geometry.aabb_radius + padding
+        problem = "the body is too large for exact distances"
+        check_most(radius, _LARGEST, "m", problem, where)
 
 
 def _hull(path: Path, scale: np.ndarray) -> Geometry:
     """Return the convex hull of a mesh file."""
     if not path.is_file():
         raise InputError("the mesh file does not exist", where=str(path))
-    size = path.stat().st_size
-    if size > _LARGEST_FILE:
-        raise InputError(
-            "the mesh file is too large",
-            where=str(path),
-            found=f"{size / 1e6:.0f} MB",
-            allowed=f"at most {_LARGEST_FILE / 1e6:.0f} MB",
-            hint="Only its convex hull counts: reduce it to fewer triangles",
-        )
+    hint = "Only its convex hull counts: reduce it to fewer triangles"
+    size = path.stat().st_size / 1e6
+    check_most(size, _LARGEST_FILE, "MB", "the mesh file is too large", str(path), hint)
     try:
         mesh = coal.MeshLoader(coal.NODE_TYPE.BV_AABB).load(str(path), scale)
         _check_size(mesh, str(path))

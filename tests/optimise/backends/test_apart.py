@@ -70,13 +70,13 @@ def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch
 def test_a_small_problem_is_solved_apart_if_it_asks_for_it(apart, monkeypatch):
     monkeypatch.setattr(child_process, "ENTRIES", 1000)
     solved_by = []
-    honest = uno._run
+    honest = uno.call_uno
 
     def note(*arguments):
         solved_by.append(os.getpid())
         return honest(*arguments)
 
-    monkeypatch.setattr(uno, "_run", note)
+    monkeypatch.setattr(uno, "call_uno", note)
     assert solve(SolverOptions(apart=apart)).status.usable
     assert solved_by == ([] if apart else [os.getpid()])
 
@@ -84,7 +84,7 @@ def test_a_small_problem_is_solved_apart_if_it_asks_for_it(apart, monkeypatch):
 def test_a_small_problem_that_is_silent_for_long_is_ended(monkeypatch):
     monkeypatch.setattr(child_process, "ENTRIES", 1000)
     monkeypatch.setattr(child_process, "_SILENCE", 0.1)
-    monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
+    monkeypatch.setattr(uno, "call_uno", lambda *_: time.sleep(1e6))
     report = solve(SolverOptions(apart=True))
     assert report.status is SolveStatus.STALLED
     assert report.message == "ended: a subproblem took too long"
@@ -93,7 +93,7 @@ def test_a_small_problem_that_is_silent_for_long_is_ended(monkeypatch):
 
 
 def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):
-    monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
+    monkeypatch.setattr(uno, "call_uno", lambda *_: time.sleep(1e6))
     report = solve(SolverOptions(time_limit=0.1))
     assert report.status is SolveStatus.TIME_LIMIT
     assert report.message == "ended: it did not finish in time"
@@ -112,7 +112,7 @@ def test_what_a_solve_had_found_before_it_was_ended_is_its_answer(monkeypatch):
             monitor.between_iterations(objective)
         time.sleep(1e6)
 
-    monkeypatch.setattr(uno, "_run", find_and_hang)
+    monkeypatch.setattr(uno, "call_uno", find_and_hang)
     report = solve(SolverOptions(time_limit=0.3))
     assert report.status is SolveStatus.TIME_LIMIT
     assert disc().objective(better) < disc().objective(START)
@@ -126,7 +126,7 @@ def test_without_a_time_limit_it_is_not_ended():
 
 
 def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
-    monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
+    monkeypatch.setattr(uno, "call_uno", lambda *_: time.sleep(1e6))
     context = multiprocessing.get_context("fork")
     _, sender = context.Pipe(duplex=False)
     process = context.Process(
@@ -145,7 +145,9 @@ def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
 
 
 def test_a_solver_that_crashes_is_told(monkeypatch):
-    monkeypatch.setattr(uno, "_run", lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+    monkeypatch.setattr(
+        uno, "call_uno", lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+    )
     report = solve()
     assert (report.status, report.message) == (SolveStatus.FAILED, "crashed")
 

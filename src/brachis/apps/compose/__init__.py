@@ -11,8 +11,4 @@ True
 from brachis.apps.compose.rail import Rail, on_rail
 
 __all__ = ["Rail", "on_rail"]
-
-
-def __dir__() -> list[str]:
-    """Names for completion."""
-    return __all__
+__dir__ = __all__.copy  # what completion shows

@@ -22,8 +22,4 @@ __all__ = [
     "samples_schema",
     "write",
 ]
-
-
-def __dir__() -> list[str]:
-    """Names for completion."""
-    return __all__
+__dir__ = __all__.copy  # what completion shows

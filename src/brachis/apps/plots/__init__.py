@@ -57,8 +57,4 @@ __all__ = [
     "plot_torques",
     "save_figure",
 ]
-
-
-def __dir__() -> list[str]:
-    """Names for completion."""
-    return __all__
+__dir__ = __all__.copy  # what completion shows

@@ -12,8 +12,4 @@ Examples
 from brachis.apps.report.page import Report, check_report_name, make_report
 
 __all__ = ["Report", "check_report_name", "make_report"]
-
-
-def __dir__() -> list[str]:
-    """Names for completion."""
-    return __all__
+__dir__ = __all__.copy  # what completion shows

@@ -25,9 +25,6 @@ _STATUS = {
     -13: SolveStatus.EVALUATION_ERROR,
 }
 
-_SMALL_BARRIER = 1e-5
-"""Largest barrier parameter at which iterates show whether the solve has settled."""
-
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
@@ -58,10 +55,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         *_: float,
     ) -> bool:
         """Tell whether to go on after an iteration."""
-        stop = monitor.between_iterations(objective)
-        # With a large barrier the motion is slower than its start: no sign that the solve has settled.
-        own = infeasibility if barrier <= _SMALL_BARRIER else np.inf
-        return not (monitor.has_settled(objective, own) or stop)
+        return not monitor.ends_interior(objective, infeasibility, barrier)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
         """Write infinite bounds as IPOPT has them."""

@@ -26,6 +26,8 @@ _LARGEST = 1e30
 
 _TRIAL_ITERATIONS = 10
 """Iterations before a solve is compared with `SolverOptions.to_beat`."""
+_SMALL_BARRIER = 1e-5
+"""Largest barrier parameter at which iterates show whether the solve has settled."""
 _NEARLY_FEASIBLE = 1e-3
 """Violation of rows up to which an iterate counts, or ten times the tolerance if that is larger."""
 
@@ -137,6 +139,17 @@ class SolveMonitor:
         is_feasible = infeasibility <= self._feasible_below
         self.stagnated = bool(before) and is_feasible and not gains
         return self.stagnated
+
+    def ends_interior(
+        self, objective: float, infeasibility: float, barrier: float
+    ) -> bool:
+        """Tell whether an interior-point method has to stop after an iteration, or has settled.
+
+        With a large barrier the motion is slower than its start: no sign that the solve has settled.
+        """
+        stop = self.between_iterations(objective)
+        violation = infeasibility if barrier <= _SMALL_BARRIER else np.inf
+        return self.has_settled(objective, violation) or stop
 
     def must_stop(self) -> bool:
         """Tell whether the user has interrupted or the time is over."""

@@ -16,12 +16,7 @@ from typing import Any
 import numpy as np
 
 from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
-from brachis.optimise.backends.protocol import (
-    Problem,
-    SolverOptions,
-    SolverReport,
-    SolveStatus,
-)
+from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
 from brachis.optimise.backends.secant import SecantHessian
 
 NAME = "uno"
@@ -58,7 +53,6 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
-    solve_first_problem()
     learnt = monitor.options.learnt
     with monitor:
         for radius, scaled in _RESTARTS:
@@ -66,7 +60,8 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             stall = _Stall(monitor, units)
             hessian = SecantHessian.of(monitor.problem, x, learnt)
             learnt = None  # it may be what has failed
-            result = _run(monitor, x, units, radius, hessian, stall)
+            settings = {"TR_radius": radius * monitor.options.first_step}
+            result = call_uno(monitor, x, units, settings, stall, hessian)
             x = units * np.array(result.primal_solution)
             ending = result.optimization_status.name
             found = result.solution_status.name
@@ -104,7 +99,7 @@ def report_result(
 
 
 @cache
-def solve_first_problem() -> None:
+def _solve_first_problem() -> None:
     """Minimise x^2, once in a process.
 
     Rounding within Uno depends on the first problem that a process has solved: without this one, answers would
@@ -120,15 +115,15 @@ def solve_first_problem() -> None:
     )
     model.set_objective(unopy.MINIMIZE, lambda point: float(point[0] ** 2), write_slope)
     model.set_initial_primal_iterate([0.5])
-    make_backend("filtersqp", {}).optimize(model)
+    _backend({}).optimize(model)
 
 
-def make_backend(preset: str, settings: dict[str, Any]) -> Any:
-    """Make Uno's solver with a preset and settings, silent."""
+def _backend(settings: dict[str, Any]) -> Any:
+    """Uno's own solver with settings, silent."""
     import unopy
 
     backend = unopy.UnoSolver()
-    backend.set_preset(preset)
+    backend.set_preset(settings.pop("preset", "filtersqp"))
     backend.set_logger_stream(io.StringIO())  # Uno would print to standard output
     silent = {"logger": "SILENT", "print_solution": False}
     for key, value in (silent | settings).items():
@@ -190,52 +185,20 @@ class _Stall:
         return stop or self.seen or self.is_lost
 
 
-def _run(
+def call_uno(
     monitor: SolveMonitor,
     x: np.ndarray,
     units: np.ndarray,
-    radius: float,
-    hessian: SecantHessian | None,
-    terminate: _Stall,
+    settings: dict[str, Any],
+    terminate: Callable[..., bool],
+    hessian: SecantHessian | None = None,
 ) -> Any:
-    """One call of Uno, which is untyped; its variables are x in units."""
-    options = monitor.options
-    model = build_model(monitor, x, units, min(options.widening, options.tolerance))
-    if hessian is not None:
-        _set_hessian(model, partial(monitor.hessian, hessian), units)
-    settings = take_settings(options) | {"TR_radius": radius * options.first_step}
-    backend = make_backend("filtersqp", settings)
-    backend.set_termination_callback(terminate)
-    return backend.optimize(model)
-
-
-def take_settings(options: SolverOptions) -> dict[str, Any]:
-    """Return the options that all presets of Uno have."""
-    return {
-        "primal_tolerance": options.tolerance,
-        "dual_tolerance": options.tolerance,
-        "max_iterations": options.max_iterations,
-        "time_limit": float(options.time_limit),
-    }
-
-
-def build_model(
-    monitor: SolveMonitor, x: np.ndarray, units: np.ndarray, widening: float
-) -> Any:
-    """Build Uno's model of the monitor's problem, which begins at x.
-
-    Parameters
-    ----------
-    monitor : SolveMonitor
-    x : (v,) ndarray
-    units : (v,) ndarray
-        The model's variables are x in these units.
-    widening : float
-        See `_spread_bounds`.
-    """
+    """One call of Uno, which is untyped, from x, (v,); its variables are x in units."""
     import unopy
 
+    _solve_first_problem()
     problem = monitor.problem
+    options = monitor.options
     model = unopy.Model(
         unopy.PROBLEM_NONLINEAR,
         len(x),
@@ -257,7 +220,8 @@ def build_model(
         lambda point: monitor.objective(units * point),
         scale(monitor.gradient, units),
     )
-    lower, upper = _spread_bounds(problem.lower, problem.upper, widening)
+    most = min(options.widening, options.tolerance)
+    lower, upper = _spread_bounds(problem.lower, problem.upper, most)
     model.set_constraints(
         len(lower),
         scale(monitor.rows, 1.0),
@@ -268,8 +232,19 @@ def build_model(
         problem.jacobian_columns.tolist(),
         scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
+    if hessian is not None:
+        _set_hessian(model, partial(monitor.hessian, hessian), units)
     model.set_initial_primal_iterate((x / units).tolist())
-    return model
+    settings = {
+        "primal_tolerance": options.tolerance,
+        "dual_tolerance": options.tolerance,
+        "max_iterations": options.max_iterations,
+        "time_limit": float(options.time_limit),
+        **settings,
+    }
+    backend = _backend(settings)
+    backend.set_termination_callback(terminate)
+    return backend.optimize(model)
 
 
 def _spread_bounds(

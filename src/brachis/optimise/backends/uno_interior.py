@@ -12,13 +12,7 @@ import numpy as np
 
 from brachis.optimise.backends.monitor import SolveMonitor, objective_at, residual
 from brachis.optimise.backends.protocol import SolverReport
-from brachis.optimise.backends.uno import (
-    build_model,
-    make_backend,
-    report_result,
-    solve_first_problem,
-    take_settings,
-)
+from brachis.optimise.backends.uno import call_uno, report_result
 
 NAME = "uno_interior"
 _FIRST_GAP = 0.3
@@ -27,13 +21,10 @@ _FIRST_GAP = 0.3
 Programs over the path begin within 1 % of their optimum. With Uno's 0.1 a solve first moves away from it, and 3 of 8
 are not back after 100 iterations; with a third of this, 2 of 8 end up to 0.7 % slower.
 """
-_SMALL_BARRIER = 1e-5
-"""Largest complementarity at which iterates show whether the solve has settled, as for IPOPT."""
 
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
-    solve_first_problem()
     problem = monitor.problem
 
     def terminate(point: np.ndarray, *rest: Any) -> bool:
@@ -42,18 +33,15 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         iterate = np.array(point[: len(x)])  # a restoration appends variables
         objective = objective_at(problem, iterate)
         violation = residual(problem, iterate)  # Uno's is of scaled rows
-        if objective_multiplier > 0.0:
+        if objective_multiplier == 0.0:
+            complementarity = np.inf
+        else:
             monitor.keep(iterate, objective, violation)
-        if objective_multiplier == 0.0 or complementarity > _SMALL_BARRIER:
-            violation = np.inf
-        stop = monitor.between_iterations(objective)
-        return monitor.has_settled(objective, violation) or stop
+        return monitor.ends_interior(objective, violation, complementarity)
 
     share = _FIRST_GAP / max(len(problem.lower), 1)
     barrier = float(np.clip(share * objective_at(problem, x), 1e-9, 0.1))
-    settings = {"barrier_initial_parameter": barrier}
-    backend = make_backend("ipopt", take_settings(monitor.options) | settings)
-    backend.set_termination_callback(terminate)
+    settings = {"preset": "ipopt", "barrier_initial_parameter": barrier}
     with monitor:
-        result = backend.optimize(build_model(monitor, x, np.ones(len(x)), 0.0))
+        result = call_uno(monitor, x, np.ones(len(x)), settings, terminate)
     return report_result(monitor, NAME, result, np.array(result.primal_solution))
