@@ -282,8 +282,8 @@ class Trajectory(Summary):
         """Return a pandas table, a row every `dt` seconds; see `sample`.
 
         Columns: ``t`` (s), ``s``; for every joint ``q_<joint>`` (rad or m), ``qd_``, ``qdd_`` and ``tau_`` (Nm or N, if
-        known); ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed`` (m/s). Needs the
-        extra ``pandas``.
+        known); ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed`` (m/s). Needs
+        the extra ``pandas``.
 
         Raises
         ------
