@@ -36,7 +36,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Self, TypedDict, Unpack
 
 PIP = "python -m pip install"
@@ -396,7 +395,7 @@ class NotInstalledError(InputError):
 class NotBuiltError(BrachisError):
     """The compiled kernel is missing, damaged, or made of other source."""
 
-    def __init__(self, problem: str, script: Path) -> None:
+    def __init__(self, problem: str, script: object) -> None:
         hint = f"Run python {script}; without a C compiler first {PIP} ziglang"
         super().__init__(f"the kernel is not built: {problem}", hint=hint)
 
