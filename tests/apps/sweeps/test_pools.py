@@ -181,7 +181,7 @@ def test_an_executor_plans_many_tasks():
 def cluster(tmp_path):
     """A scheduler's file, and two workers; all end with the test."""
     pytest.importorskip(
-        "distributed", reason="Dask is not installed: pip install 'brachis[cluster]'"
+        "distributed", reason="Dask is not installed: the extra cluster"
     )
     file = tmp_path / "scheduler.json"
     common = ["--scheduler-file", str(file), "--host", "127.0.0.1", "--no-dashboard"]
