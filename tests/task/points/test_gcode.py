@@ -114,7 +114,7 @@ MISTAKES = [
     ),
     ("G0 X1 Y1 Z1\nG4 P2", r"line 2: a dwell is not read: .*; found G4"),
     ("G7 G18\nG0 X1 Y1 Z1", r"line 1: X would be a diameter: .*; found G7"),
-    ("G0 X1 Y1 Z1\n/G1 X2 F10", r"line 2: this is not understood; .*/ is a switch"),
+    ("G0 X1 Y1 Z1\n/G1 X2 F10", r"line 2: this is not understood; .*no / at the start"),
     ("G0 X1 Y1 Z1\nG1 X2 X3 F10", r"line 2: a letter stands twice .*; found X3"),
     ("G0 X1 Y1 Z1\nG1 X2 P2 F10", r"line 2: the letter P of this G1 .*; found P2"),
     ("G0 X1 Y1 Z1\nG1 X2 L2 F10", r"line 2: the letter L of this G1 .*; found L2"),

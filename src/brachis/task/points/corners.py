@@ -63,19 +63,18 @@ def find_corners(
     """
     if len(points) < 3 or points.dimension < 2:
         return ()
-    noisy = scatter.deviation > 0.0
     u = lengths_along(points.position, scatter.deviation)
     spacing = u[-1] / (len(points) - 1)
     direction = 0.02  # rad: what scatter may do to a direction
     for_direction = 12.0 * spacing * (scatter.deviation / direction) ** 2
     near = for_direction ** (1.0 / 3.0)
     width = max(near, 2.0 * tolerance)
-    least = 4 if noisy else 1
+    least = 4 if scatter.deviation > 0.0 else 1
     near_turn = _turning(points.position, u, width, least)
     wide_turn = _turning(points.position, u, 2.0 * width, 2 * least)
     angle = near_turn.angle
     # Between lines that are farther apart a smooth curve turns by more in proportion, a corner by the same angle.
-    growth = wide_turn.distance / np.maximum(near_turn.distance, 1e-12)
+    growth = wide_turn.distance / near_turn.distance
     share = (2.0 + growth) / 3.0
     doubt = _SURE * scatter.deviation * near_turn.uncertainty
     sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < share * (angle - doubt))

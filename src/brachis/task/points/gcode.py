@@ -45,7 +45,6 @@ _REFUSED: Final = {
     "G4": "a dwell is not read: cut the file there and set dwell on the segment",
     "G7": "X would be a diameter: write radii (G8)",
     **dict.fromkeys(("G28", "G30"), "the machine's reference position is not known"),
-    **dict.fromkeys(("G41", "G42"), "cutter compensation is not read"),
     **dict.fromkeys(
         ("G73", "G76", *(f"G{number}" for number in range(81, 90))),
         "canned cycles are not read",
@@ -181,13 +180,10 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
     """Return the numbers of a line by their letters, and its codes, such as G1 or M30."""
     rest = _WORD.sub("", code).strip()
     if rest:
-        is_switched = rest.startswith("/")
         raise machine.wrong(
             "this is not understood",
             repr(rest[:40]),
-            "G-code words, such as G1 X10 F600",
-            "/ is a switch of the machine: remove it, or the line" * is_switched
-            or None,
+            "G-code words, such as G1 X10 F600; no / at the start of a line",
         )
     values: dict[str, float] = {}
     codes = []

@@ -123,8 +123,8 @@ def is_repeated(
     """
     around = np.pad(steps, 1, mode="reflect")
     shorter = np.minimum(around[:-2], around[2:])
-    is_short = (steps < largest) & (steps < 0.01 * shorter)
-    return np.asarray(is_short | (steps < tolerances.LENGTH))
+    is_short = steps < np.minimum(largest, 0.01 * shorter)
+    return is_short | (steps < tolerances.LENGTH)
 
 
 def sum_up(steps: npt.ArrayLike) -> Array:

@@ -412,7 +412,7 @@ def _check_lengths(points: Points, name: str) -> None:
             i,
             f"the {name}'s length is {lengths[i]:.6g}",
             found=str(points.turning[i].tolist()),
-            allowed=f"a{'n' * (name == 'axis')} {name} of length 1",
+            allowed=f"{name} of length 1",
         )
 
 
@@ -441,7 +441,6 @@ def _with_rolls(points: Points) -> Points:
         raise points.wrong(
             i,
             "the tool's axis turns by half a turn from one row to the next",
-            allowed="axes that say which way the tool turns",
             hint="Add rows in between",
         )
     half_turns = np.column_stack([np.cross(before, axes), 1.0 + cosines])
