@@ -81,11 +81,11 @@ def find_corners(
     sharp &= wide_turn.straightness > _STRAIGHT
     # A polygon that turns by this much from one side to the next is not a smooth curve.
     sides = _turning(points.position, u, 0.0, 1)
-    by_scatter = 8.0 * scatter.deviation * sides.uncertainty
-    sharp |= sides.angle > np.maximum(np.deg2rad(50.0), by_scatter)
+    doubt = 8.0 * scatter.deviation * sides.uncertainty
+    sharp |= sides.angle - doubt > np.deg2rad(50.0)
     # A smooth arc, however small it is beside the tolerance, turns little from one side to the next.
-    fine_angle = _turning(points.position, u, near, least).angle
-    sharp &= np.minimum(angle, fine_angle) > np.maximum(LEAST_ANGLE, angle / 4.0)
+    fine = _turning(points.position, u, near, least)
+    sharp &= np.minimum(angle, fine.angle) > np.maximum(LEAST_ANGLE, angle / 4.0)
     peaks = _peaks(angle, sharp, u, width, least)
     # Lines that are longer than scatter asks for miss the corner where the path bends.
     return tuple(
