@@ -19,7 +19,7 @@ from brachis.ik import (
     ik_family,
 )
 from brachis.robot import Robot, task_map_of
-from brachis.robot.task_map import RowsAndYaw
+from brachis.robot.task_map import RowsAndAngle
 from support.chains import Joint, chain_urdf, planar_robot
 
 ROOT = Path(__file__).parents[2]
@@ -116,7 +116,7 @@ def test_yaw_in_another_plane_than_the_joints_is_refused():
     with pytest.raises(
         DecompositionError, match="yaw turns in another plane than the joints"
     ):
-        find(robot, RowsAndYaw(robot, ("x", "y", "yaw"), tool_axis=0), [])
+        find(robot, RowsAndAngle(robot, ("x", "y", "yaw"), tool_axis=0), [])
 
 
 def test_rows_that_the_plane_cannot_tell_apart_are_refused():

@@ -15,7 +15,7 @@ from support.spatial import rail_arm
 ARMS = {
     "3R": (lambda: planar_robot("RRR"), ["x", "y"]),
     "RPRC, one row": (lambda: planar_robot("RPRC", "tilted"), ["z"]),
-    "4R with yaw": (lambda: planar_robot("RRRR", "xz"), ["x", "z", "yaw"]),
+    "4R with yaw": (lambda: planar_robot("RRRR", "xz"), ["x", "z", "pitch"]),
     "3R with yaw, r = 0": (lambda: planar_robot("RRR"), ["y", "x", "yaw"]),
     "gantry": (
         lambda: gantry_robot([(1.0, 0.0, 0.0), (0.0, 1.0, 0.3), (0.2, 0.0, 1.0)]),

@@ -13,7 +13,7 @@ import brachis
 from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
 from brachis.ik.point_recipes import RECIPES, positioning
 from brachis.robot import Robot, task_map_of
-from brachis.robot.task_map import RowsAndYaw
+from brachis.robot.task_map import RowsAndAngle
 from support.chains import Joint, chain_urdf
 from support.effort import QUICK
 from support.factored_bench import Bench
@@ -194,7 +194,7 @@ def test_refusals():
     for space in (
         task_map_of(robot, "pose"),
         task_map_of(robot, ["x", "y"]),
-        RowsAndYaw(robot, ("x", "y", "yaw"), 0),
+        RowsAndAngle(robot, ("x", "y", "yaw"), 0),
     ):
         with pytest.raises(
             NotApplicableError, match="this family solves only the position: x, y and z"

@@ -280,7 +280,7 @@ def planar(quarter):
 @pytest.mark.parametrize("redundant", range(4))
 def test_rows_and_yaw_of_a_plane_that_is_almost_upright(redundant):
     robot = planar(1.5708)
-    space = task_map_of(robot, ["x", "z", "yaw"])
+    space = task_map_of(robot, ["x", "z", "pitch"])
     match = find(robot, space, [robot.joint_names[redundant]])
     assert match.family == "planar"
     assert (

@@ -23,11 +23,14 @@ from support.random_chains import random_model
 POINTS = 11
 CURVES_AND_PATH = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds")
 CASES = {
-    "pose, r = 0": (6, Prescribed()),
-    "pose, r = 2": (8, Prescribed()),
+    "pose, r = 0": (6, Prescribed((0, 1, 2), 3, in_tool_axes=True)),
+    "pose, r = 2": (8, Prescribed((0, 1, 2), 3, in_tool_axes=True)),
     "position, r = 4": (7, Prescribed((0, 1, 2))),
     "one row, r = 2": (3, Prescribed((2,))),
-    "two rows and yaw, r = 1": (4, Prescribed((0, 2), 1, -1.0)),
+    "two rows and pitch, r = 1": (4, Prescribed((0, 2), 1, False, (1, 0, 2), -1.0)),
+    "three rows and yaw, r = 0": (4, Prescribed((2, 0, 1), 1)),
+    "two rows and orientation, r = 1": (6, Prescribed((2, 0), 3)),
+    "orientation, r = 2": (5, Prescribed((), 3)),
 }
 
 
@@ -45,14 +48,11 @@ def motion_in(chain, asked, q, path, tables, curves):
 
 def rates_of(asked, twists):
     """Prescribed rows, (K, m, n), of columns (6, K, n)."""
-    if not asked.axes:
-        return np.moveaxis(twists, 0, 1)
-    rows = [*asked.axes]
-    signs = [1.0] * len(rows)
-    if asked.tool_axis >= 0:
-        rows.append(3 + 3 - sum(asked.axes))
-        signs.append(asked.sign)
-    return np.moveaxis(twists[rows], 0, 1) * np.array(signs)[:, None]
+    turning = [3, 4, 5]
+    if asked.turns == 1:
+        turning = [6 - sum(asked.heading[1:])]
+    rows = [*asked.axes, *turning[: asked.turns]]
+    return np.moveaxis(twists[rows], 0, 1)
 
 
 @pytest.fixture(
@@ -83,7 +83,7 @@ def case(request):
 def test_motion(case):
     chain, asked, q, (xi, xi_ds, _), conditions, (ydot, yddot), found = case
     m = asked.count
-    _, _, twists = chain.tool(q, in_tool_axes=not asked.axes)
+    _, _, twists = chain.tool(q, in_tool_axes=asked.in_tool_axes)
     np.testing.assert_allclose(found.twists, twists, atol=1e-12)
     augmented = np.concatenate([rates_of(asked, twists), conditions.rows], axis=1)
     inverse = np.linalg.inv(augmented)
@@ -97,7 +97,7 @@ def test_motion(case):
     np.testing.assert_allclose(found.gradient, gradient, atol=1e-10)
     qdot = np.einsum("kij,kj->ki", gradient, ydot)
     np.testing.assert_allclose(found.qdot, qdot, atol=1e-10)
-    slopes = tool_derivatives(twists, qdot, 0.0 * qdot, in_tool_axes=not asked.axes)
+    slopes = tool_derivatives(twists, qdot, 0.0 * qdot, in_tool_axes=asked.in_tool_axes)
     bias = np.einsum("kij,kj->ki", rates_of(asked, slopes[0]), qdot)
     sdot = ydot[:, :1]
     wanted = np.concatenate([xi_ds * sdot**2 - bias, 0.0 * right[:, m:]], axis=1)
@@ -115,7 +115,7 @@ def test_derivatives(case):
     _, asked, _, (_, xi_ds, xi_dds), conditions, (ydot, yddot), motion = case
     m = asked.count
     slopes = tool_derivatives(
-        motion.twists, motion.qdot, motion.qddot, in_tool_axes=not asked.axes
+        motion.twists, motion.qdot, motion.qddot, in_tool_axes=asked.in_tool_axes
     )
     V_q, A_q, A_v = (rates_of(asked, own) for own in slopes)  # noqa: N806  (the field's letters)
     gradient = motion.gradient
@@ -161,7 +161,7 @@ def test_singular_slopes(case):
     left = values[:, None] * np.einsum("kji,kj->ki", motion.inverse, vectors)
     rest = np.zeros_like(q)
     slopes, _, _ = tool_derivatives(
-        motion.twists, vectors, rest, in_tool_axes=not asked.axes
+        motion.twists, vectors, rest, in_tool_axes=asked.in_tool_axes
     )
     m = asked.count
     known = np.einsum("ki,kij->kj", left[:, :m], rates_of(asked, slopes))
@@ -174,7 +174,7 @@ def test_singular_slopes(case):
 
 
 def test_rows_that_are_the_same_everywhere_are_given_once():
-    n, asked = 7, Prescribed()
+    n, asked = 7, Prescribed((0, 1, 2), 3, in_tool_axes=True)
     rng = np.random.default_rng(4)
     chain = chain_of(*random_model(n, n))
     row = rng.normal(size=(1, n + 1))

@@ -50,7 +50,7 @@ def work() -> None:
     q, qdot, qddot = rng.normal(size=(3, POINTS, N))
     chain.torques(q, qdot, qddot)
     partials = chain.torque_derivatives(q, qdot, qddot)
-    asked = Prescribed()
+    asked = Prescribed((0, 1, 2), 3, in_tool_axes=True)
     names = ("xi", "xi_ds", "xi_dds", "ydot", "yddot")
     sizes = (6, 6, 6, 2, 2)
     given = {

@@ -57,7 +57,7 @@ def assert_derivatives(curve: Curve, step: float = 1e-5) -> None:
         )
 
 
-XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "yaw"]
+XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "pitch"]
 CURVES: dict[str, tuple[dict[str, Any], list[float], list[str]]] = {
     "line": ({"line": {"to": [1, 2]}}, [0.3, 0.4], XY),
     "line with yaw": ({"line": {"by": [1, 2, -3]}}, [0.3, 0.4, 0.5], XYW),
@@ -210,9 +210,10 @@ def test_yaw_turns_with_the_tangent(turns: float) -> None:
         XYW,
     )
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 40), 1)
-    heading = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    # By the right-hand rule about y, which turns z towards x.
+    heading = -np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     np.testing.assert_allclose(z[:, 2] - 0.7, heading - heading[0], atol=1e-12)
-    assert z[-1, 2] - 0.7 == pytest.approx(2 * np.pi * turns)
+    assert z[-1, 2] - 0.7 == pytest.approx(-2 * np.pi * turns)
     fixed = curve_of({"circle": {"center": [0, 0], "turns": turns}}, [2, 0, 0.7], XYW)
     np.testing.assert_array_equal(
         fixed.derivatives(np.array([0.0, 1.0]), 0)[0, :, 2], 0.7
@@ -283,7 +284,9 @@ def test_a_spline_whose_start_is_stated() -> None:
 
 
 def test_a_site_knows_its_position_rows() -> None:
-    site = SegmentContext("path[0].line", np.array([1.0, 2.0, 3.0]), ("x", "z", "yaw"))
+    site = SegmentContext(
+        "path[0].line", np.array([1.0, 2.0, 3.0]), ("x", "z", "pitch")
+    )
     assert site.positions == ("x", "z")
     np.testing.assert_array_equal(site.position, [1.0, 2.0])
 

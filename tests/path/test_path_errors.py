@@ -127,7 +127,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"circle": {"center": [1, 0], "yaw": "tangent"}},
         XY,
-        ["path[0].circle.yaw: yaw is not a row", "Add yaw"],
+        ["path[0].circle.yaw: the task space has no angle", "Add an angle"],
     ),
     (
         {"arc": {"via": [1, 1], "to": [2, 2]}},
@@ -234,7 +234,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
         XYW,
-        ["path[0].turn: this turn needs", "line: {by: [0, 0, ...]}"],
+        ["path[0].turn: this turn needs", "line: {by: [..., angle]}"],
     ),
 ]
 

@@ -11,8 +11,8 @@ from support.spatial import rail_arm
 
 CASES = [
     ("RPRC", "xy", ["x", "y", "yaw"]),
-    ("RPRC", "xz", ["x", "z", "yaw"]),
-    ("RPRC", "xz", ["z", "x", "yaw"]),
+    ("RPRC", "xz", ["x", "z", "pitch"]),
+    ("RPRC", "xz", ["z", "x", "pitch"]),
     ("RRP", "tilted", ["x", "y", "z"]),
     ("RPR", "tilted", ["z"]),
 ]

@@ -8,9 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import brachis
 from brachis.errors import InputError
 from brachis.robot import Robot, task_map_of
-from support.chains import planar_robot
+from support.chains import ZERO, Joint, chain_urdf, planar_robot
 
 
 @pytest.fixture(scope="module")
@@ -37,43 +38,32 @@ def test_position_rows_are_world_coordinates_in_the_order_asked(rows):
 def test_yaw_of_the_scara_is_the_sum_of_its_angles(scara):
     space = task_map_of(scara, ["x", "y", "yaw"])
     assert space.units == ("m", "m", "rad")
-    assert (space.sign, space.world_axis) == (1.0, 2)
     for q in np.random.default_rng(1).uniform(-1.0, 1.0, (10, 3)):
         assert space.value(q)[2] == pytest.approx(q.sum())
 
 
-@pytest.mark.parametrize(
-    ("plane", "rows", "sign", "axis"),
-    [
-        ("xy", ["x", "y", "yaw"], 1.0, 2),
-        ("xy", ["y", "x", "yaw"], -1.0, 2),
-        ("xz", ["x", "z", "yaw"], -1.0, 1),
-        ("xz", ["z", "x", "yaw"], 1.0, 1),
-    ],
-)
-def test_yaw_turns_from_the_first_row_towards_the_second(plane, rows, sign, axis):
-    robot = planar_robot("RRR", plane)
-    space = task_map_of(robot, rows)
-    assert (space.sign, space.world_axis) == (sign, axis)
-    q = np.array([0.2, 0.3, -0.4])
-    placement = robot.tool_placement(q)
-    first, second = np.eye(3)["xyz".index(rows[0])], np.eye(3)["xyz".index(rows[1])]
-    turn = 0.1
-    # A rotation by `turn` that carries the first axis towards the second.
-    rotation = pin.AngleAxis(turn, np.cross(first, second)).matrix()
-    np.testing.assert_allclose(
-        rotation @ first, np.cos(turn) * first + np.sin(turn) * second, atol=1e-15
-    )
-    turned = space.of_placements(
-        placement.translation[None], (rotation @ placement.rotation)[None]
-    )[0]
-    assert turned[2] - space.value(q)[2] == pytest.approx(turn)
-    # The sign is that of an angular velocity about the positive world axis.
-    spin = pin.AngleAxis(turn, np.eye(3)[axis]).matrix()
-    spun = space.of_placements(
-        placement.translation[None], (spin @ placement.rotation)[None]
-    )[0]
-    assert spun[2] - space.value(q)[2] == pytest.approx(sign * turn)
+MOUNTS = {"roll": (0.0, np.pi / 2, 0.0), "pitch": (np.pi / 2, 0.0, 0.0), "yaw": ZERO}
+
+
+@pytest.mark.parametrize("rows", [["x", "y"], ["z"], [], ["z", "x", "y"]], ids=str)
+@pytest.mark.parametrize("angle", ["roll", "pitch", "yaw"])
+def test_an_angle_turns_about_its_axis_by_the_right_hand_rule(angle, rows):
+    mount = Joint("fixed", rpy=MOUNTS[angle], limit=None)
+    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0)) for _ in range(3)]
+    text = chain_urdf(joints, tool=(0.2, 0.0, 0.0), mount=mount)
+    robot = Robot.from_urdf("chain", urdf_text=text)
+    space = task_map_of(robot, [*rows, angle])
+    upright = robot.tool_placement(np.zeros(3)).rotation
+    assert space.units == ("m",) * len(rows) + ("rad",)
+    rng = np.random.default_rng(1)
+    for turn in rng.uniform(-3.0, 3.0, 5):
+        about = pin.AngleAxis(turn, np.eye(3)[["roll", "pitch", "yaw"].index(angle)])
+        first = rng.normal(size=3)
+        value = space.of_placements(first[None], (about.matrix() @ upright)[None])[0]
+        named = dict(zip("xyz", first, strict=True))
+        np.testing.assert_allclose(value[:-1], [named[row] for row in rows])
+        base = space.of_placements(first[None], upright[None])[0]
+        assert space.difference(value, base)[-1] == pytest.approx(turn)
 
 
 def test_yaw_is_the_direction_of_a_tool_axis(scara):
@@ -115,12 +105,11 @@ def test_a_map_survives_pickling(scara):
     [
         [],
         ["x", "x"],
-        ["yaw"],
         ["x", "w"],
-        ["x", "yaw"],
         ["yaw", "x", "y"],
         ["x", "yaw", "y"],
-        ["x", "y", "z", "yaw"],
+        ["x", "yaw", "pitch"],
+        ["x", "rx"],
     ],
     ids=str,
 )
@@ -128,6 +117,28 @@ def test_rows_that_make_no_sense(scara, rows):
     with pytest.raises(InputError, match="task_space") as caught:
         task_map_of(scara, rows)
     assert caught.value.found == rows
+
+
+@pytest.mark.parametrize(
+    ("rows", "found", "hint"),
+    [
+        (["x", "z", "yaw"], "with j1, j2, j3 about other axes", "[x, z, pitch]"),
+        (["roll"], "[roll], with j1, j2, j3", "task_space: [pitch]"),
+    ],
+)
+def test_an_angle_about_another_axis_names_the_joints_and_the_right_one(
+    rows, found, hint
+):
+    with pytest.raises(InputError, match="the world's") as caught:
+        task_map_of(planar_robot("RRR", "xz"), rows)
+    assert found in str(caught.value)
+    assert hint in caught.value.hint
+
+
+def test_the_angle_of_an_arm_with_a_wrist_is_refused_with_advice():
+    with pytest.raises(InputError, match="yaw is the angle of tools") as caught:
+        task_map_of(brachis.robots.iiwa14, ["x", "y", "z", "yaw"])
+    assert "pose_free_roll" in caught.value.hint
 
 
 def test_yaw_without_a_tool_axis_in_the_plane():

@@ -110,7 +110,7 @@ def test_positions_alone_leave_the_orientation_to_the_segment() -> None:
     path_of(made, POINTS[0], TURNS[0])
 
 
-@pytest.mark.parametrize("rows", [["x", "y"], ["x", "z", "yaw"], "position", ["y"]])
+@pytest.mark.parametrize("rows", [["x", "y"], ["x", "z", "pitch"], "position", ["y"]])
 def test_rows(rows: Any) -> None:
     names = ["x", "y", "z"] if rows == "position" else rows
     write(",".join(names), POINTS[:, : len(names)])

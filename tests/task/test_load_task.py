@@ -376,8 +376,11 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     ({"start": {}}, ["start.joints: this key is required, and missing"]),
     ({"end": "fre"}, ["task: end: ", "found 'fre'", "allowed: free, or a mapping"]),
-    ({"task_space": ["x", "yaw"]}, ["task_space: yaw needs exactly two position rows"]),
-    ({"task_space": ["yaw", "x", "y"]}, ["task_space: yaw needs", "comes last"]),
+    (
+        {"task_space": ["x", "yaw", "roll"]},
+        ["task_space: only one row of rotation", "for example [x, y, z, yaw]"],
+    ),
+    ({"task_space": ["axis", "x", "y"]}, ["task_space: only one", "it comes last"]),
     (
         {"task_space": ["x", "x"]},
         ["task_space: a name occurs twice", "found ['x', 'x']"],

@@ -226,7 +226,7 @@ end: free    # or {{joints: ...}}, in which the tool is at the path's end
 task_space: {space}    # what the path prescribes; {degree}
 
 path:    # segments from the start posture's tool on, in the world frame
-  - line: {{by: {by}}}    # m
+  - line: {{by: {by}}}    # m{units}
   # For a second segment put "blend: 0.01" (m, to round the corner) or "stop: true" below the line before it.
   # Others: arc, circle, spline, csv, ...: docs/task_files.md
 
@@ -265,6 +265,7 @@ def task_text(
     """
     source = Path(robot.source)
     redundant = robot.n - (6 if space == "pose" else len(space))
+    turning = 0 if space == "pose" else len(space) - len(choice.displacement)
     base = f"\n  base_frame: {_inline(robot.base_frame)}"
     name = source.parent.name if source.name == "robot.urdf" else source.name
     # Relative, if the URDF is in a folder near the task file.
@@ -282,7 +283,8 @@ def task_text(
         joints="\n".join(_joint(robot, i, choice.posture[i]) for i in range(robot.n)),
         space=_inline(space),
         degree=f"{write_count(robot.n, 'joint')}: {redundant or 'none is'} redundant",
-        by=_inline(choice.displacement.tolist()),
+        by=_inline(np.pad(choice.displacement, (0, turning)).tolist()),
+        units=", rad" * turning,
     )
 
 

@@ -1,13 +1,14 @@
-"""Rows of positions: chains that move in one plane, and joints that all slide.
+"""Rows of positions, and an angle: chains that move in one plane and along its normal, and joints that all slide.
 
-Planar chains leave one or two joints of any kind to the closed form, or three where yaw is prescribed. With the
-redundant joints held, W0 is the tool while the others are at zero, and W its target in the plane:
+Planar chains leave one or two joints of any kind to the closed form, or three where an angle is prescribed, and a slide
+along the normal where the height is. The height of the tool is that at zero, and what the slides along the normal add.
+With the redundant joints held, W0 is the tool while the others are at zero, and W its target in the plane:
 
     one joint     the row's component of E_a W0 is given:                    a cosine, or a line
     two joints    E_a E_b W0 = W:                                            `move_within_plane`
-    with yaw      E_a E_b E_c = D, where D turns by the angle that yaw asks for, and brings W0 to W
+    an angle      E_a E_b E_c = D, where D turns by what is left of the angle, and brings W0 to W
 
-With yaw one revolute joint leaves a point P of its axis in place and follows from the angle. Two joints are left:
+With an angle one revolute joint leaves a point P of its axis in place and follows from the angle. Two joints are left:
 
     c revolute    E_a E_b P = D P
     a revolute    E_c^-1 E_b^-1 P = D^-1 P
@@ -36,7 +37,7 @@ from brachis.ik.vectors import determinants, nan_where_negative, wrap
 from brachis.kernel import formula
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
-from brachis.robot.task_map import Pose, RowsAndYaw
+from brachis.robot.task_map import RowsAndAngle
 
 _LABELS = {
     "RR": "elbow",
@@ -46,7 +47,7 @@ _LABELS = {
     "R": "swing",
     "P": "slide",
 }
-"""What branches are called after the kinds of the joints that remain when one has been given to yaw."""
+"""What branches are called after the kinds of the joints that remain when one has been given to the angle."""
 
 
 class PlanarSolver(DeterminantSolver, FormulaSolver):
@@ -71,13 +72,29 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         revolute = geometry.revolute
         self._plane = basis
         self._normal = np.cross(*basis)
-        self._rows = np.eye(3)[list(task_map.axes)]
+        rows = np.eye(3)[list(task_map.axes)]
+        heights = rows @ self._normal
+        lifting = _lifting_joints(geometry, self._normal, range(geometry.n))
+        is_height = (np.abs(heights) > 1.0 - tolerances.ANGLE) & bool(lifting)
+        self._columns = np.flatnonzero(~is_height)
+        self._rows = rows[self._columns]
         self._senses = np.where(revolute, np.sign(geometry.axes @ self._normal), 1.0)
+        # How the slides move the tool along the normal.
+        self._lifts = np.where(revolute, 0.0, geometry.axes @ self._normal)
         rest = complement(geometry.n, redundant)
-        kinds = "".join("R" if revolute[i] else "P" for i in rest)
-        self._tool_axis = None
-        if isinstance(task_map, RowsAndYaw):
-            self._tool_axis = task_map.tool_axis
+        self._planar = rest
+        self._lifting = []
+        if is_height.any():
+            self._height_column = int(np.argmax(is_height))
+            self._height_sign = heights[self._height_column]
+            self._height = self._normal @ geometry.tool_position
+            self._lifting = [i for i in lifting if i in rest]
+            self._planar = [i for i in rest if i not in self._lifting]
+        kinds = "".join("R" if revolute[i] else "P" for i in self._planar)
+        self._angle = None
+        if isinstance(task_map, RowsAndAngle):
+            self._angle = task_map
+            self._angle_sense = np.sign(self._normal[task_map.world_axis])
             kinds = "".join(kinds.rsplit("R", 1))
         # Heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
         height = self._normal @ geometry.tool_position
@@ -93,12 +110,12 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         super().__init__(flat, redundant, _LABELS[kinds])
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
-        """Compute det J_nr from velocities in the plane, or along the row, and about the normal."""
+        """Compute det J_nr, but for the slide along the normal, from velocities in the plane and about the normal."""
         screws = self._chain.screws_at(q * self._senses)
-        columns = screws.jacobian_columns(self._joints)
-        directions = self._rows if len(self._joints) == 1 else self._plane
+        columns = screws.jacobian_columns(self._planar)
+        directions = self._rows if len(self._planar) == 1 else self._plane
         rows = np.tensordot(directions, columns[:3], 1)
-        if self._tool_axis is not None:
+        if self._angle is not None:
             turns = np.tensordot(self._normal, columns[3:], 1)
             rows = np.concatenate([rows, turns[None]])
         return determinants(rows)
@@ -107,22 +124,30 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         """Return the non-redundant joints, (K, 2, 1, m)."""
         known = q_r * self._senses[self._redundant]
         screws = self._chain.screws_with(self._redundant, known)
-        joints = screws.pick(self._joints, 1)
+        joints = screws.pick(self._planar, 1)
         tool = screws.tool_position[:, None]
-        rows = targets[:, : len(self._rows)] - self._offset
+        rows = targets[:, self._columns] - self._offset
         goal = (self._lift @ rows.T)[:, None]
         if len(joints) == 1:
             row = self._rows[0][:, None, None]
             values = [joints[0].orbit(tool).component(row, rows[:, 0], 0)]
-        elif self._tool_axis is None:
+        elif self._angle is None:
             values = [*move_within_plane(joints[0], joints[1], tool, goal, 0)]
         else:
-            heading = self._plane @ screws.tool_rotation[:, self._tool_axis]
-            angle = targets[:, 2] - formula.arctan2(heading[1], heading[0])
-            values = self._solve_with_yaw(joints, tool, goal, angle)
+            first, second = self._angle.plane
+            pointer = screws.tool_rotation[:, self._angle.tool_axis]
+            heading = formula.arctan2(
+                self._angle.sign * pointer[second], pointer[first]
+            )
+            angle = self._angle_sense * (targets[:, -1] - heading)
+            values = self._solve_with_angle(joints, tool, goal, angle)
+        for joint in self._lifting:
+            height = self._height_sign * targets[:, self._height_column] - self._height
+            height = height - q_r @ self._lifts[self._redundant]
+            values.insert(self._joints.index(joint), height / self._lifts[joint])
         return self._arrange(np.broadcast_arrays(*values), q_r)
 
-    def _solve_with_yaw(
+    def _solve_with_angle(
         self,
         joints: Sequence[Screw],
         tool: np.ndarray,
@@ -164,6 +189,18 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         return np.swapaxes(answers, 0, 1)[:, :, None]
 
 
+def _lifting_joints(
+    geometry: ChainGeometry, normal: np.ndarray, joints: Sequence[int]
+) -> list[int]:
+    """List which of some joints slide along a normal."""
+    return [
+        i
+        for i in joints
+        if not geometry.revolute[i]
+        and abs(geometry.axes[i] @ normal) > 1.0 - tolerances.ANGLE
+    ]
+
+
 def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
     """Direction to which all revolute axes are parallel and each slide parallel or perpendicular."""
     turning = np.flatnonzero(geometry.revolute)
@@ -199,26 +236,39 @@ def planar(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> PlanarSolver:
     """Fit the family: all joints move in one plane that the prescribed rows can see."""
-    if isinstance(task_map, Pose):
-        raise NotApplicableError("this family does not solve poses")
+    if len(task_map.angles) > 1:
+        raise NotApplicableError("this family does not solve orientations")
     normal = _plane_normal(geometry)
     rows = np.eye(3)[list(task_map.axes)]
+    is_height = np.abs(rows @ normal) > 1.0 - tolerances.ANGLE
+    rest = complement(geometry.n, redundant)
+    inert = _lifting_joints(geometry, normal, range(geometry.n))
+    lifting = [geometry.joint_names[i] for i in inert if i in rest]
+    if inert and is_height.any() and len(lifting) != 1:
+        row = task_map.rows[int(np.argmax(is_height))]
+        raise NotApplicableError(
+            f"{row} needs one slide along it that is not redundant; there is {', '.join(lifting) or 'none'}"
+        )
+    is_height &= bool(inert)
+    rows = rows[~is_height]
     basis = _basis(normal, rows)
     normal = np.cross(*basis)
-    inert = ~geometry.revolute & (
-        np.abs(geometry.axes @ normal) > 1.0 - tolerances.ANGLE
-    )
-    leaves_plane = inert.any() and np.any(np.abs(rows @ normal) > tolerances.ANGLE)
+    leaves_plane = bool(inert) and np.any(np.abs(rows @ normal) > tolerances.ANGLE)
     rank = np.linalg.matrix_rank(rows @ basis.T, tol=tolerances.ANGLE)
-    if leaves_plane or rank < len(rows):
+    if leaves_plane or rank < len(rows) or not len(rows):
         raise NotApplicableError(
             "the prescribed rows do not fit the plane in which the joints move"
         )
-    if isinstance(task_map, RowsAndYaw):
-        if abs(normal[task_map.world_axis]) < 1.0 - tolerances.ANGLE:
-            raise NotApplicableError("yaw turns in another plane than the joints")
-        if not geometry.revolute[complement(geometry.n, redundant)].any():
-            raise NotApplicableError("no revolute joint is left to set yaw")
+    if isinstance(task_map, RowsAndAngle):
+        axis = np.eye(3)[task_map.world_axis]
+        if np.linalg.norm(np.cross(normal, axis)) > tolerances.ANGLE:
+            raise NotApplicableError(
+                f"{task_map.rows[-1]} turns in another plane than the joints"
+            )
+        if len(rows) != 2:
+            raise NotApplicableError("an angle needs both rows of the plane")
+        if not geometry.revolute[rest].any():
+            raise NotApplicableError("no revolute joint is left to set the angle")
     return PlanarSolver(geometry, task_map, redundant, basis)
 
 
@@ -271,7 +321,7 @@ def prismatic(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> PrismaticSolver:
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
-    if isinstance(task_map, Pose | RowsAndYaw):
+    if task_map.angles:
         raise NotApplicableError("prismatic joints do not change orientations")
     turning = [
         geometry.joint_names[i]

@@ -56,7 +56,6 @@ from brachis.ik.screws import ChainGeometry, Screw
 from brachis.ik.vectors import across, angle_about, dot
 from brachis.kernel import formula
 from brachis.robot import TaskMap
-from brachis.robot.task_map import Pose
 
 FRONT = 0
 """Slot of a recipe's first step."""
@@ -363,7 +362,7 @@ def positioning(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> PositioningSolver:
     """Fit the family: the tool's position alone is prescribed, and three joints are left over for it."""
-    if isinstance(task_map, Pose) or len(task_map.axes) != 3:
+    if task_map.angles or len(task_map.axes) != 3:
         raise NotApplicableError("this family solves only the position: x, y and z")
     three = RemainingJoints.of(geometry, redundant, 3)
     return fit(PositioningSolver, geometry, redundant, three, task_map.axes)

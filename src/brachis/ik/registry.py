@@ -36,8 +36,8 @@ from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_ax
 from brachis.ik.solver_checks import check_answers, ranges_to_check
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskMap
-from brachis.robot.task_map import JointSpace
-from brachis.robot.task_map.protocol import AXES, POSE_ROWS
+from brachis.robot.task_map import JointSpace, task_map_of
+from brachis.robot.task_map.protocol import ANGLES, AXES, POSE_ROWS
 
 BUILTIN: tuple[Family, ...] = (
     prismatic,
@@ -404,11 +404,20 @@ def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:
 
 
 def default_task_space(robot: Robot) -> str | list[str]:
-    """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves."""
+    """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves.
+
+    Where all joints that turn are along one axis of the world, the angle about it is the fourth row.
+    """
     geometry = ChainGeometry.of(robot)
     sizes = np.abs(geometry.axes)
     along = np.where(geometry.revolute[:, None], 1.0 - sizes, sizes)
     normals = np.flatnonzero(np.all(along < tolerances.LENGTH, axis=0))
     if len(normals):
         return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
+    is_along = along < tolerances.LENGTH
+    for axis in np.flatnonzero(is_along[geometry.revolute].all(axis=0)):
+        rows = [*AXES, ANGLES[axis]]
+        jacobians = task_map_of(robot, rows).sample_jacobians()
+        if np.linalg.matrix_rank(jacobians, tol=tolerances.WRITTEN).max() == len(rows):
+            return rows
     return "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])

@@ -55,24 +55,31 @@ static long write_task(
     double miss[6] = {0};
     const selection chosen = select_parts(asked);
     long count = chosen.count;
-    if (asked->is_pose) {
+    double *turned = miss + asked->rows;
+    for (long i = 0; i < asked->rows; i++) {
+        miss[i] = target[i] - position[asked->axes[i]];
+    }
+    if (asked->turns == 1) {
+        const double *axis = R[asked->tool_axis];
+        double off = target[count - 1] - atan2(asked->sign * axis[asked->second], axis[asked->first]);
+        *turned = off - TURN * floor(off / TURN + 0.5);
+    } else if (asked->turns) {
+        const double *wanted = target + asked->rows;
         double to[9];
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) {
-                miss[i] += R[i][j] * (target[j] - position[j]);
-                to[3 * i + j] = R[i][0] * target[3 + j] + R[i][1] * target[6 + j] + R[i][2] * target[9 + j];
+                to[3 * i + j] = R[i][0] * wanted[j] + R[i][1] * wanted[3 + j] + R[i][2] * wanted[6 + j];
             }
         }
-        logarithm(to, miss + 3);
-    } else {
-        for (long i = 0; i < asked->rows; i++) {
-            miss[i] = target[i] - position[asked->axes[i]];
-        }
-        if (asked->tool_axis >= 0) {
-            const double *axis = R[asked->tool_axis];
-            double yaw = atan2(axis[asked->axes[1]], axis[asked->axes[0]]);
-            double off = target[count - 1] - yaw;
-            miss[count - 1] = off - TURN * floor(off / TURN + 0.5);
+        logarithm(to, turned);
+        double shift[3] = {miss[0], miss[1], miss[2]};
+        double vector[3] = {turned[0], turned[1], turned[2]};
+        for (int i = 0; i < 3; i++) {
+            if (asked->in_tool_axes) {
+                miss[i] = R[i][0] * shift[0] + R[i][1] * shift[1] + R[i][2] * shift[2];
+            } else {
+                turned[i] = R[0][i] * vector[0] + R[1][i] * vector[1] + R[2][i] * vector[2];
+            }
         }
     }
     for (long row = 0; row < count; row++) {
@@ -133,7 +140,7 @@ void brachis_newton(
             for (long i = 0; i < n; i++) {
                 posture[i] = (pack){q[0][i], q[1][i], q[2][i], q[3][i]};
             }
-            placement tool = place_tool(arm, posture, asked->is_pose != 0, columns);
+            placement tool = place_tool(arm, posture, asked->in_tool_axes != 0, columns);
             for (int lane = 0; lane < LANES; lane++) {
                 if (!open[lane]) {
                     continue;

@@ -28,48 +28,57 @@ class _Prescribed(ctypes.Structure):
     """`prescribed` of tool.h."""
 
     _fields_ = [
-        ("is_pose", ctypes.c_long),
+        ("in_tool_axes", ctypes.c_long),
         ("rows", ctypes.c_long),
         ("axes", ctypes.c_long * 3),
+        ("turns", ctypes.c_long),
         ("tool_axis", ctypes.c_long),
+        ("first", ctypes.c_long),
+        ("second", ctypes.c_long),
         ("sign", ctypes.c_double),
     ]
 
 
 @dataclass(frozen=True)
 class Prescribed(Structured):
-    """What of the tool is prescribed: its pose, or rows of its position and perhaps yaw.
+    """What of the tool is prescribed: rows of its position, and an angle or its orientation; or its pose.
 
     Attributes
     ----------
     axes : tuple of int
-        World axes of the position rows; none for a pose.
-    tool_axis : int
-        Axis of the tool whose direction in the plane of the two rows is yaw; -1 without yaw.
+        World axes of the position rows.
+    turns : {0, 1, 3}
+        Rows of rotation: none, an angle about a world axis, or the orientation.
+    in_tool_axes : bool
+        Whether the rows are motions along and about the tool's axes; only of a pose.
+    heading : tuple of int
+        Of an angle: the tool's axis, and the two world axes in whose plane its direction is the angle.
     sign : float
-        Of yaw about the third world axis.
+        Of the second world axis.
     """
 
-    axes: tuple[int, ...] = ()
-    tool_axis: int = -1
+    axes: tuple[int, ...]
+    turns: int = 0
+    in_tool_axes: bool = False
+    heading: tuple[int, int, int] = (0, 0, 1)
     sign: float = 1.0
 
     @property
     def count(self) -> int:
         """How many rows are prescribed."""
-        if not self.axes:
-            return 6
-        return len(self.axes) + (self.tool_axis >= 0)
+        return len(self.axes) + self.turns
 
     @property
     def coordinates(self) -> int:
-        """How many task coordinates they have: of a pose position and rotation matrix."""
-        return self.count if self.axes else 12
+        """How many task coordinates they have: of an orientation the rotation matrix."""
+        return len(self.axes) + (9 if self.turns == 3 else self.turns)
 
     def _make_structure(self) -> _Prescribed:
         axes = (ctypes.c_long * 3)(*self.axes)
         count = len(self.axes)
-        return _Prescribed(not count, count, axes, self.tool_axis, self.sign)
+        return _Prescribed(
+            self.in_tool_axes, count, axes, self.turns, *self.heading, self.sign
+        )
 
 
 def find_postures(

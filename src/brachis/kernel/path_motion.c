@@ -84,7 +84,7 @@ void brachis_path_motion(path_motion *own)
         read_block(own->q, count, n, k, posture);
         read_block(own->ydot, count, c, k, ydot);
         read_block(own->yddot, count, c, k, yddot);
-        place_tool(arm, posture, asked->is_pose != 0, columns);
+        place_tool(arm, posture, asked->in_tool_axes != 0, columns);
         for (long i = 0; i < r * n; i++) {
             long at = i + i / n;
             inverse[m * n + i] = own->rows_step ? gather(own->rows, count, own->rows_step, k, at) : all(own->rows[at]);
@@ -122,7 +122,7 @@ void brachis_path_motion(path_motion *own)
         }
 
         /* qddot = G yddot + J_aug^-1 (xi_ds sdot^2 - Jdot qdot; -2 C' qdot sdot - e' sdot^2) */
-        twist bias = bias_of(n, columns, rate, asked->is_pose != 0);
+        twist bias = bias_of(n, columns, rate, asked->in_tool_axes != 0);
         pack sdot = ydot[0];
         for (long row = 0; row < m; row++) {
             pack wanted = gather(own->xi_ds, count, m, k, row) * sdot * sdot;
@@ -174,7 +174,7 @@ void brachis_path_derivatives(path_motion *own)
         for (long i = 0; i < n; i++) {
             columns[i] = read_twist(own->twists, count, n, k, i);
         }
-        differentiate_tool(n, columns, rate, more, asked->is_pose != 0, slopes, by_q, by_qdot);
+        differentiate_tool(n, columns, rate, more, asked->in_tool_axes != 0, slopes, by_q, by_qdot);
         for (long row = 0; row < m; row++) {
             for (long i = 0; i < n; i++) {
                 V[row * n + i] = chosen_part(&slopes[i], &chosen, row);
@@ -335,7 +335,7 @@ void brachis_singular_slopes(
                 u[j] += value * inverse[i * n + j] * v[i];
             }
         }
-        differentiate_tool(n, columns, v, still, asked->is_pose != 0, slopes, unused_q, unused_qdot);
+        differentiate_tool(n, columns, v, still, asked->in_tool_axes != 0, slopes, unused_q, unused_qdot);
         for (long row = 0; row < m; row++) {
             for (long i = 0; i < n; i++) {
                 found[i] += u[row] * chosen_part(&slopes[i], &chosen, row);

@@ -130,7 +130,7 @@ void brachis_postures(path_motion *own)
     long n = own->arm->joints;
     long m = select_parts(own->asked).count;
     long r = n - m;
-    long coordinates = own->asked->is_pose ? 12 : m;
+    long coordinates = own->asked->turns == 3 ? own->asked->rows + 9 : m;
     if (own->reference) {
         solve_chart(own, n, r, coordinates);
     }

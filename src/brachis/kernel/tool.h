@@ -5,14 +5,16 @@
 
 #include "chain.h"
 
-/* What is prescribed: the pose of the tool (`is_pose`), or `rows` of its position along the world's axes, and behind them,
-if `tool_axis` is not negative, yaw: the direction of this axis of the tool in the plane of the two rows. */
+/* What of the tool is prescribed: `rows` of its position along the world's axes, and behind them `turns` = 0, 1 or 3 rows of
+rotation. One is an angle about an axis of the world: that of an axis of the tool in the plane of two axes of the world, of which
+the second counts with a sign. All six may be in the axes of the tool, for a pose. */
 typedef struct {
-    long is_pose;
+    long in_tool_axes;
     long rows;
     long axes[3];
-    long tool_axis;
-    double sign; /* of yaw about the world's third axis */
+    long turns;
+    long tool_axis, first, second;
+    double sign;
 } prescribed;
 
 /* A part of a motion: linear along three axes, then angular about them. */
@@ -22,28 +24,24 @@ static inline pack part_of(const twist *a, long part)
     return parts[part];
 }
 
-/* Parts of the tool's motion that are prescribed, and their signs. */
+/* Parts of the tool's motion that are prescribed. */
 typedef struct {
     long count, parts[6];
-    double signs[6];
 } selection;
 
 static inline selection select_parts(const prescribed *asked)
 {
-    selection chosen = {asked->is_pose ? 6 : asked->rows, {0}, {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}};
+    selection chosen = {asked->rows + asked->turns, {0}};
     for (long i = 0; i < chosen.count; i++) {
-        chosen.parts[i] = asked->is_pose ? i : asked->axes[i];
-    }
-    if (!asked->is_pose && asked->tool_axis >= 0) {
-        chosen.parts[chosen.count] = 6 - asked->axes[0] - asked->axes[1];
-        chosen.signs[chosen.count++] = asked->sign;
+        long turn = asked->turns == 1 ? 6 - asked->first - asked->second : 3 + i - asked->rows;
+        chosen.parts[i] = i < asked->rows ? asked->axes[i] : turn;
     }
     return chosen;
 }
 
 static inline pack chosen_part(const twist *a, const selection *chosen, long row)
 {
-    return chosen->signs[row] * part_of(a, chosen->parts[row]);
+    return part_of(a, chosen->parts[row]);
 }
 
 /* Placement: position, and columns of the rotation. */

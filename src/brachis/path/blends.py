@@ -14,7 +14,6 @@ from brachis.path.curves import SplineCurve
 from brachis.path.joins import Join
 from brachis.path.pose import (
     LEAST_QUALITY,
-    POSITIONS,
     least_quality,
     quaternion_curve,
     rotations,
@@ -57,7 +56,7 @@ def blend_rows(join: Join, size: float) -> Curve:
     Raises
     ------
     PathError
-        The blend is longer than half of a neighbour, or (nearly) stops or reverses; or a neighbour moves yaw alone.
+        The blend is longer than half of a neighbour, or (nearly) stops or reverses; or an angle alone moves.
     """
     _check_neighbours(join, size)
     return _blend(join, *join.sides(size))
@@ -75,7 +74,7 @@ def blend_poses(join: Join, size: float) -> Curve:
     """
     _check_neighbours(join, size)
     start, end = map(_with_quaternion, join.sides(size))
-    end[:, POSITIONS:] *= _sign(join, size)
+    end[:, -4:] *= _sign(join, size)
     columns = _blend(join, start, end)
     _, least = least_quality(columns)
     if least < LEAST_QUALITY:
@@ -143,8 +142,8 @@ def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
 
 
 def _with_quaternion(pose: Array) -> Array:
-    """Return the derivatives of position and quaternion, (4, 7), from those of a pose, (4, 12)."""
-    return np.concatenate([pose[:, :POSITIONS], quaternion_derivatives(pose)], axis=1)
+    """Return the derivatives of position and quaternion, (4, p + 4), from those of a pose, (4, p + 9)."""
+    return np.concatenate([pose[:, :-9], quaternion_derivatives(pose)], axis=1)
 
 
 def _sign(join: Join, size: float) -> float:

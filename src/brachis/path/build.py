@@ -11,7 +11,7 @@ from brachis.common.words import write_apart
 from brachis.errors import StartError
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
 from brachis.path.joins import find_joins, refuse_corners
-from brachis.path.pose import POSITIONS, PosePath, rotations
+from brachis.path.pose import OrientedPath, PosePath, rotations
 from brachis.path.protocol import Array, Curve
 from brachis.path.sequence import Path, PathFrame, Piece
 from brachis.robot import Robot, TaskMap
@@ -23,7 +23,12 @@ from brachis.robot.plausibility import (
     reach,
     turn_hint,
 )
-from brachis.robot.task_map.protocol import POSE_ROWS, joints_of, position_rows
+from brachis.robot.task_map.protocol import (
+    POSE_ROWS,
+    TURN_ROWS,
+    joints_of,
+    position_rows,
+)
 from brachis.task import Segment, Task
 
 
@@ -39,11 +44,11 @@ def build_path(
     ----------
     segments : sequence of Segment
         The segments of a task, at least one.
-    start : array_like, shape (m,) or (12,)
-        Task coordinates at the start posture, m and rad; of a pose the position and the rotation matrix row by row.
+    start : array_like, shape (c,)
+        Task coordinates at the start posture, m and rad; of an orientation the rotation matrix row by row.
     task_space_rows : sequence of str
-        Rows of the task space, out of x, y, z and yaw, where yaw comes last; x, y, z, rx, ry, rz for poses; or the rows
-        of all joints (`brachis.robot.task_map.protocol.joint_rows`).
+        Rows of the task space, out of x, y, z and behind them one of roll, pitch, yaw, or rx, ry, rz for orientations;
+        or the rows of all joints (`brachis.robot.task_map.protocol.joint_rows`).
     frame : PathFrame, optional
         Frame in which the segments are given; the world's unless given. The start is in the world either way.
 
@@ -51,7 +56,7 @@ def build_path(
     -------
     Path
         The path in the world, three times continuously differentiable in s but for its stops. For poses `PosePath`,
-        whose samples have the body twist.
+        whose samples have the body twist; for other orientations `OrientedPath`.
 
     Raises
     ------
@@ -72,12 +77,12 @@ def build_path(
     coordinates = RowCoordinates(rows)
     if joints_of(rows):
         coordinates = JointCoordinates(rows)
-    elif rows == POSE_ROWS:
-        path_type = PosePath
-        coordinates = PoseCoordinates()
+    elif rows[-3:] == TURN_ROWS:
+        path_type = PosePath if rows == POSE_ROWS else OrientedPath
+        coordinates = PoseCoordinates(position_rows(rows))
         # The nearest rotation: the polar decomposition without its stretch.
         left, _, right = np.linalg.svd(rotations(point))
-        point[POSITIONS:] = (left @ right).ravel()
+        point[-9:] = (left @ right).ravel()
     if frame is not None:
         point = frame.to_frame(point)
     curves: list[Curve] = []

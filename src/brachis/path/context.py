@@ -82,7 +82,7 @@ class SegmentContext:
             key,
             found=found,
             allowed="a motion away from the segment's start",
-            hint="With task_space: pose, a segment turn: {...} turns the tool on the spot",
+            hint="With task_space: pose or axis, a segment turn: {...} turns the tool on the spot",
         )
 
     def wrong(
@@ -104,4 +104,4 @@ def place(rows: Sequence[str], point: Array) -> str:
 def stands_still(curve: Curve, positions: int) -> bool:
     """Return whether the position rows, the first ones, do not move along a curve."""
     ends = curve.derivatives(curve.knots, 0)[0, :, :positions]
-    return bool(np.ptp(ends, axis=0).max() < tolerances.LENGTH)
+    return bool(np.ptp(ends, axis=0).max(initial=0.0) < tolerances.LENGTH)

@@ -25,7 +25,7 @@ from brachis.path.curves import (
 )
 from brachis.path.joins import pose_corner, row_corner
 from brachis.path.orientation import orientation_along, turn_of
-from brachis.path.pose import POSITIONS, pose_curve, rotations
+from brachis.path.pose import pose_curve, rotations
 from brachis.path.protocol import Array, Curve, MappedCurve
 from brachis.path.splines import (
     bspline_curve,
@@ -33,7 +33,8 @@ from brachis.path.splines import (
     pose_spline,
     spline_through,
 )
-from brachis.robot.task_map.protocol import AXES, joints_of
+from brachis.robot.task_map.protocol import joints_of
+from brachis.task.orientation import AlongTangent
 from brachis.task.point_data import PointFile
 from brachis.task.segments import (
     ArcCenter,
@@ -107,7 +108,7 @@ class RowCoordinates:
                 f"this {key} needs a task space of poses",
                 found=f"task_space [{', '.join(self.rows)}]",
                 where=f"path[{index}].{key}",
-                hint="Set task_space: pose, or turn yaw by line: {by: [0, 0, ...]}",
+                hint="Set task_space: pose, or turn yaw by line: {by: [..., angle]}",
             )
         return BUILDERS[type(segment.shape)](segment.shape, context)
 
@@ -153,17 +154,16 @@ def _permute(columns: np.ndarray, _sigma: Array, derivatives: Array) -> Array:
 
 @dataclass(frozen=True)
 class PoseCoordinates(RowCoordinates):
-    """The twelve coordinates of poses."""
+    """Rows of the position, then the rotation matrix row by row; `rows` are those of the position."""
 
-    rows: tuple[str, ...] = AXES
     corner = staticmethod(pose_corner)
     blend = staticmethod(blend_poses)
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """Return the curve of position and orientation along a segment."""
-        position = start[:POSITIONS]
+        position = start[: len(self.rows)]
         rotation = rotations(start)
-        context = SegmentContext(f"path[{index}].{segment.kind}", position, AXES)
+        context = SegmentContext(f"path[{index}].{segment.kind}", position, self.rows)
         if isinstance(segment, TurnSegment):
             turn = turn_of(segment.turn, rotation, context.key)
             if abs(turn.angle) < tolerances.LENGTH:
@@ -172,8 +172,14 @@ class PoseCoordinates(RowCoordinates):
                     found="0 degrees",
                     allowed="an orientation that differs from the one before",
                 )
-            still = LineCurve(position, np.zeros(POSITIONS), abs(turn.angle))
+            still = LineCurve(position, np.zeros_like(position), abs(turn.angle))
             return pose_curve(still, turn.over(still.length))
+        if not self.rows:
+            raise context.wrong(
+                "this segment moves the position, which is not in the task space",
+                found=segment.kind,
+                allowed="turn: {rotate: ...} or turn: {to: ...}",
+            )
         shape = segment.shape
         if isinstance(shape, SplineThrough) and shape.orientations is not None:
             return pose_spline(shape, context, rotation)
@@ -181,5 +187,8 @@ class PoseCoordinates(RowCoordinates):
             return pose_bspline(shape, context, rotation)
         curve = BUILDERS[type(shape)](shape, context)
         key = f"path[{index}].orientation"
+        turns = segment.orientation
+        if turns == "tangent" or isinstance(turns, AlongTangent):
+            context.need_rows("an orientation along the tangent", 3)
         turning = orientation_along(segment.orientation, curve, rotation, key)
         return pose_curve(curve, turning)

@@ -10,6 +10,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.path.context import SegmentContext
 from brachis.path.protocol import Array
+from brachis.robot.task_map.protocol import ANGLES, AXES
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,
@@ -36,8 +37,8 @@ class SplineCurve:
     spline : BSpline
         The spline with values of shape (m,).
     length : float
-        Range of sigma; of waypoints the cumulative chord length of the position rows, m (of yaw, rad, where they stand
-        still).
+        Range of sigma; of waypoints the cumulative chord length of the position rows, m (of the angle, rad, where they
+        stand still).
     knots : ndarray
         Values of sigma between which the spline is a polynomial; of waypoints their chord lengths.
     """
@@ -60,7 +61,7 @@ class LineCurve:
     start : ndarray, shape (m,)
         Task coordinates at its start.
     slope : ndarray, shape (m,)
-        Task coordinates per unit sigma; of norm 1 in the position rows, or in yaw where they stand still.
+        Task coordinates per unit sigma; of norm 1 in the position rows, or in the angle where they stand still.
     length : float
         Range of sigma, m (rad where the position stands still).
     """
@@ -121,7 +122,7 @@ class ArcCurve:
     Attributes
     ----------
     center : ndarray, shape (m,)
-        Centre, m; where yaw is a row, yaw at the start, rad.
+        Centre, m; where an angle is a row, that at the start, rad.
     outward, forward : ndarray, shape (m,)
         From the centre to the start, and in the direction of the turn there; both as long as the radius, m.
     length : float
@@ -129,7 +130,7 @@ class ArcCurve:
     turn : float
         Angle per unit sigma, rad/m.
     slope : ndarray, shape (m,)
-        Climb along the axis per unit sigma; of yaw rad/m.
+        Climb along the axis per unit sigma; of an angle rad/m.
     """
 
     center: Array
@@ -164,7 +165,7 @@ class ArcCurve:
 
 
 def _arc(center: Array, outward: Array, forward: Array, angle: float) -> ArcCurve:
-    """Return the arc by an angle, rad, without climb or yaw."""
+    """Return the arc by an angle, rad, without climb or angle."""
     radius = float(np.linalg.norm(outward))
     nothing = np.zeros_like(center)
     return ArcCurve(center, outward, forward, radius * angle, 1.0 / radius, nothing)
@@ -175,13 +176,13 @@ def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
     angle = float(np.deg2rad(shape.angle_deg))
     if abs(angle) < tolerances.LENGTH:
         raise context.zero_length(".angle_deg", shape.angle_deg)
-    return _with_yaw(_about_center(shape, angle, context), shape.yaw, context)
+    return _with_angle(_about_center(shape, angle, context), shape.yaw, context)
 
 
 def circle(shape: CircleTurns, context: SegmentContext) -> ArcCurve:
     """Return the turns about a centre."""
     arc = _about_center(shape, 2 * np.pi * shape.turns, context)
-    return _with_yaw(arc, shape.yaw, context)
+    return _with_angle(arc, shape.yaw, context)
 
 
 def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
@@ -217,13 +218,13 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     end = to_end - to_center
     angle = float(np.arctan2(end @ forward, end @ outward) % (2 * np.pi))
     arc = _arc(start + to_center, outward, forward, angle)
-    return _with_yaw(arc, shape.yaw, context)
+    return _with_angle(arc, shape.yaw, context)
 
 
 def _about_center(
     shape: ArcCenter | CircleTurns | HelixTurns, angle: float, context: SegmentContext
 ) -> ArcCurve:
-    """Return the arc by a signed angle, rad, about the centre of a shape; yaw is left out."""
+    """Return the arc by a signed angle, rad, about the centre of a shape; an angle is left out."""
     context.need_rows("an arc", 2, 3)
     center = context.coordinates(shape.center, "center", context.positions)
     outward = context.position - center
@@ -285,25 +286,40 @@ def _normal(
     return unit
 
 
-def _with_yaw(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
-    """Return the arc with the yaw that the segment asks for."""
+def _with_angle(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
+    """Return the arc with the angle that the segment asks for, where the task space has one."""
     tangent = turning == "tangent"
-    if "yaw" in context.rows:
-        sense = np.sign(np.linalg.det([arc.outward, arc.forward]))
+    angle = context.rows[-1]
+    if angle in ANGLES:
+        sense = 0.0
+        if tangent:
+            sides = np.zeros((2, 3))
+            sides[:, [AXES.index(row) for row in context.positions]] = [
+                arc.outward,
+                arc.forward,
+            ]
+            sense = float(np.cross(*sides)[ANGLES.index(angle)] * arc.turn**2)
+            if abs(sense) < 1.0 - tolerances.WRITTEN:
+                raise context.wrong(
+                    f"the arc is in another plane than that in which {angle} turns",
+                    ".yaw",
+                    found="tangent",
+                    allowed="fixed",
+                )
         return replace(
             arc,
             center=np.append(arc.center, context.start[-1]),
             outward=np.append(arc.outward, 0.0),
             forward=np.append(arc.forward, 0.0),
-            slope=np.append(arc.slope, sense * arc.turn if tangent else 0.0),
+            slope=np.append(arc.slope, sense * arc.turn),
         )
     if tangent:
         raise context.wrong(
-            "yaw is not a row of the task space",
+            "the task space has no angle",
             ".yaw",
             found="tangent",
             allowed="fixed",
-            hint="Add yaw to task_space, or with task_space: pose set orientation: tangent in the segment",
+            hint="Add an angle to task_space, or with task_space: pose set orientation: tangent in the segment",
         )
     return arc
 
@@ -316,4 +332,5 @@ def helix(shape: HelixTurns, context: SegmentContext) -> ArcCurve:
     rise = shape.turns * shape.pitch * arc.normal
     length = float(np.hypot(arc.length, np.linalg.norm(rise)))
     turn = arc.turn * arc.length / length
-    return replace(arc, length=length, turn=turn, slope=rise / length)
+    climbing = replace(arc, length=length, turn=turn, slope=rise / length)
+    return _with_angle(climbing, "fixed", context)

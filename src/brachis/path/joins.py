@@ -11,10 +11,9 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import PathError
-from brachis.kernel import body_twists
 from brachis.path.context import place, stands_still
-from brachis.path.pose import POSITIONS
 from brachis.path.protocol import Array, Curve
+from brachis.path.rotations import angular_rates
 from brachis.robot.task_map.protocol import joints_of, position_rows
 
 
@@ -140,8 +139,8 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
         if corner > 0.01 * abs(new_speed - speed):
             moved = np.linalg.norm((after - before)[1, : join.positions])
-            in_yaw = "" if moved > tolerances.WRITTEN else " in yaw alone"
-            return f"a corner of {np.rad2deg(corner):.4g} degrees{in_yaw}"
+            alone = "" if moved > tolerances.WRITTEN else f" in {join.rows[-1]} alone"
+            return f"a corner of {np.rad2deg(corner):.4g} degrees{alone}"
         return f"the parameter's speed changing from {speed:.6g} to {new_speed:.6g}"
     if jumps[2] > tolerances.WRITTEN:
         return f"a curvature jump of {np.linalg.norm(after[2] - before[2]):.4g} 1/m"
@@ -175,7 +174,7 @@ def angle_between(one: Array, other: Array) -> float:
 def pose_corner(join: Join) -> Corner | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
     on_the_spot = [
-        stands_still(curve, POSITIONS) for curve in (join.first, join.second)
+        stands_still(curve, join.positions) for curve in (join.first, join.second)
     ]
     if on_the_spot[0] != on_the_spot[1]:
         return Corner(
@@ -184,7 +183,7 @@ def pose_corner(join: Join) -> Corner | None:
             f"Turn the tool along a segment, by its orientation, or set {join.stopping}",
         )
     before, after = join.sides()
-    jump = _mismatch(join, before[:, :POSITIONS], after[:, :POSITIONS])
+    jump = _mismatch(join, before[:, : join.positions], after[:, : join.positions])
     if jump:
         return Corner(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
@@ -200,12 +199,12 @@ def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str
     Parameters
     ----------
     join : Join
-    before, after : ndarray, shape (4, 12)
+    before, after : ndarray, shape (4, c)
         Derivatives of the coordinates of the pose by sigma at the join.
     unit : str
         Unit of sigma.
     """
-    old, new = (body_twists(one)[:, POSITIONS:] for one in (before, after))
+    old, new = (angular_rates(one) for one in (before, after))
     jumps = np.linalg.norm(new - old, axis=1)
     allowed = tolerances.WRITTEN * max(float(np.linalg.norm(old[0])), 1.0)
     large = np.flatnonzero(jumps * join.shorter ** np.arange(3.0) > allowed)

@@ -1,4 +1,4 @@
-"""Paths of poses: curves of their twelve coordinates, and the body twist along them."""
+"""Paths of poses, or of fewer rows of the position and the orientation: curves of their coordinates, and the twist."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 
-from brachis.common.arrays import spread
+from brachis.common.arrays import apply_each, spread
 from brachis.kernel import body_twists, rotation_derivatives
 from brachis.path.protocol import Array, Curve, MappedCurve, Orientation, PathSample
+from brachis.path.rotations import angular_rates
 from brachis.path.sequence import Path
 
-POSITIONS = 3
 LEAST_QUALITY = 0.5
 """Quality of interpolated quaternions below which the tool turns quite otherwise than its neighbours ask for."""
 
@@ -32,8 +32,28 @@ class PosePath(Path):
         return PathSample(derivatives[0], *body_twists(derivatives))
 
 
+class OrientedPath(Path):
+    """A path of rows of the position and the orientation, whose samples have angular velocities in the world."""
+
+    def sample(self, s: Sequence[float] | Array) -> PathSample:
+        """Return the path at K values of s, shape (K,); beyond its ends as the first or last piece continues.
+
+        With the angular velocity w along the tool's axes that in the world is R w. Its derivatives are R w', and
+        R (w'' + w x w').
+        """
+        derivatives = self.derivatives(s)
+        velocity, rate, bend = angular_rates(derivatives)
+        bend = bend + np.cross(velocity, rate)
+        rotation = rotations(derivatives[0])
+        turning = np.array(
+            [apply_each(rotation, one) for one in (velocity, rate, bend)]
+        )
+        moving = derivatives[1:, :, : self.positions]
+        return PathSample(derivatives[0], *np.concatenate([moving, turning], axis=-1))
+
+
 def pose_curve(position: Curve, orientation: Orientation) -> MappedCurve:
-    """Return the twelve coordinates of a position, three columns, m, and an orientation over the same parameter."""
+    """Return the coordinates of a position, m, and an orientation over the same parameter."""
     return MappedCurve(position, partial(_with_orientation, orientation))
 
 
@@ -42,7 +62,7 @@ def _with_orientation(orientation: Orientation, sigma: Array, position: Array) -
 
 
 def quaternion_curve(columns: Curve) -> MappedCurve:
-    """Return the twelve coordinates of a position and a quaternion, which need not have unit length.
+    """Return the coordinates of a position and a quaternion, which need not have unit length.
 
     Divided by its length the quaternion is that of the orientation. This construction does not depend on the choice of
     the world frame or the tool frame: others multiply all quaternions by a unit quaternion, which commutes with it.
@@ -50,14 +70,14 @@ def quaternion_curve(columns: Curve) -> MappedCurve:
     Parameters
     ----------
     columns : Curve
-        x, y, z, then the quaternion w, x, y, z: seven columns.
+        Rows of the position, then the quaternion w, x, y, z.
     """
     return MappedCurve(columns, _from_quaternions)
 
 
 def _from_quaternions(_sigma: Array, columns: Array) -> Array:
-    rotation = rotation_derivatives(columns[..., POSITIONS:])
-    return _coordinates(columns[..., :POSITIONS], rotation)
+    rotation = rotation_derivatives(columns[..., -4:])
+    return _coordinates(columns[..., :-4], rotation)
 
 
 def least_quality(columns: Curve) -> tuple[float, float]:
@@ -68,7 +88,7 @@ def least_quality(columns: Curve) -> tuple[float, float]:
 
     def quality(sigma: Array) -> Array:
         """Return the quality of the quaternions, (K,), 1 at unit length."""
-        quaternions = columns.derivatives(sigma, 0)[0, :, POSITIONS:]
+        quaternions = columns.derivatives(sigma, 0)[0, :, -4:]
         lengths = np.linalg.norm(quaternions, axis=1)
         return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
 
@@ -97,8 +117,8 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
 
 
 def rotations(coordinates: Array) -> Array:
-    """Return the rotation matrices (..., 3, 3) out of the coordinates (..., 12) of poses."""
-    return coordinates[..., POSITIONS:].reshape(*coordinates.shape[:-1], 3, 3)
+    """Return the rotation matrices (..., 3, 3) at the end of coordinates (..., c)."""
+    return coordinates[..., -9:].reshape(*coordinates.shape[:-1], 3, 3)
 
 
 def _coordinates(position: Array, rotation: Array) -> Array:

@@ -20,12 +20,13 @@ class PathSample:
     For task spaces of rows it is the plain derivative of the target. For poses, of position p and rotation matrix R of
     the tool frame in the world frame, it is the body twist [v; w]: the velocity ``v = R^T p'`` (m) and the angular
     velocity w of ``R^T R'`` (rad), both along the axes of the tool frame; `xi_ds` and `xi_dds` are the plain
-    derivatives of these six numbers.
+    derivatives of these six numbers. For orientations with fewer rows of the position than a pose, the velocity and the
+    angular velocity are along the axes of the world.
 
     Attributes
     ----------
-    target : ndarray, shape (K, m) or (K, 12)
-        Task coordinates z(s): m for position rows, rad for yaw; of a pose p (m), then R row by row.
+    target : ndarray, shape (K, c)
+        Task coordinates z(s): m for position rows, rad for angles; of an orientation R row by row.
     xi : ndarray, shape (K, m)
         dz/ds, or the body twist.
     xi_ds : ndarray, shape (K, m)
@@ -44,7 +45,7 @@ class Curve(Protocol):
     """One piece of a path over a parameter sigma in [0, length].
 
     Sigma is the arc length of the position rows, m; for a spline the cumulative chord length of its waypoints; for a
-    motion of yaw alone, or a turn on the spot, the angle, rad. A curve of poses has their twelve coordinates.
+    motion of an angle alone, or a turn on the spot, the angle, rad.
     """
 
     @property
@@ -58,7 +59,7 @@ class Curve(Protocol):
         ...
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, m or 12)."""
+        """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, c)."""
         ...
 
 

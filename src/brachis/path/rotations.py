@@ -76,16 +76,26 @@ def hat(vector: Array) -> Array:
 
 
 def quaternion_derivatives(pose: Array) -> Array:
-    """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a pose's coordinates, (order + 1, 12).
+    """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a pose's coordinates, (order + 1, c).
 
     With the angular velocity w in the turning frame, ``q' = q w / 2``, one derivative after the other.
     """
     result = np.zeros((len(pose), 4))
-    result[0] = quaternions_of(rotation_of(pose[0, 3:].reshape(3, 3)))
-    rate = np.pad(body_twists(pose)[:, 3:], ((0, 0), (1, 0)))
+    result[0] = quaternions_of(rotation_of(pose[0, -9:].reshape(3, 3)))
+    rate = np.pad(angular_rates(pose), ((0, 0), (1, 0)))
     for k in range(len(pose) - 1):
         result[k + 1] = _leibniz(quaternion_product, result, rate, k) / 2.0
     return result
+
+
+def angular_rates(poses: Array) -> Array:
+    """Return the angular velocity along the tool's axes, and its derivatives, (order, ..., 3), rad.
+
+    Coordinates, (order + 1, ..., c), have a rotation matrix row by row at their end.
+    """
+    turning = poses[..., -9:]
+    still = np.zeros((*turning.shape[:-1], 3))
+    return body_twists(np.concatenate([still, turning], axis=-1))[..., 3:]
 
 
 def rotation_of(matrix: Array) -> Rotation:

@@ -14,9 +14,10 @@ from brachis.common import tolerances
 from brachis.common.arrays import apply_each
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve, PathSample
+from brachis.path.rotations import rotation_of
 from brachis.robot import TaskMap, task_map_of
 from brachis.robot.task_map import JointSpace
-from brachis.robot.task_map.protocol import AXES, POSE_ROWS, YAW, position_rows
+from brachis.robot.task_map.protocol import ANGLES, AXES, TURN_ROWS, position_rows
 from brachis.task import Placement
 from brachis.task.points.points import sum_up
 from brachis.task.points.units import rotation_by
@@ -47,30 +48,34 @@ class PathFrame:
             The frame turns the rows out of their line or plane.
         """
         rotation = rotation_by("rpy", np.radians(placement.rpy_deg)).as_matrix()
-        if tuple(rows) == POSE_ROWS:
-            coordinates = np.zeros((12, 12))
-            coordinates[:3, :3] = rotation
-            coordinates[3:, 3:] = np.kron(rotation, np.eye(3))  # of a matrix row by row
-            return cls(coordinates, np.pad(placement.xyz, (0, 9)))
         axes = [AXES.index(row) for row in position_rows(rows)]
         block = rotation[np.ix_(axes, axes)]
+        behind = np.zeros((0, 0))
+        turned = np.zeros(0)
+        stays = np.eye(3)[[ANGLES.index(row) for row in rows if row in ANGLES]]
+        if tuple(rows[-3:]) == TURN_ROWS:
+            behind = np.kron(rotation, np.eye(3))  # of a matrix row by row
+            turned = np.zeros(9)
+        elif len(stays):
+            behind = np.eye(1)
+            turned = rotation_of(rotation).as_rotvec() @ stays.T
         if (
-            np.abs(block @ block.T - np.eye(len(axes))).max() > 1e-9
+            np.abs(block @ block.T - np.eye(len(axes))).max(initial=0.0) > 1e-9
             or np.linalg.det(block) < 0.0
+            or np.abs(stays @ rotation - stays).max(initial=0.0) > 1e-9
         ):
             raise PathError(
                 "the path's frame turns the path out of the rows of the task space",
                 where="path_frame",
                 found=f"rpy_deg {list(placement.rpy_deg)} with task_space [{', '.join(rows)}]",
                 allowed="a turn within these rows",
-                hint="Set task_space: position, or turn the frame only about the axis that is not among these rows",
+                hint="Set task_space: position, or turn the frame only about the axis that leaves these rows in place",
             )
-        turn = np.eye(len(rows))
-        turn[: len(axes), : len(axes)] = block
-        origin = np.array(placement.xyz)[axes]
-        if YAW in rows:
-            origin = np.append(origin, np.arctan2(block[1, 0], block[0, 0]))
-        return cls(turn, origin)
+        count = len(axes)
+        turn = np.zeros((count + len(behind), count + len(behind)))
+        turn[:count, :count] = block
+        turn[count:, count:] = behind
+        return cls(turn, np.append(np.array(placement.xyz)[axes], turned))
 
     def to_world(self, coordinates: Array) -> Array:
         """Return coordinates in the world, (c,)."""

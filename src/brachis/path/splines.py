@@ -14,7 +14,6 @@ from brachis.path.curves import LineCurve, SplineCurve
 from brachis.path.orientation import AMBIGUOUS, half_turn, turn_between
 from brachis.path.pose import (
     LEAST_QUALITY,
-    POSITIONS,
     least_quality,
     pose_curve,
     quaternion_curve,
@@ -70,7 +69,7 @@ def pose_spline(
     shape : SplineThrough
         The waypoints, with orientations.
     context : SegmentContext
-        Place of the segment, in three position rows.
+        Place of the segment, in position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
 
@@ -320,7 +319,7 @@ def pose_bspline(
     shape : BSplineCurve
         Control points with quaternions.
     context : SegmentContext
-        Place of the segment, in three position rows.
+        Place of the segment, in position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
 
@@ -330,15 +329,15 @@ def pose_bspline(
         The curve starts elsewhere than the segment.
     """
     points = np.array(shape.control_points)
-    first = points[0, POSITIONS:] / np.linalg.norm(points[0, POSITIONS:])
+    first = points[0, -4:] / np.linalg.norm(points[0, -4:])
     start = quaternions_of(rotation_of(rotation))
     turn = quaternion_product(start, first * [1.0, -1.0, -1.0, -1.0])
-    off = context.start - points[0, :POSITIONS]
+    off = context.start - points[0, :-4]
     if not shape.relative:
         all_off = np.concatenate([off, 2.0 * turn[1:]])
         _check_start(".control_points[0]", all_off, context)
-    points[:, :POSITIONS] += off
-    points[:, POSITIONS:] = quaternion_product(turn, points[:, POSITIONS:])
+    points[:, :-4] += off
+    points[:, -4:] = quaternion_product(turn, points[:, -4:])
     return quaternion_curve(_of_control_points(shape, points))
 
 

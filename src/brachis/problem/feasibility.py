@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import complement, difference
 from brachis.robot.plausibility import position_hint
 from brachis.robot.task_map import JointSpace
+from brachis.robot.task_map.protocol import TURN_ROWS
 from brachis.task import SplineSettings
 
 _REGULAR = 1e-6
@@ -268,25 +270,52 @@ def lacks_a_direction(task_map: TaskMap) -> bool:
     return bool(_least_singular_values(task_map.sample_jacobians()).max() < _REGULAR)
 
 
-def check_movable(task_map: TaskMap) -> None:
-    """Refuse a coordinate of the task space that no joint changes, such as z of an arm in a plane.
+def check_independent(task_map: TaskMap) -> None:
+    """Refuse rows of the task space that no joint changes, such as z of an arm in a plane, or that depend on others.
 
     Raises
     ------
     InputError
     """
-    moves = np.abs(task_map.sample_jacobians()).max(axis=(0, 2)) > _REGULAR
-    if moves.all():
+    rows = task_map.rows
+    jacobians = task_map.sample_jacobians()
+
+    def depend(chosen: Sequence[int]) -> bool:
+        """Tell whether some rows are linearly dependent in all postures."""
+        least = _least_singular_values(jacobians[:, list(chosen)])
+        return bool(least.max() < _REGULAR)
+
+    independent: list[int] = []
+    for row in range(len(rows)):
+        if not depend([*independent, row]):
+            independent.append(row)
+    subsets = (
+        subset
+        for size in range(1, len(rows) + 1)
+        for subset in combinations(range(len(rows)), size)
+        if depend(subset)
+    )
+    dependent = next(subsets, None)
+    if dependent is None:
         return
-    rows = np.array(task_map.rows)
-    fixed = rows[~moves]
-    others = rows[moves]
-    is_usual = len(others) > 0 and set(others) <= {"x", "y", "z"}
+    names = [rows[row] for row in independent]
+    is_usual = len(names) > 0 and not {*names} & {*TURN_ROWS}
+    if len(dependent) == 1:
+        fixed = [rows[row] for row in range(len(rows)) if depend([row])]
+        problem = f"no joint changes {', '.join(fixed)} of the tool"
+        found = f"[{', '.join(rows)}]"
+    else:
+        together = [rows[row] for row in dependent]
+        sizes = np.abs(jacobians[:, list(dependent)]).max(axis=(0, 1))
+        robot = task_map.robot
+        joints = [robot.joint_names[i] for i in np.flatnonzero(sizes > _REGULAR)]
+        problem = f"{', '.join(together)} of the tool cannot be prescribed together: they depend on each other"
+        found = f"[{', '.join(rows)}]; only {', '.join(joints)} move these rows"
     raise InputError(
-        f"no joint changes {', '.join(fixed)} of the tool",
+        problem,
         where="task_space",
-        found=f"[{', '.join(task_map.rows)}]",
-        allowed=f"[{', '.join(others)}]" if is_usual else None,
+        found=found,
+        allowed=f"[{', '.join(names)}]" if is_usual else None,
     )
 
 

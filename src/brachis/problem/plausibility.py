@@ -28,7 +28,7 @@ from brachis.robot.plausibility import (
     reach,
 )
 from brachis.robot.task_map import JointSpace
-from brachis.robot.task_map.protocol import YAW
+from brachis.robot.task_map.protocol import ANGLES
 from brachis.robot.urdf_bodies import inertia_matrix, mass_of
 from brachis.robot.urdf_elements import read_tree
 from brachis.task import LIMIT_KINDS, SpeedTable, Task
@@ -58,8 +58,8 @@ USUAL = {
         "rad/s",
         _OR_NULL,
     ),
-    "path_start": ("yaw looks like degrees", TURN, "rad", ""),
-    "path": ("the turn of yaw looks like degrees", 2.0 * TURN, "rad", ""),
+    "path_start": ("the angle looks like degrees", TURN, "rad", ""),
+    "path": ("the turn of the angle looks like degrees", 2.0 * TURN, "rad", ""),
     "path.dwell": ("the time looks like ms", 100.0, "s", ""),
     "link": ("the distance from the joint before looks like mm", 20.0, "m", ""),
     # Times the arm's length.
@@ -149,7 +149,7 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
     ):
         if given is not None:
             issues += _positions(task_map.robot, key, given)
-    if YAW in task_map.rows:
+    if task_map.angles and task_map.angles[0] in ANGLES:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
         turn = float(np.ptp(along[:, -1]))

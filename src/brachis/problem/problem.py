@@ -28,7 +28,7 @@ from brachis.path import (
 )
 from brachis.problem.feasibility import (
     branch_of,
-    check_movable,
+    check_independent,
     check_postures,
     check_regular,
     check_smoothness,
@@ -322,7 +322,7 @@ def decompositions_of(
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     asked = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and robot.n >= task_map.m:
-        check_movable(task_map)
+        check_independent(task_map)
     if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
         if len(found) <= 1:
             # Nothing to choose: the reasons of the only choice, or the wrong number of joints.

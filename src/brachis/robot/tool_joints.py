@@ -20,6 +20,8 @@ from brachis.task.fields import POSITION
 
 FREE_ROLL = "pose_free_roll"
 """The task space of poses whose roll about the tool axis is free."""
+AXIS = "axis"
+"""Word for the direction of the tool's z axis, among rows of a task space or alone."""
 _DIRECTIONS = {
     "roll": (0.0, 0.0, -1.0),
     "lead": (0.0, -1.0, 0.0),
@@ -75,6 +77,11 @@ class ToolJoint:
         return math.isfinite(self.upper)
 
 
+def rolls_freely(space: str | Sequence[str]) -> bool:
+    """Tell whether a task space leaves the roll of the tool about its z axis free."""
+    return space in (FREE_ROLL, AXIS) or (not isinstance(space, str) and AXIS in space)
+
+
 def tool_joints_of(
     space: str | Sequence[str], tolerances: Tolerances | None
 ) -> tuple[ToolJoint, ...]:
@@ -104,7 +111,7 @@ def tool_joints_of(
     ):
         for way in ways if reach < math.inf else ():
             ranges[way] = _within(ranges.get(way), reach, key)
-    if space == FREE_ROLL:
+    if rolls_freely(space):
         ranges["roll"] = _FREE
     return tuple(ToolJoint(way, *ranges[way]) for way in _DIRECTIONS if way in ranges)
 

@@ -68,25 +68,36 @@ from brachis.task.tolerances import (
     Tolerances,
 )
 
-Row = Literal["x", "y", "z", "yaw"]
-_SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
+Row = Literal["x", "y", "z", "roll", "pitch", "yaw", "axis"]
+_SPACE_FORMS = (
+    "a list of rows out of x, y, z and one of roll, pitch, yaw, axis; "
+    "or one of position, pose, pose_free_roll, axis, joints"
+)
 
 _EACH_ONCE = must(
     lambda names: len(set(names)) == len(names),
     "a name occurs twice",
     "each name once",
 )
-_YAW_LAST = must(
-    lambda rows: "yaw" not in rows or (len(rows) == 3 and rows[-1] == "yaw"),
-    "yaw needs exactly two position rows, and comes last",
-    "for example [x, y, yaw]",
+_ANGLE_LAST = must(
+    lambda rows: {*rows[:-1]} <= {*POSITION},
+    "only one row of rotation is possible, and it comes last",
+    "for example [x, y, z, yaw] or [x, y, axis]",
 )
+
+
+def _name_space(space: str | tuple[str, ...]) -> str | tuple[str, ...]:
+    """Give a task space one name, so that equal ones compare equal."""
+    if space == (*POSITION, "axis"):
+        return "pose_free_roll"
+    return {"position": POSITION, "axis": ("axis",)}.get(str(space), space)
+
+
 TaskSpace = Annotated[
-    Literal["position", "pose", "pose_free_roll", "joints"]
-    | Annotated[NonEmpty[Row], _EACH_ONCE, _YAW_LAST],
+    Literal["position", "pose", "pose_free_roll", "axis", "joints"]
+    | Annotated[NonEmpty[Row], _EACH_ONCE, _ANGLE_LAST],
     ByForm(_SPACE_FORMS),
-    # ``position`` is spelled out, so that equal task spaces compare equal.
-    AfterValidator(lambda space: POSITION if space == "position" else space),
+    AfterValidator(_name_space),
 ]
 
 
@@ -166,16 +177,17 @@ class Task(CheckedModel):
     """Configuration at the start of the path: {joints: ...} or free. With free, path_start is required unless the path
     begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
-    """Point at which the path begins: a list of all task coordinates (m, yaw in rad). For a pose: {position: [x, y, z],
-    rpy_deg: [...]}, or another orientation convention. Null: the tool's place in the start posture, or the first
-    waypoint. It must agree with a given start posture."""
+    """Point at which the path begins: a list of all task coordinates (m, angles in rad). For a pose, or with axis:
+    {position: [x, y, z], rpy_deg: [...]}, or another orientation convention. Null: the tool's place in the start posture,
+    or the first waypoint. It must agree with a given start posture."""
     end: FreePosture = "free"
     """Configuration at the end of the path: free or {joints: ...}. Its tool must be at the path's end, to 1e-6 m or
     rad; the nearest posture on the path is then used."""
     task_space: TaskSpace
     """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
-    joints, or a list of coordinates out of x, y, z, yaw (yaw last, with two others). A path of joints gives all joint
-    positions (rad, m) in chain order, and only its timing is planned."""
+    joints, or a list of coordinates out of x, y, z. Behind these may be yaw, pitch or roll, rad: the angle about the
+    world's z, y or x axis of a tool that turns about no other axis; or axis, the direction of the tool's z axis. A path
+    of joints gives all joint positions (rad, m) in chain order, and only its timing is planned."""
     path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)] = Field(
         json_schema_extra=_add_forms_of_paths
     )
@@ -387,12 +399,12 @@ class Task(CheckedModel):
 
     def _mistakes_in_tolerances(self) -> Iterator[Mistake]:
         asked = self.tolerances
-        of_places = self.of_poses or self.task_space == POSITION
+        of_places = self._has_whole_poses or self.task_space == POSITION
         if asked.orientation != OrientationTolerance() and not self.of_poses:
             yield (
                 "tolerances.orientation",
                 "the path does not prescribe the orientation",
-                "tolerances of the orientation with task_space: pose",
+                "tolerances of the orientation with task_space: pose or axis",
             )
         if asked.position != PositionTolerance() and not of_places:
             yield (
@@ -441,7 +453,11 @@ class Task(CheckedModel):
 
     @property
     def of_poses(self) -> bool:
-        """Whether the path prescribes the tool's orientation beside its position."""
+        """Whether the path has an orientation of the tool, or of its axis."""
+        return self._has_whole_poses or "axis" in self.task_space
+
+    @property
+    def _has_whole_poses(self) -> bool:
         return self.task_space in {"pose", "pose_free_roll"}
 
     @property

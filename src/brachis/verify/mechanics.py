@@ -47,9 +47,19 @@ def tool_placements(
         for way in ("x", "y", "z", "side", "lead", "roll")
     )
     # The path's axes in the tool frame.
-    turned = _turns(_AXES[2], -roll) @ _turns(_AXES[1], -lead) @ _turns(_AXES[0], side)
+    turned = (
+        turns_about(_AXES[2], -roll)
+        @ turns_about(_AXES[1], -lead)
+        @ turns_about(_AXES[0], side)
+    )
     rotation = rotation @ turned
     return origin - np.einsum("kij,jk->ki", rotation, np.array([x, y, z])), rotation
+
+
+def angles_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Angles, (K,), rad, between vectors, (K, d)."""
+    apart = np.linalg.norm(first - second, axis=1)
+    return 2.0 * np.arctan2(apart, np.linalg.norm(first + second, axis=1))
 
 
 def real_tool_placements(
@@ -79,7 +89,7 @@ def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
         if body.sliding:
             origin = origin + (rotation @ body.axis) * position[:, None]
         else:
-            rotation = rotation @ _turns(body.axis, position)
+            rotation = rotation @ turns_about(body.axis, position)
         rotations.append(rotation)
         origins.append(origin)
     return np.stack(rotations, axis=1), np.stack(origins, axis=1)
@@ -231,7 +241,7 @@ def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.nda
     return vectors * cosine + cross(along, vectors) * np.sin(angles) + parallel
 
 
-def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def turns_about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Return the rotation matrices, (K, 3, 3), about a unit vector by angles (K,), rad."""
     still = np.outer(axis, axis)
     cosine = np.cos(angles)[:, None, None]

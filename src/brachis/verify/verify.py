@@ -18,7 +18,8 @@ from brachis.errors import BrachisWarning, InputError
 from brachis.path import path_of
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
-from brachis.robot.task_map import JointSpace
+from brachis.robot.task_map import JointSpace, RowsAndAngle
+from brachis.robot.tool_joints import rolls_freely
 from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
     check_continuity,
@@ -28,7 +29,7 @@ from brachis.verify.checks import (
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
-from brachis.verify.mechanics import tool_placements
+from brachis.verify.mechanics import angles_between, tool_placements, turns_about
 from brachis.verify.motion import Given
 from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
@@ -122,16 +123,39 @@ def verify_trajectory(
     )
 
 
+def _path_errors(given: Given, targets: np.ndarray) -> np.ndarray:
+    """Return how far the tool is from task coordinates, (K, c): the larger of distance and angle, (K,), m or rad."""
+    task_map = given.task_map
+    positions, rotations = tool_placements(given.robot, given.states.q, given.joints)
+    axes = list(task_map.axes)
+    distances = np.linalg.norm(positions[:, axes] - targets[:, : len(axes)], axis=1)
+    if isinstance(task_map, RowsAndAngle):
+        normal = np.eye(3)[task_map.world_axis]
+        pointer = rotations[:, :, task_map.tool_axis]
+        pointer = pointer - np.outer(pointer @ normal, normal)
+        turned = turns_about(normal, targets[:, -1])[:, :, task_map.plane[0]]
+        angles = angles_between(pointer, turned)
+    elif task_map.angles:
+        wanted = targets[:, -9:].reshape(-1, 3, 3)
+        if rolls_freely(given.task.task_space):
+            angles = angles_between(rotations[:, :, 2], wanted[:, :, 2])
+        else:
+            chords = np.linalg.norm(rotations - wanted, axis=(1, 2))
+            angles = 2.0 * np.arcsin((chords / np.sqrt(8.0)).clip(max=1.0))
+    else:
+        return distances
+    return np.maximum(distances, angles)
+
+
 def _check_path(given: Given) -> Check:
     """Check the largest distance of the tool from the path at the saved s(t)."""
     states = given.states
     task_map = given.task_map
     targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
-    found = states.q
-    if not isinstance(task_map, JointSpace):
-        placed = tool_placements(task_map.robot, states.q, given.joints)
-        found = task_map.of_placements(*placed)
-    errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
+    if isinstance(task_map, JointSpace):
+        errors = np.linalg.norm(states.q - targets, axis=1)
+    else:
+        errors = _path_errors(given, targets)
     worst = np.argmax(errors)
     tolerance = given.options.path_tolerance
     remark = ""

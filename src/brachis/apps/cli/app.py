@@ -275,12 +275,12 @@ def motion_file(result: Path) -> Path:
 
 def task_space_of(text: str | None) -> str | list[str] | None:
     """Read ``--task-space``: a word, or a list of rows."""
-    from brachis.robot.task_map.protocol import AXES, YAW
+    from brachis.robot.task_map.protocol import ROWS
 
     if text is None:
         return None
     rows = [row.strip() for row in text.split(",") if row.strip()]
-    return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
+    return rows[0] if len(rows) == 1 and rows[0] not in ROWS else rows
 
 
 def read_changes(

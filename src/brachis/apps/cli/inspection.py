@@ -72,7 +72,7 @@ def inspect(
         URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the path and the
         postures at its ends.
     task_space : str, optional
-        What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. Default: the task's,
+        What the path prescribes: rows such as x,y or x,y,z,yaw, or a word such as pose or axis. Default: the task's,
         or all that the robot can.
     posture : str, optional
         Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.

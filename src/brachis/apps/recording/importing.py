@@ -31,7 +31,7 @@ from brachis.path import Path, build_path
 from brachis.planner import Given
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
-from brachis.robot.task_map import JOINTS, JointSpace, Pose
+from brachis.robot.task_map import JOINTS, JointSpace
 from brachis.robots import locate
 from brachis.task import (
     CsvSegment,
@@ -353,9 +353,9 @@ def _choose_evenly(length: np.ndarray) -> np.ndarray:
 
 def _points(task_map: TaskMap, values: np.ndarray, rows: np.ndarray) -> Points:
     """Make points of task coordinates, (K, c)."""
-    count = len(task_map.axes) or values.shape[1]
+    count = len(task_map.axes) if task_map.angles else values.shape[1]
     turning = values[:, count:]
-    if isinstance(task_map, Pose):
+    if len(task_map.angles) > 1:
         from scipy.spatial.transform import Rotation
 
         rotations = Rotation.from_matrix(turning.reshape(-1, 3, 3))

@@ -19,17 +19,29 @@ from brachis.robot.friction import Friction
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.robot import Robot
 from brachis.robot.task_map.protocol import (
+    ANGLES,
     AXES,
     POSE_ROWS,
     ROWS,
-    YAW,
+    TURN_ROWS,
     TaskDerivatives,
     TaskMap,
     joint_rows,
     position_rows,
 )
-from brachis.robot.task_map.tool import Pose, RowsAndYaw, WorldRows
-from brachis.robot.tool_joints import FREE_ROLL, ToolJoint, tool_joints_of
+from brachis.robot.task_map.tool import (
+    Pose,
+    RowsAndAngle,
+    RowsAndOrientation,
+    WorldRows,
+)
+from brachis.robot.tool_joints import (
+    AXIS,
+    FREE_ROLL,
+    ToolJoint,
+    rolls_freely,
+    tool_joints_of,
+)
 from brachis.task import Tolerances
 
 
@@ -70,7 +82,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     Raises
     ------
     InputError
-        A row or word is unknown, no axis of the tool frame lies in the yaw plane, or the tool cannot roll freely.
+        A row or word is unknown, a joint tilts the tool against the axis of an angle, or the tool cannot roll freely.
 
     Examples
     --------
@@ -80,9 +92,8 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     """
     if rows == JOINTS:
         return JointSpace(robot, joint_rows(robot.joint_names))
-    if (
-        rows == FREE_ROLL
-        and tool_joints_of(FREE_ROLL, None)[0] not in robot.tool_joints
+    if rolls_freely(rows) and (
+        tool_joints_of(FREE_ROLL, None)[0] not in robot.tool_joints
     ):
         raise InputError(
             "the robot's tool does not roll freely",
@@ -92,48 +103,64 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
         )
     if rows in ("pose", FREE_ROLL):
         return Pose(robot)
-    is_word = isinstance(rows, str) and rows != "position"
-    names = AXES if rows == "position" else tuple(rows)
+    is_word = isinstance(rows, str) and rows not in ("position", AXIS)
+    names = {"position": AXES, AXIS: (AXIS,)}.get(str(rows), tuple(rows))
     if names == POSE_ROWS:
         return Pose(robot)
+    positions = position_rows(names)
+    turning = names[len(positions) :]
     is_repeated = len(set(names)) < len(names)
-    if is_word or is_repeated or not {*names} <= {*ROWS} or not position_rows(names):
+    is_unknown = is_word or not {*names} <= {*ROWS}
+    is_ordered = {*positions} <= {*AXES} and names == (*positions, *turning[:1])
+    if not names or is_unknown or is_repeated or not is_ordered:
         raise InputError(
             "this task space does not exist",
             where="task_space",
             found=rows,
-            allowed=f"{', '.join(ROWS)}, each once and not yaw alone; or one of position, pose, {FREE_ROLL}, {JOINTS}",
+            allowed=f"rows out of {', '.join(AXES)}, each once, and behind them one of {', '.join(ANGLES)}, {AXIS}; "
+            f"or one of position, pose, {FREE_ROLL}, {JOINTS}",
         )
-    return _rows_and_yaw(robot, names) if YAW in names else WorldRows(robot, names)
+    if AXIS in names:
+        return RowsAndOrientation(robot, (*positions, *TURN_ROWS))
+    return _rows_and_angle(robot, names) if turning else WorldRows(robot, names)
 
 
-def _rows_and_yaw(robot: Robot, names: tuple[str, ...]) -> RowsAndYaw:
-    """Bind two rows of the position and yaw to a robot.
+def _rows_and_angle(robot: Robot, names: tuple[str, ...]) -> RowsAndAngle:
+    """Bind rows of the position and an angle to a robot.
 
     Raises
     ------
     InputError
-        Yaw is not beside two rows, or no axis of the tool frame lies in their plane.
+        A joint turns about another axis than the angle, or no axis of the tool frame lies across that axis.
     """
-    positions = position_rows(names)
-    if names[-1] != YAW or len(positions) != 2:
+    angle = names[-1]
+    world_axis = ANGLES.index(angle)
+    turning = np.abs(robot.chain.axes[robot.revolute])
+    is_along = turning > 1.0 - tolerances.ANGLE
+    tilting = np.flatnonzero(robot.revolute)[~is_along[:, world_axis]]
+    if len(tilting):
+        usual = [ANGLES[axis] for axis in np.flatnonzero(is_along.all(axis=0))]
+        rows = ", ".join([*names[:-1], *usual])
+        joints = ", ".join(robot.joint_names[i] for i in tilting)
         raise InputError(
-            "yaw needs exactly two position rows before it",
+            f"{angle} is the angle of tools that turn about the world's {AXES[world_axis]} axis alone",
             where="task_space",
-            found=list(names),
-            allowed="[x, y, yaw]",
+            found=f"[{', '.join(names)}], with {joints} about other axes",
+            hint=f"Set task_space: [{rows}]"
+            if usual
+            else "Set task_space: pose or pose_free_roll, or rows with axis, the direction of the tool's z axis",
         )
     rotation = robot.tool_placement(np.zeros(robot.n)).rotation
-    plane = [AXES.index(row) for row in positions]
-    lies_in_plane = np.linalg.norm(rotation[plane], axis=0) >= 1.0 - tolerances.ANGLE
-    if not lies_in_plane.any():
+    plane = [axis for axis in range(3) if axis != world_axis]
+    lies_across = np.linalg.norm(rotation[plane], axis=0) >= 1.0 - tolerances.ANGLE
+    if not lies_across.any():
         raise InputError(
-            "no axis of the tool frame lies in the plane in which yaw turns",
+            f"no axis of the tool frame lies in the plane in which {angle} turns",
             where="task_space",
             found=list(names),
             hint="Attach a tool frame with an axis in this plane",
         )
-    return RowsAndYaw(robot, names, int(np.argmax(lies_in_plane)))
+    return RowsAndAngle(robot, names, int(np.argmax(lies_across)))
 
 
 def bind(

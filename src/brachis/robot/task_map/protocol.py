@@ -14,25 +14,25 @@ from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.kernel import Chain, Prescribed, tool_derivatives
 from brachis.robot.robot import Robot
+from brachis.robot.tool_joints import AXIS
 from brachis.task import ToolPose
 
 AXES: Final = ("x", "y", "z")
-YAW: Final = "yaw"
-ROWS: Final = (*AXES, YAW)
+ANGLES: Final = ("roll", "pitch", "yaw")
+"""Angles about the world's x, y and z axis, of tools that turn about this axis alone."""
+ROWS: Final = (*AXES, *ANGLES, AXIS)
 """What a task space of rows may consist of."""
-POSE_ROWS: Final = (*AXES, "rx", "ry", "rz")
+TURN_ROWS: Final = ("rx", "ry", "rz")
+POSE_ROWS: Final = (*AXES, *TURN_ROWS)
 """Rows of a pose: displacement and rotation along and about the tool frame's axes."""
-POSE_COORDINATES: Final = 12
-"""Coordinates of a pose: the position, then the rotation matrix row by row."""
 
 
-_ANGLES: Final = (YAW, *POSE_ROWS[3:])
 _JOINT: Final = "joint "
 
 
 def position_rows(rows: Sequence[str]) -> tuple[str, ...]:
     """Return the rows whose change is a path's length: those of the position, which come first, or all joints."""
-    return tuple(row for row in rows if row not in _ANGLES)
+    return tuple(row for row in rows if row not in {*ANGLES, *TURN_ROWS, AXIS})
 
 
 def joint_rows(names: Sequence[str]) -> tuple[str, ...]:
@@ -90,6 +90,11 @@ class TaskMap(Summary, ABC):
     def axes(self) -> tuple[int, ...]:
         """World axes (0, 1, 2) of the position rows; none in a space of joints."""
         return tuple(AXES.index(row) for row in self.rows if row in AXES)
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Rows behind those of the position: an angle, or three of rotation; none in a space of joints."""
+        return () if joints_of(self.rows) else self.rows[len(self.axes) :]
 
     @property
     def prescribed(self) -> Prescribed:

@@ -1,4 +1,4 @@
-"""The tool as task space: its pose, rows of its position in the world frame, or two such rows and yaw there."""
+"""The tool as task space: its pose, rows of its position in the world, and behind these an angle or its orientation."""
 
 from __future__ import annotations
 
@@ -12,12 +12,33 @@ import numpy as np
 from brachis.errors import InputError
 from brachis.kernel import Prescribed, rotation_vectors
 from brachis.robot.joints import principal
-from brachis.robot.task_map.protocol import POSE_ROWS, TaskMap
+from brachis.robot.task_map.protocol import ANGLES, POSE_ROWS, TaskMap
 from brachis.task import ToolPose
 
 
+class _Oriented(TaskMap):
+    """A task map that prescribes the whole orientation, whose matrix is behind the rows of the position."""
+
+    def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
+        """Return the coordinates, (c,), of a pose that a task states."""
+        if not isinstance(stated, ToolPose):
+            raise InputError(
+                "the orientation is missing",
+                where=where,
+                found=list(stated),
+                allowed="a position with an orientation (ToolPose)",
+            )
+        rotation = stated.rotation.as_matrix()
+        return self.of_placements(np.array([stated.position]), rotation[None])[0]
+
+    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Return the rows of the positions, then rotation matrices row by row, (K, c)."""
+        rows = positions[:, list(self.axes)]
+        return np.concatenate([rows, rotations.reshape(-1, 9)], axis=1)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Pose(TaskMap):
+class Pose(_Oriented):
     """The tool frame's pose.
 
     It has 12 coordinates for its 6 rows: the position (3), then the rotation matrix row by row (9), both in the world
@@ -30,23 +51,7 @@ class Pose(TaskMap):
     @cached_property
     def prescribed(self) -> Prescribed:
         """The pose."""
-        return Prescribed()
-
-    def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
-        """Return the coordinates, (12,), of a pose that a task states."""
-        if not isinstance(stated, ToolPose):
-            raise InputError(
-                "the orientation is missing",
-                where=where,
-                found=list(stated),
-                allowed="a position with an orientation (ToolPose)",
-            )
-        rotation = stated.rotation.as_matrix()
-        return np.concatenate([stated.position, rotation.ravel()])
-
-    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return positions and rotation matrices row by row, (K, 12)."""
-        return np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
+        return Prescribed(self.axes, 3, in_tool_axes=True)
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return the translation and the rotation vector, (..., 6), in the frame of `second`."""
@@ -85,11 +90,11 @@ class WorldRows(TaskMap):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RowsAndYaw(WorldRows):
-    """Two rows of the tool frame's position in the world frame and, last, yaw (rad).
+class RowsAndAngle(WorldRows):
+    """Rows of the tool frame's position in the world frame and, last, the angle about a world axis (rad).
 
-    Yaw turns the first row's axis towards the second's; it is the direction of the tool-frame axis `tool_axis` within
-    the plane of these two rows.
+    The tool turns about this axis alone. The angle is that of the tool-frame axis `tool_axis` to the world's x axis, or
+    of roll to the y axis, by the right-hand rule.
 
     Attributes
     ----------
@@ -101,36 +106,76 @@ class RowsAndYaw(WorldRows):
 
     @cached_property
     def prescribed(self) -> Prescribed:
-        """The rows of the position, and yaw."""
-        return Prescribed(self.axes, self.tool_axis, self.sign)
-
-    @property
-    def sign(self) -> float:
-        """+1 where yaw turns about the positive world axis, -1 otherwise."""
-        first, second = self.axes
-        return 1.0 if (second - first) % 3 == 1 else -1.0
+        """The rows of the position, and the angle."""
+        first, second = self.plane
+        heading = (self.tool_axis, first, second)
+        return Prescribed(self.axes, 1, heading=heading, sign=self.sign)
 
     @property
     def world_axis(self) -> int:
-        """World axis (0, 1, 2) about which yaw turns."""
-        return 3 - sum(self.axes)
+        """World axis (0, 1, 2) about which the angle turns."""
+        return ANGLES.index(self.rows[-1])
+
+    @property
+    def plane(self) -> tuple[int, int]:
+        """World axes across: that from which the angle counts, and the other one."""
+        first, second = (axis for axis in range(3) if axis != self.world_axis)
+        return first, second
+
+    @property
+    def sign(self) -> float:
+        """+1 where the angle turns the first axis of `plane` towards the second one, else -1."""
+        return -1.0 if self.world_axis == 1 else 1.0
+
+    def headings(self, rotations: np.ndarray) -> np.ndarray:
+        """Return the cosine and the sine, (2, K), of the angle for rotations (K, 3, 3)."""
+        first, second = self.plane
+        pointer = rotations[:, :, self.tool_axis]
+        return np.array([pointer[:, first], self.sign * pointer[:, second]])
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return the rows of the positions, and yaw in (-pi, pi]."""
-        first, second = self.axes
-        yaw = np.arctan2(
-            rotations[:, second, self.tool_axis], rotations[:, first, self.tool_axis]
-        )
-        return np.column_stack([super().of_placements(positions, rotations), yaw])
+        """Return the rows of the positions, and the angle in (-pi, pi]."""
+        cosine, sine = self.headings(rotations)
+        angle = np.arctan2(sine, cosine)
+        return np.column_stack([super().of_placements(positions, rotations), angle])
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the displacement row by row; yaw in [-pi, pi)."""
+        """Return the displacement row by row; the angle in [-pi, pi)."""
         delta = super().difference(first, second).copy()
         delta[..., -1] = principal(delta[..., -1])
         return delta
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Return the rows of the linear velocity, and the angular one about the world axis of yaw."""
-        return np.concatenate(
-            [super().rates(twists), self.sign * twists[3 + self.world_axis, None]]
-        )
+        """Return the rows of the linear velocity, and the angular one about the world axis."""
+        return twists[[*self.axes, 3 + self.world_axis]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RowsAndOrientation(_Oriented):
+    """Rows of the tool frame's position in the world frame, and its orientation.
+
+    Its rows are velocities along the world's axes and rotation about them; task coordinates are the rows of the
+    position, then the rotation matrix row by row. Where a virtual joint rolls the tool, they prescribe the direction of
+    its z axis.
+    """
+
+    in_tool_axes: ClassVar[bool] = False
+
+    @cached_property
+    def prescribed(self) -> Prescribed:
+        """The rows of the position, and the orientation."""
+        return Prescribed(self.axes, 3)
+
+    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the displacement row by row, and the rotation vector, (..., m), in the world."""
+        first, second = np.broadcast_arrays(first, second)
+        count = len(self.axes)
+        shape = first.shape[:-1]
+        to = first[..., count:].reshape(-1, 3, 3)
+        back = second[..., count:].reshape(-1, 3, 3).swapaxes(1, 2)
+        turn = rotation_vectors(to @ back).reshape(*shape, 3)
+        return np.concatenate([(first - second)[..., :count], turn], axis=-1)
+
+    def rates(self, twists: np.ndarray) -> np.ndarray:
+        """Return the rows of the linear velocity, and the angular velocity."""
+        return twists[[*self.axes, 3, 4, 5]]

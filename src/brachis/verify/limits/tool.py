@@ -108,8 +108,10 @@ def _deviations(given: Given, states: MotionStates) -> dict[str, np.ndarray]:
     joints = joint_placements(given.robot, states.q)
     origin, rotation = real_tool_placements(given.robot, *joints)
     target = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
-    shift = origin - target[:, :3]
-    wanted = target[:, 3:].reshape(-1, 3, 3) if given.task.of_poses else rotation
+    shift = np.zeros_like(origin)
+    axes = list(given.task_map.axes)
+    shift[:, axes] = origin[:, axes] - target[:, : len(axes)]
+    wanted = target[:, -9:].reshape(-1, 3, 3) if given.task.of_poses else rotation
     back = np.swapaxes(wanted, 1, 2)
     turned = back @ rotation
     if given.task.tolerances.position.axes == "tool":
