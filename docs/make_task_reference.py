@@ -180,8 +180,34 @@ With `stop: true` the tool stops at the end of a segment, with `dwell: 0.5` it a
 are at rest at a stop; the posture is free. The motions before and after it are planned together. Where the path ends,
 the motion ends at rest anyway (`boundary.end_speed: 0`).
 
-Points have all task coordinates: m, and rad for yaw. For poses (`pose`, `pose_free_roll`) these are x, y, z, and
-`orientation` says how the tool turns.
+Points have all task coordinates: m, and rad for yaw, pitch or roll. For poses (`pose`, `pose_free_roll`) these are x,
+y, z, and `orientation` says how the tool turns.
+
+`task_space` takes any rows of the position, and one row of rotation behind them. A SCARA with a quill, a palletiser
+that keeps its tool level, or a gantry with a turning axis takes `[x, y, z, yaw]`:
+
+```yaml
+task_space: [x, y, z, yaw]
+path:
+  - line: {by: [-0.1, 0.12, 0, 1.0]}                         # m, m, m, rad
+```
+
+An arm in the xz-plane takes `[x, z, pitch]`, one in the yz-plane `[y, z, roll]`. The angle follows the right-hand rule
+about the world's axis. It is 0 where the first axis of the tool frame that is perpendicular to this axis points along x
+(for roll: along y). No joint may tilt the tool.
+
+`axis` prescribes the direction of the tool's z axis and nothing else, as for a torch whose roll is free. `[x, y, axis]`
+adds positions; `[x, y, z, axis]` is `pose_free_roll`. Segments turn the axis as they turn poses, by `orientation` and
+`turn`. For `axis` alone the path has only segments `turn`.
+
+```yaml
+task_space: [x, y, axis]
+path:
+  - line: {by: [0.1, -0.1]}
+    orientation: {rotate: {axis: [0, 1, 0], angle_deg: 30}}
+```
+
+Rows that depend on each other, or that no joint changes, are refused.
 
 Points are in the world frame, or in one of the `frames`, for example that of a workpiece. Write `path: {frame:
 workpiece, segments: [...]}`, or the key `path_frame` next to `path`. Segments, files of points, directions,
@@ -270,8 +296,9 @@ CSV = """
 
 `csv: {file: poses.csv}` is a smooth curve along the points of a file, one point per row. The first line names the
 columns, in any order. Empty lines and lines that begin with `#` are skipped. If the task space is a list of
-coordinates, they are the names of the columns (`x,y`, `x,z,yaw`, ...). For a path of joints the columns have the names
-of the joints (rad, m); `units` and `tolerance` are not allowed there. For poses the columns are
+coordinates, they are the names of the columns (`x,y`, `x,y,z,yaw`, ...). With `axis` the columns are those of the
+positions and of an orientation. For a path of joints the columns have the names of the joints (rad, m); `units` and
+`tolerance` are not allowed there. For poses the columns are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
@@ -286,8 +313,8 @@ of the joints (rad, m); `units` and `tolerance` are not allowed there. For poses
 An extra column `feed` (or `f`, `speed`, `v`) gives the tool's speed on the way to each point; it needs a `tolerance`.
 Columns are separated by commas, semicolons, tabs or spaces. Numbers may have decimal commas unless commas separate the
 columns. Units are part of the column names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are given by `units`.
-Lengths without a unit are in m, yaw and rotation vectors in rad. Other angles and speeds need a unit. brachis reports
-how it understood the file.
+Lengths without a unit are in m, the angle of a task space and rotation vectors in rad. Other angles and speeds need a
+unit. brachis reports how it understood the file.
 
 The segment starts at the first point. With `start: free` and without `path_start`, the path begins there too. If the
 segment would have to start more than 1e-4 m or rad away from it, the file is refused. With `relative: true` all points

@@ -27,7 +27,7 @@ from brachis.errors import BrachisError, InputError
 from brachis.optimise.candidate import Candidate
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import LeastMotion, find_least_motion
-from brachis.problem.feasibility import check_regular, lacks_a_direction
+from brachis.problem.feasibility import check_independent, check_regular
 from brachis.problem.plausibility import (
     check_within_reach,
     of_end_time,
@@ -250,7 +250,8 @@ def _open_search(
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
     task_map = problem.task_map
-    if has_charts(problem, decompositions) and not lacks_a_direction(task_map):
+    if has_charts(problem, decompositions):
+        check_independent(task_map)
         check_regular(task_map, problem.given_postures)
     else:
         # Faulty decompositions are reported before the path is checked.

@@ -27,7 +27,10 @@ CASES = {
     "pose, r = 2": (8, Prescribed((0, 1, 2), 3, in_tool_axes=True)),
     "position, r = 4": (7, Prescribed((0, 1, 2))),
     "one row, r = 2": (3, Prescribed((2,))),
-    "two rows and pitch, r = 1": (4, Prescribed((0, 2), 1, False, (1, 0, 2), -1.0)),
+    "two rows and pitch, r = 1": (
+        4,
+        Prescribed((0, 2), 1, heading=(1, 0, 2), sign=-1.0),
+    ),
     "three rows and yaw, r = 0": (4, Prescribed((2, 0, 1), 1)),
     "two rows and orientation, r = 1": (6, Prescribed((2, 0), 3)),
     "orientation, r = 2": (5, Prescribed((), 3)),

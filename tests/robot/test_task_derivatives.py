@@ -13,6 +13,8 @@ CASES = [
     ("RPRC", "xy", ["x", "y", "yaw"]),
     ("RPRC", "xz", ["x", "z", "pitch"]),
     ("RPRC", "xz", ["z", "x", "pitch"]),
+    ("RPRC", "xz", ["z", "pitch"]),
+    ("RRRC", "xy", ["z", "x", "y", "yaw"]),
     ("RRP", "tilted", ["x", "y", "z"]),
     ("RPR", "tilted", ["z"]),
 ]

@@ -60,6 +60,8 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
     redundant : tuple of int
     basis : (2, 3) ndarray
         Of the plane.
+    lifting : list of int
+        The joint, if any, that slides along the normal and is not redundant.
     """
 
     def __init__(
@@ -68,28 +70,21 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         task_map: TaskMap,
         redundant: tuple[int, ...],
         basis: np.ndarray,
+        lifting: list[int],
     ) -> None:
         revolute = geometry.revolute
         self._plane = basis
         self._normal = np.cross(*basis)
         rows = np.eye(3)[list(task_map.axes)]
-        heights = rows @ self._normal
-        lifting = _lifting_joints(geometry, self._normal, range(geometry.n))
-        is_height = (np.abs(heights) > 1.0 - tolerances.ANGLE) & bool(lifting)
-        self._columns = np.flatnonzero(~is_height)
+        self._heights = rows @ self._normal * bool(lifting)
+        self._columns = np.flatnonzero(np.abs(self._heights) < 0.5)
         self._rows = rows[self._columns]
         self._senses = np.where(revolute, np.sign(geometry.axes @ self._normal), 1.0)
         # How the slides move the tool along the normal.
         self._lifts = np.where(revolute, 0.0, geometry.axes @ self._normal)
+        self._lifting = lifting
         rest = complement(geometry.n, redundant)
-        self._planar = rest
-        self._lifting = []
-        if is_height.any():
-            self._height_column = int(np.argmax(is_height))
-            self._height_sign = heights[self._height_column]
-            self._height = self._normal @ geometry.tool_position
-            self._lifting = [i for i in lifting if i in rest]
-            self._planar = [i for i in rest if i not in self._lifting]
+        self._planar = [i for i in rest if i not in lifting]
         kinds = "".join("R" if revolute[i] else "P" for i in self._planar)
         self._angle = None
         if isinstance(task_map, RowsAndAngle):
@@ -97,8 +92,8 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             self._angle_sense = np.sign(self._normal[task_map.world_axis])
             kinds = "".join(kinds.rsplit("R", 1))
         # Heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
-        height = self._normal @ geometry.tool_position
-        self._offset = self._rows @ self._normal * height
+        self._height = self._normal @ geometry.tool_position
+        self._offset = self._rows @ self._normal * self._height
         self._lift = basis.T @ np.linalg.pinv(self._rows @ basis.T)
         flatten = basis.T @ basis
         flat = replace(
@@ -142,7 +137,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             angle = self._angle_sense * (targets[:, -1] - heading)
             values = self._solve_with_angle(joints, tool, goal, angle)
         for joint in self._lifting:
-            height = self._height_sign * targets[:, self._height_column] - self._height
+            height = targets[:, : len(self._heights)] @ self._heights - self._height
             height = height - q_r @ self._lifts[self._redundant]
             values.insert(self._joints.index(joint), height / self._lifts[joint])
         return self._arrange(np.broadcast_arrays(*values), q_r)
@@ -189,18 +184,6 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         return np.swapaxes(answers, 0, 1)[:, :, None]
 
 
-def _lifting_joints(
-    geometry: ChainGeometry, normal: np.ndarray, joints: Sequence[int]
-) -> list[int]:
-    """List which of some joints slide along a normal."""
-    return [
-        i
-        for i in joints
-        if not geometry.revolute[i]
-        and abs(geometry.axes[i] @ normal) > 1.0 - tolerances.ANGLE
-    ]
-
-
 def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
     """Direction to which all revolute axes are parallel and each slide parallel or perpendicular."""
     turning = np.flatnonzero(geometry.revolute)
@@ -240,20 +223,21 @@ def planar(
         raise NotApplicableError("this family does not solve orientations")
     normal = _plane_normal(geometry)
     rows = np.eye(3)[list(task_map.axes)]
-    is_height = np.abs(rows @ normal) > 1.0 - tolerances.ANGLE
     rest = complement(geometry.n, redundant)
-    inert = _lifting_joints(geometry, normal, range(geometry.n))
-    lifting = [geometry.joint_names[i] for i in inert if i in rest]
-    if inert and is_height.any() and len(lifting) != 1:
+    slides_up = ~geometry.revolute & (
+        np.abs(geometry.axes @ normal) > 1.0 - tolerances.ANGLE
+    )
+    is_height = slides_up.any() & (np.abs(rows @ normal) > 1.0 - tolerances.ANGLE)
+    lifting = [i for i in rest if slides_up[i] and is_height.any()]
+    if len(lifting) != is_height.sum():
         row = task_map.rows[int(np.argmax(is_height))]
         raise NotApplicableError(
-            f"{row} needs one slide along it that is not redundant; there is {', '.join(lifting) or 'none'}"
+            f"{row} needs one slide along it, no more and no less, that is not redundant"
         )
-    is_height &= bool(inert)
     rows = rows[~is_height]
     basis = _basis(normal, rows)
     normal = np.cross(*basis)
-    leaves_plane = bool(inert) and np.any(np.abs(rows @ normal) > tolerances.ANGLE)
+    leaves_plane = slides_up.any() and np.any(np.abs(rows @ normal) > tolerances.ANGLE)
     rank = np.linalg.matrix_rank(rows @ basis.T, tol=tolerances.ANGLE)
     if leaves_plane or rank < len(rows) or not len(rows):
         raise NotApplicableError(
@@ -269,7 +253,7 @@ def planar(
             raise NotApplicableError("an angle needs both rows of the plane")
         if not geometry.revolute[rest].any():
             raise NotApplicableError("no revolute joint is left to set the angle")
-    return PlanarSolver(geometry, task_map, redundant, basis)
+    return PlanarSolver(geometry, task_map, redundant, basis, lifting)
 
 
 class PrismaticSolver(DeterminantSolver, FormulaSolver):

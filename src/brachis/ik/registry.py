@@ -216,8 +216,8 @@ def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> Non
             "the robot has fewer joints than the task space has rows",
             redundant_joints=names,
             found=f"{robot.n} for {task_map.m} rows",
-            allowed=f"at most {robot.n} rows; or task_space: joints, with a path of the joints such as "
-            f"line: {{by: [{by}]}}",
+            allowed=f"at most {robot.n} rows, such as [{', '.join(default_task_space(robot))}]; or task_space: joints, "
+            f"with a path of the joints such as line: {{by: [{by}]}}",
         )
     if len(set(names)) != len(names) or len(names) != r:
         joints = write_count(robot.n, "joint")

@@ -69,6 +69,12 @@ class Prescribed(Structured):
         return len(self.axes) + self.turns
 
     @property
+    def parts(self) -> list[int]:
+        """Rows of the tool's twist, linear, then angular, that are prescribed."""
+        turning = [3, 4, 5] if self.turns == 3 else [6 - sum(self.heading[1:])]
+        return [*self.axes, *turning[: self.turns]]
+
+    @property
     def coordinates(self) -> int:
         """How many task coordinates they have: of an orientation the rotation matrix."""
         return len(self.axes) + (9 if self.turns == 3 else self.turns)

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from brachis.common.arrays import apply_each, spread
+from brachis.common.arrays import spread
 from brachis.kernel import body_twists, rotation_derivatives
 from brachis.path.protocol import Array, Curve, MappedCurve, Orientation, PathSample
 from brachis.path.rotations import angular_rates
@@ -44,10 +44,8 @@ class OrientedPath(Path):
         derivatives = self.derivatives(s)
         velocity, rate, bend = angular_rates(derivatives)
         bend = bend + np.cross(velocity, rate)
-        rotation = rotations(derivatives[0])
-        turning = np.array(
-            [apply_each(rotation, one) for one in (velocity, rate, bend)]
-        )
+        rates = np.array([velocity, rate, bend])
+        turning = np.einsum("kij,okj->oki", rotations(derivatives[0]), rates)
         moving = derivatives[1:, :, : self.positions]
         return PathSample(derivatives[0], *np.concatenate([moving, turning], axis=-1))
 

@@ -50,15 +50,20 @@ class PathFrame:
         rotation = rotation_by("rpy", np.radians(placement.rpy_deg)).as_matrix()
         axes = [AXES.index(row) for row in position_rows(rows)]
         block = rotation[np.ix_(axes, axes)]
-        behind = np.zeros((0, 0))
-        turned = np.zeros(0)
         stays = np.eye(3)[[ANGLES.index(row) for row in rows if row in ANGLES]]
+        origin = np.array(placement.xyz)[axes]
+        count = len(axes)
+        turn = block
         if tuple(rows[-3:]) == TURN_ROWS:
-            behind = np.kron(rotation, np.eye(3))  # of a matrix row by row
-            turned = np.zeros(9)
+            origin = np.pad(origin, (0, 9))
+            turn = np.eye(len(origin))
+            turn[count:, count:] = np.kron(
+                rotation, np.eye(3)
+            )  # of a matrix row by row
         elif len(stays):
-            behind = np.eye(1)
-            turned = rotation_of(rotation).as_rotvec() @ stays.T
+            origin = np.append(origin, stays @ rotation_of(rotation).as_rotvec())
+            turn = np.eye(len(origin))
+        turn[:count, :count] = block
         if (
             np.abs(block @ block.T - np.eye(len(axes))).max(initial=0.0) > 1e-9
             or np.linalg.det(block) < 0.0
@@ -71,11 +76,7 @@ class PathFrame:
                 allowed="a turn within these rows",
                 hint="Set task_space: position, or turn the frame only about the axis that leaves these rows in place",
             )
-        count = len(axes)
-        turn = np.zeros((count + len(behind), count + len(behind)))
-        turn[:count, :count] = block
-        turn[count:, count:] = behind
-        return cls(turn, np.append(np.array(placement.xyz)[axes], turned))
+        return cls(turn, origin)
 
     def to_world(self, coordinates: Array) -> Array:
         """Return coordinates in the world, (c,)."""

@@ -265,9 +265,10 @@ def check_regular(task_map: TaskMap, postures: Mapping[str, np.ndarray]) -> None
             )
 
 
-def lacks_a_direction(task_map: TaskMap) -> bool:
-    """Tell whether the arm can nowhere move its tool in all directions of the task space."""
-    return bool(_least_singular_values(task_map.sample_jacobians()).max() < _REGULAR)
+_TURNS_ALONE = (
+    "rx, ry and rz are turns of the tool about x, y and z; if it turns about one of these alone, prescribe rows of its "
+    "position, and yaw, pitch or roll"
+)
 
 
 def check_independent(task_map: TaskMap) -> None:
@@ -279,43 +280,36 @@ def check_independent(task_map: TaskMap) -> None:
     """
     rows = task_map.rows
     jacobians = task_map.sample_jacobians()
-
-    def depend(chosen: Sequence[int]) -> bool:
-        """Tell whether some rows are linearly dependent in all postures."""
-        least = _least_singular_values(jacobians[:, list(chosen)])
-        return bool(least.max() < _REGULAR)
-
-    independent: list[int] = []
-    for row in range(len(rows)):
-        if not depend([*independent, row]):
-            independent.append(row)
-    subsets = (
+    numbers = range(len(rows))
+    subsets = [
         subset
         for size in range(1, len(rows) + 1)
-        for subset in combinations(range(len(rows)), size)
-        if depend(subset)
-    )
-    dependent = next(subsets, None)
-    if dependent is None:
+        for subset in combinations(numbers, size)
+        if _least_singular_values(jacobians[:, list(subset)]).max() < _REGULAR
+    ]
+    if not subsets:
         return
-    names = [rows[row] for row in independent]
-    is_usual = len(names) > 0 and not {*names} & {*TURN_ROWS}
-    if len(dependent) == 1:
-        fixed = [rows[row] for row in range(len(rows)) if depend([row])]
-        problem = f"no joint changes {', '.join(fixed)} of the tool"
-        found = f"[{', '.join(rows)}]"
-    else:
-        together = [rows[row] for row in dependent]
-        sizes = np.abs(jacobians[:, list(dependent)]).max(axis=(0, 1))
+    fixed = [subset[0] for subset in subsets if len(subset) == 1]
+    dependent = fixed or subsets[0]
+    together = ", ".join(rows[row] for row in dependent)
+    problem = f"no joint changes {together} of the tool"
+    left_out = fixed
+    found = f"[{', '.join(rows)}]"
+    if not fixed:
         robot = task_map.robot
+        sizes = np.abs(jacobians[:, list(dependent)]).max(axis=(0, 1))
         joints = [robot.joint_names[i] for i in np.flatnonzero(sizes > _REGULAR)]
-        problem = f"{', '.join(together)} of the tool cannot be prescribed together: they depend on each other"
-        found = f"[{', '.join(rows)}]; only {', '.join(joints)} move these rows"
+        problem = f"{together} of the tool depend on each other and cannot be prescribed together"
+        left_out = [dependent[-1]]
+        found += f", where {together} are moved by {', '.join(joints)}"
+    others = [name for row, name in enumerate(rows) if row not in left_out]
+    is_usual = bool(others) and not {*others} & {*TURN_ROWS}
     raise InputError(
         problem,
         where="task_space",
         found=found,
-        allowed=f"[{', '.join(names)}]" if is_usual else None,
+        allowed=f"[{', '.join(others)}]" if is_usual else None,
+        hint=None if is_usual else _TURNS_ALONE,
     )
 
 

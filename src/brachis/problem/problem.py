@@ -32,7 +32,6 @@ from brachis.problem.feasibility import (
     check_postures,
     check_regular,
     check_smoothness,
-    lacks_a_direction,
 )
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
@@ -323,7 +322,7 @@ def decompositions_of(
     asked = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and robot.n >= task_map.m:
         check_independent(task_map)
-    if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
+    if not matches and (asked or robot.n < task_map.m):
         if len(found) <= 1:
             # Nothing to choose: the reasons of the only choice, or the wrong number of joints.
             ik.find(robot, task_map, (), families=families)

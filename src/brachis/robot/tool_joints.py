@@ -79,7 +79,7 @@ class ToolJoint:
 
 def rolls_freely(space: str | Sequence[str]) -> bool:
     """Tell whether a task space leaves the roll of the tool about its z axis free."""
-    return space in (FREE_ROLL, AXIS) or (not isinstance(space, str) and AXIS in space)
+    return space == FREE_ROLL or AXIS in space
 
 
 def tool_joints_of(

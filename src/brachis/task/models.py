@@ -178,8 +178,9 @@ class Task(CheckedModel):
     begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, angles in rad). For a pose, or with axis:
-    {position: [x, y, z], rpy_deg: [...]}, or another orientation convention. Null: the tool's place in the start posture,
-    or the first waypoint. It must agree with a given start posture."""
+    {position: [x, y, z], rpy_deg: [...]}, or another orientation convention; of the position the rows of the task space
+    count. Null: the tool's place in the start posture, or the first waypoint. It must agree with a given start posture.
+    """
     end: FreePosture = "free"
     """Configuration at the end of the path: free or {joints: ...}. Its tool must be at the path's end, to 1e-6 m or
     rad; the nearest posture on the path is then used."""
@@ -399,7 +400,7 @@ class Task(CheckedModel):
 
     def _mistakes_in_tolerances(self) -> Iterator[Mistake]:
         asked = self.tolerances
-        of_places = self._has_whole_poses or self.task_space == POSITION
+        of_places = self.task_space in {"pose", "pose_free_roll", POSITION}
         if asked.orientation != OrientationTolerance() and not self.of_poses:
             yield (
                 "tolerances.orientation",
@@ -409,8 +410,8 @@ class Task(CheckedModel):
         if asked.position != PositionTolerance() and not of_places:
             yield (
                 "tolerances.position",
-                "the path does not prescribe the whole position",
-                "tolerances of the position with task_space: position or pose",
+                "this task space has no tolerances of the position",
+                "task_space: position, pose or pose_free_roll with them",
             )
         if asked.orientation.roll is not None and self.task_space != "pose":
             yield (
@@ -454,11 +455,8 @@ class Task(CheckedModel):
     @property
     def of_poses(self) -> bool:
         """Whether the path has an orientation of the tool, or of its axis."""
-        return self._has_whole_poses or "axis" in self.task_space
-
-    @property
-    def _has_whole_poses(self) -> bool:
-        return self.task_space in {"pose", "pose_free_roll"}
+        space = self.task_space
+        return space in {"pose", "pose_free_roll"} or "axis" in space
 
     @property
     def start_place(self) -> StartPlace:

@@ -56,12 +56,6 @@ def tool_placements(
     return origin - np.einsum("kij,jk->ki", rotation, np.array([x, y, z])), rotation
 
 
-def angles_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Angles, (K,), rad, between vectors, (K, d)."""
-    apart = np.linalg.norm(first - second, axis=1)
-    return 2.0 * np.arctan2(apart, np.linalg.norm(first + second, axis=1))
-
-
 def real_tool_placements(
     robot: Robot, rotations: np.ndarray, origins: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,6 @@ from brachis.path import path_of
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace, RowsAndAngle
-from brachis.robot.tool_joints import rolls_freely
 from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
     check_continuity,
@@ -29,7 +28,7 @@ from brachis.verify.checks import (
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
-from brachis.verify.mechanics import angles_between, tool_placements, turns_about
+from brachis.verify.mechanics import tool_placements, turns_about
 from brachis.verify.motion import Given
 from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
@@ -124,27 +123,24 @@ def verify_trajectory(
 
 
 def _path_errors(given: Given, targets: np.ndarray) -> np.ndarray:
-    """Return how far the tool is from task coordinates, (K, c): the larger of distance and angle, (K,), m or rad."""
+    """Return the tool's distance, m, or largest angle of an axis, rad, from task coordinates, (K, c): (K,)."""
     task_map = given.task_map
     positions, rotations = tool_placements(given.robot, given.states.q, given.joints)
     axes = list(task_map.axes)
     distances = np.linalg.norm(positions[:, axes] - targets[:, : len(axes)], axis=1)
-    if isinstance(task_map, RowsAndAngle):
-        normal = np.eye(3)[task_map.world_axis]
-        pointer = rotations[:, :, task_map.tool_axis]
-        pointer = pointer - np.outer(pointer @ normal, normal)
-        turned = turns_about(normal, targets[:, -1])[:, :, task_map.plane[0]]
-        angles = angles_between(pointer, turned)
-    elif task_map.angles:
-        wanted = targets[:, -9:].reshape(-1, 3, 3)
-        if rolls_freely(given.task.task_space):
-            angles = angles_between(rotations[:, :, 2], wanted[:, :, 2])
-        else:
-            chords = np.linalg.norm(rotations - wanted, axis=(1, 2))
-            angles = 2.0 * np.arcsin((chords / np.sqrt(8.0)).clip(max=1.0))
-    else:
+    if not task_map.angles:
         return distances
-    return np.maximum(distances, angles)
+    if isinstance(task_map, RowsAndAngle):
+        # In the plane, for axes of rounded URDFs are tilted a little.
+        axis = task_map.world_axis
+        pointers = np.delete(rotations, axis, axis=1)[:, :, [task_map.tool_axis]]
+        turned = turns_about(np.eye(3)[axis], targets[:, -1])
+        wanted = np.delete(turned, axis, axis=1)[:, :, [task_map.plane[0]]]
+    else:
+        pointers = rotations
+        wanted = targets[:, -9:].reshape(-1, 3, 3)
+    chords = np.linalg.norm(pointers - wanted, axis=1).max(axis=1)
+    return np.maximum(distances, 2.0 * np.arcsin((0.5 * chords).clip(max=1.0)))
 
 
 def _check_path(given: Given) -> Check:

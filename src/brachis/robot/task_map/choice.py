@@ -109,10 +109,9 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
         return Pose(robot)
     positions = position_rows(names)
     turning = names[len(positions) :]
-    is_repeated = len(set(names)) < len(names)
-    is_unknown = is_word or not {*names} <= {*ROWS}
-    is_ordered = {*positions} <= {*AXES} and names == (*positions, *turning[:1])
-    if not names or is_unknown or is_repeated or not is_ordered:
+    is_known = not is_word and names and {*names} <= {*ROWS}
+    is_ordered = names == (*positions, *turning[:1]) and len({*names}) == len(names)
+    if not is_known or not is_ordered:
         raise InputError(
             "this task space does not exist",
             where="task_space",

@@ -80,7 +80,7 @@ class TaskMap(Summary, ABC):
     (2, ('x', 'y'))
     """
 
-    in_tool_axes: ClassVar[bool] = True
+    in_tool_axes: ClassVar[bool] = False
     """Whether twists are in the axes of the tool frame; else they are in those of the world."""
 
     robot: Robot
@@ -96,10 +96,10 @@ class TaskMap(Summary, ABC):
         """Rows behind those of the position: an angle, or three of rotation; none in a space of joints."""
         return () if joints_of(self.rows) else self.rows[len(self.axes) :]
 
-    @property
+    @cached_property
     def prescribed(self) -> Prescribed:
         """What of the tool is prescribed, as the kernel takes it; a space of joints has none."""
-        raise NotImplementedError
+        return Prescribed(self.axes, len(self.angles), in_tool_axes=self.in_tool_axes)
 
     @property
     def m(self) -> int:
@@ -117,13 +117,16 @@ class TaskMap(Summary, ABC):
         Raises
         ------
         InputError
-            They are not as many as the rows, or do not make a pose.
+            They are not as many as the rows.
         """
-        if isinstance(stated, ToolPose) or len(stated) != self.m:
+        if isinstance(stated, ToolPose):
+            rotation = stated.rotation.as_matrix()
+            return self.of_placements(np.array([stated.position]), rotation[None])[0]
+        if len(stated) != self.m:
             raise InputError(
                 "this is the wrong number of coordinates",
                 where=where,
-                found="a pose" if isinstance(stated, ToolPose) else len(stated),
+                found=len(stated),
                 allowed=f"{self.m}: {', '.join(self.rows)}",
             )
         return np.array(stated, dtype=float)
@@ -138,7 +141,7 @@ class TaskMap(Summary, ABC):
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); a space of joints has none."""
-        raise NotImplementedError
+        return positions[:, list(self.axes)]
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Displacement (..., m) that leads from the `second` task coordinates (..., c) to the `first`; row by row."""
@@ -161,7 +164,7 @@ class TaskMap(Summary, ABC):
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Rows (m, ...) of the task velocity that twists (6, ...) of the tool make; a space of joints has none."""
-        raise NotImplementedError
+        return twists[self.prescribed.parts]
 
     def jacobian(self, twists: np.ndarray) -> np.ndarray:
         """Task Jacobian J (K, m, n) from the `twists` at K postures."""

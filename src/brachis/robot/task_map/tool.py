@@ -2,91 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from brachis.errors import InputError
 from brachis.kernel import Prescribed, rotation_vectors
 from brachis.robot.joints import principal
 from brachis.robot.task_map.protocol import ANGLES, POSE_ROWS, TaskMap
-from brachis.task import ToolPose
-
-
-class _Oriented(TaskMap):
-    """A task map that prescribes the whole orientation, whose matrix is behind the rows of the position."""
-
-    def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
-        """Return the coordinates, (c,), of a pose that a task states."""
-        if not isinstance(stated, ToolPose):
-            raise InputError(
-                "the orientation is missing",
-                where=where,
-                found=list(stated),
-                allowed="a position with an orientation (ToolPose)",
-            )
-        rotation = stated.rotation.as_matrix()
-        return self.of_placements(np.array([stated.position]), rotation[None])[0]
-
-    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return the rows of the positions, then rotation matrices row by row, (K, c)."""
-        rows = positions[:, list(self.axes)]
-        return np.concatenate([rows, rotations.reshape(-1, 9)], axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pose(_Oriented):
+class RowsAndOrientation(TaskMap):
+    """Rows of the tool frame's position in the world frame, and its orientation.
+
+    Its rows are velocities along the world's axes and rotation about them; task coordinates are the rows of the
+    position, then the rotation matrix row by row (9). Where a virtual joint rolls the tool, they prescribe the
+    direction of its z axis.
+    """
+
+    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Return the rows of the positions, then rotation matrices row by row, (K, c)."""
+        rows = super().of_placements(positions, rotations)
+        return np.concatenate([rows, rotations.reshape(-1, 9)], axis=1)
+
+    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the displacement row by row, and the rotation vector, (..., m), in the world."""
+        first, second = np.broadcast_arrays(first, second)
+        count = len(self.axes)
+        to = first[..., count:].reshape(-1, 3, 3)
+        back = second[..., count:].reshape(-1, 3, 3).swapaxes(1, 2)
+        turn = rotation_vectors(to @ back).reshape(*first.shape[:-1], 3)
+        return np.concatenate([(first - second)[..., :count], turn], axis=-1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pose(RowsAndOrientation):
     """The tool frame's pose.
 
-    It has 12 coordinates for its 6 rows: the position (3), then the rotation matrix row by row (9), both in the world
-    frame. Its rows are those of the body twist: displacement (m) and rotation (rad) along and about the tool frame's
-    own axes, as the formulas of `twists` give them.
+    Its 12 coordinates are the position (3) and the rotation matrix (9) in the world frame. Its rows are those of the
+    body twist: displacement (m) and rotation (rad) along and about the tool frame's own axes, as the formulas of
+    `twists` give them.
     """
+
+    in_tool_axes: ClassVar[bool] = True
 
     rows: tuple[str, ...] = POSE_ROWS
 
-    @cached_property
-    def prescribed(self) -> Prescribed:
-        """The pose."""
-        return Prescribed(self.axes, 3, in_tool_axes=True)
-
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return the translation and the rotation vector, (..., 6), in the frame of `second`."""
-        first = np.asarray(first, dtype=float)
-        first, second = np.broadcast_arrays(first, np.asarray(second, dtype=float))
-        shape = first.shape[:-1]
-        to = first[..., 3:].reshape(*shape, 3, 3)
-        back = np.swapaxes(second[..., 3:].reshape(*shape, 3, 3), -1, -2)
-        shift = np.einsum("...ij,...j->...i", back, first[..., :3] - second[..., :3])
-        turn = rotation_vectors((back @ to).reshape(-1, 3, 3))
-        return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
-
-    def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Return the twists themselves."""
-        return twists
+        moved = super().difference(first, second)
+        rotation = second[..., 3:].reshape(*second.shape[:-1], 3, 3)
+        parts = moved.reshape(*moved.shape[:-1], 2, 3)
+        return (parts @ rotation).reshape(moved.shape)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WorldRows(TaskMap):
     """Rows of the tool frame's position in the world frame; task coordinates are the rows themselves."""
-
-    in_tool_axes: ClassVar[bool] = False
-
-    @cached_property
-    def prescribed(self) -> Prescribed:
-        """The rows of the position."""
-        return Prescribed(self.axes)
-
-    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return the rows of the positions, (K, m)."""
-        return positions[:, list(self.axes)]
-
-    def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Return the rows of the linear velocity."""
-        return twists[list(self.axes)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,16 +101,11 @@ class RowsAndAngle(WorldRows):
         """+1 where the angle turns the first axis of `plane` towards the second one, else -1."""
         return -1.0 if self.world_axis == 1 else 1.0
 
-    def headings(self, rotations: np.ndarray) -> np.ndarray:
-        """Return the cosine and the sine, (2, K), of the angle for rotations (K, 3, 3)."""
-        first, second = self.plane
-        pointer = rotations[:, :, self.tool_axis]
-        return np.array([pointer[:, first], self.sign * pointer[:, second]])
-
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return the rows of the positions, and the angle in (-pi, pi]."""
-        cosine, sine = self.headings(rotations)
-        angle = np.arctan2(sine, cosine)
+        first, second = self.plane
+        pointer = rotations[:, :, self.tool_axis]
+        angle = np.arctan2(self.sign * pointer[:, second], pointer[:, first])
         return np.column_stack([super().of_placements(positions, rotations), angle])
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -144,38 +113,3 @@ class RowsAndAngle(WorldRows):
         delta = super().difference(first, second).copy()
         delta[..., -1] = principal(delta[..., -1])
         return delta
-
-    def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Return the rows of the linear velocity, and the angular one about the world axis."""
-        return twists[[*self.axes, 3 + self.world_axis]]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RowsAndOrientation(_Oriented):
-    """Rows of the tool frame's position in the world frame, and its orientation.
-
-    Its rows are velocities along the world's axes and rotation about them; task coordinates are the rows of the
-    position, then the rotation matrix row by row. Where a virtual joint rolls the tool, they prescribe the direction of
-    its z axis.
-    """
-
-    in_tool_axes: ClassVar[bool] = False
-
-    @cached_property
-    def prescribed(self) -> Prescribed:
-        """The rows of the position, and the orientation."""
-        return Prescribed(self.axes, 3)
-
-    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the displacement row by row, and the rotation vector, (..., m), in the world."""
-        first, second = np.broadcast_arrays(first, second)
-        count = len(self.axes)
-        shape = first.shape[:-1]
-        to = first[..., count:].reshape(-1, 3, 3)
-        back = second[..., count:].reshape(-1, 3, 3).swapaxes(1, 2)
-        turn = rotation_vectors(to @ back).reshape(*shape, 3)
-        return np.concatenate([(first - second)[..., :count], turn], axis=-1)
-
-    def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Return the rows of the linear velocity, and the angular velocity."""
-        return twists[[*self.axes, 3, 4, 5]]

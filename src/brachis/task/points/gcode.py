@@ -109,7 +109,8 @@ def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
     TaskError
         The program has words that are not understood, or an invalid arc; the message names the line.
     """
-    names = POSITION if isinstance(rows, str) else rows
+    is_given = isinstance(rows, tuple)
+    names = tuple(row for row in rows if row != "axis") if is_given else POSITION
     if not set(names) <= set(POSITION):
         raise TaskError(
             "G-code contains only positions",

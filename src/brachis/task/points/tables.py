@@ -207,9 +207,12 @@ def _allowed_columns(rows: Rows) -> str:
 
 
 def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
+    position = POSITION
     if isinstance(rows, tuple):
-        return (rows,)
-    return (POSITION, *(POSITION + columns for columns in _ORIENTATIONS))
+        if "axis" not in rows:
+            return (rows,)
+        position = rows[:-1]
+    return (position, *(position + columns for columns in _ORIENTATIONS))
 
 
 def _read_columns(
@@ -269,7 +272,7 @@ def _heading(text: str) -> tuple[str, str | None]:
 
 def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str | None:
     """Return the convention of the orientations: the only one that the columns leave, or the one that is stated."""
-    columns = names[len(POSITION) :]
+    columns = tuple(name for name in names if name not in POSITION)
     possible = _ORIENTATIONS.get(columns, ())
     if stated is None and len(possible) > 1:
         raise TaskError(

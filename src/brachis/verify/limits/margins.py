@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.arrays import cross
-from brachis.robot.task_map import JointSpace, RowsAndAngle
+from brachis.robot.task_map import JointSpace
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.mechanics import joint_placements, tool_placements
 from brachis.verify.motion import Given, MotionStates
@@ -54,13 +54,7 @@ def _singular_values(
         arm = cross(axis, tool - origins[:, number].T)
         columns.append((axis, 0.0 * axis) if body.sliding else (arm, axis))
     every = np.array(columns).reshape(len(columns), 6, -1).T
-    task_map = given.task_map
-    rows = list(task_map.axes)
-    if isinstance(task_map, RowsAndAngle):
-        rows.append(3 + task_map.world_axis)
-    elif task_map.m > len(rows):
-        rows += [3, 4, 5]
-    jacobian = every[:, rows]
+    jacobian = every[:, given.task_map.prescribed.parts]
     squares = np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(1, 2))[:, 0]
     return np.sqrt(squares.clip(min=0.0))
 

@@ -1,0 +1,331 @@
+"""Rows of position with an angle, and the tool's axis: plans against analytic times and Pinocchio."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import DecompositionError, TaskError
+from brachis.ik import default_task_space, find, find_all
+from brachis.path import build_path
+from brachis.robot import Robot, bind, task_map_of
+from brachis.task import load_task
+from support.chains import Joint, chain_urdf
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+SCARA, PALLETISER, GANTRY = "ZZzZ", "ZzxZ", "xyzZ"
+YAWING = ["x", "y", "z", "yaw"]
+
+
+def chain(word: str, tool: tuple[float, float, float] = (0.1, 0.0, -0.1)) -> Robot:
+    """Make a robot from letters: slides along x, y, z and turns about X, Y, Z."""
+    joints = []
+    for letter in word:
+        slides = letter.islower()
+        bound = 1.5 if slides else 3.1
+        limit = {"lower": -bound, "upper": bound, "velocity": 4.0, "effort": 200.0}
+        kind = "prismatic" if slides else "revolute"
+        turned = bool(joints) and joints[-1].kind == "revolute"
+        offset = (0.4 if turned else 0.05, 0.0, 0.03)
+        joints.append(Joint(kind, AXES[letter.lower()], offset, limit=limit))
+    return Robot.from_urdf("chain", urdf_text=chain_urdf(joints, tool=tool))
+
+
+QUICK = {
+    "search": {"effort": "single", "least_motion": False},
+    "spline": {"intervals": 8},
+}
+
+
+def plan(robot, start, space, path, **keywords):
+    """Plan with little search."""
+    settings = {**QUICK, **keywords}
+    return brachis.plan(robot, start=start, task_space=space, path=path, **settings)
+
+
+def tool_along(trajectory):
+    """Path coordinates, and placements of the tool's frame by Pinocchio, along a saved motion."""
+    model = pin.buildModelFromXML(trajectory.urdf)
+    data = model.createData()
+    frame = model.getFrameId(trajectory.robot.settings.tool_frame or "tool")
+    samples = trajectory.sample(trajectory.t_end / 200)
+    placements = []
+    for q in samples.q[:, : model.nq]:
+        pin.framesForwardKinematics(model, data, q)
+        placements.append(data.oMf[frame].copy())
+    return samples.s, placements
+
+
+@pytest.mark.parametrize(
+    ("word", "start", "by"),
+    [
+        (SCARA, [0.3, 1.2, 0.1, 0.2], [-0.1, 0.12, 0.05, 0.8]),
+        (SCARA, [0.3, 1.2, 0.1, 0.2], [0.0, 0.0, 0.0, -1.5]),
+        (PALLETISER, [0.3, 0.3, 0.2, 0.2], [-0.1, 0.12, -0.05, -1.0]),
+        (GANTRY, [0.1, 0.1, 0.1, 0.2], [0.3, 0.1, -0.1, 1.0]),
+        ("zZZZ", [0.1, 0.3, 1.2, -0.4], [-0.1, 0.02, 0.05, 0.4]),
+        ("ZZzZZ", [0.3, 0.9, 0.1, 0.4, 0.2], [-0.1, 0.12, 0.05, 0.8]),
+    ],
+)
+def test_position_and_yaw_follow_the_line(word, start, by, tmp_path):
+    result = plan(chain(word), start, YAWING, [{"line": {"by": by}}])
+    assert result.verified
+    file = tmp_path / "motion.npz"
+    result.trajectory.save(file)
+    s, placements = tool_along(brachis.Trajectory.load(file))
+    first = placements[0]
+    moved = [placed.translation - first.translation for placed in placements]
+    np.testing.assert_allclose(moved, np.outer(s, by[:3]), atol=1e-8)
+    turned = [pin.log3(placed.rotation @ first.rotation.T) for placed in placements]
+    np.testing.assert_allclose(turned, np.outer(s, [0.0, 0.0, by[3]]), atol=1e-8)
+
+
+LIMITS = {"torque": None, "velocity": 20.0}
+BANG_BANG = [
+    # The joint that takes longest from rest to rest decides: t = 2 sqrt(d / a).
+    (GANTRY, [0.0, 0.0, 0.1, 0.2], [0.5, 0.4, 0.1, 1.0], [3.0, 2.0, 4.0, 10.0]),
+    (GANTRY, [0.0, 0.0, 0.1, 0.2], [0.1, 0.1, 0.1, 2.0], [3.0, 2.0, 4.0, 10.0]),
+    (SCARA, [0.3, 1.2, 0.1, 0.2], [0.0, 0.0, 0.3, 0.5], [20.0, 20.0, 5.0, 40.0]),
+    (SCARA, [0.3, 1.2, 0.1, 0.2], [0.0, 0.0, 0.02, 1.5], [20.0, 20.0, 5.0, 40.0]),
+]
+
+
+@pytest.mark.parametrize(("word", "start", "by", "accelerations"), BANG_BANG)
+def test_the_time_where_one_joint_decides(word, start, by, accelerations):
+    tool = (0.0, 0.0, -0.1)  # on the last axis
+    robot = chain(word, tool).with_limits(**LIMITS, acceleration=accelerations)
+    result = plan(robot, start, YAWING, [{"line": {"by": by}}], spline={})
+    assert result.verified
+    exact = max(2.0 * np.sqrt(np.abs(by) / accelerations))
+    assert result.t_end == pytest.approx(exact, rel=1e-3)
+    assert result.t_end >= exact * (1.0 - 1e-6)
+
+
+def test_the_time_of_a_quill_by_its_force():
+    robot = chain(SCARA, (0.0, 0.0, -0.1)).with_limits(torque={"j3": 60.0})
+    line = [{"line": {"by": [0.0, 0.0, 0.3, 0.0]}}]
+    start = [0.3, 1.2, 0.1, 0.2]
+    result = plan(robot, start, YAWING, line, search={}, spline={})
+    mass = 4.0  # two bodies of 2 kg
+    up, down = 60.0 / mass - 9.81, 60.0 / mass + 9.81
+    exact = np.sqrt(2.0 * 0.3 * (1.0 / up + 1.0 / down))
+    assert result.t_end == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("word", "rows", "family"),
+    [
+        (SCARA, YAWING, "planar"),
+        (SCARA, ["z", "y", "x", "yaw"], "planar"),
+        (PALLETISER, YAWING, "planar"),
+        (GANTRY, YAWING, "planar"),
+        ("xyzY", ["x", "y", "z", "pitch"], "planar"),
+        ("zZZZ", YAWING, "planar"),
+        ("yYYY", ["x", "y", "z", "pitch"], "planar"),
+        ("YYY", ["x", "z", "pitch"], "planar"),
+        (SCARA, ["x", "z", "yaw"], None),
+        (SCARA, ["z", "yaw"], None),
+    ],
+)
+def test_closed_forms(word, rows, family):
+    robot = chain(word)
+    found = find_all(robot, task_map_of(robot, rows))
+    assert {choice.family for choice in found} == {family}
+
+
+@pytest.mark.parametrize(
+    ("redundant", "exists"), [("j1", True), ("j2", True), ("j3", False), ("j4", True)]
+)
+def test_positions_of_a_scara_with_a_redundant_joint(redundant, exists):
+    robot = chain(SCARA)
+    task_map = task_map_of(robot, ["x", "y", "z"])
+    if not exists:
+        with pytest.raises(DecompositionError, match="z needs one slide"):
+            find(robot, task_map, [redundant])
+        return
+    solver = find(robot, task_map, [redundant]).solver
+    q = np.random.default_rng(1).uniform(-1.4, 1.4, (50, 4))
+    held = robot.joint_names.index(redundant)
+    answers = solver.solve(task_map.values(q), q[:, [held]])[:, :, 0]
+    free = [i for i in range(4) if i != held]
+    gaps = np.abs(answers - q[:, None, free]).max(axis=2)
+    assert np.nanmin(gaps, axis=1).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("word", "rows", "start", "by"),
+    [
+        (SCARA, ["x", "z", "yaw"], [0.3, 1.2, 0.1, 0.2], [-0.1, 0.1, 0.3]),
+        (SCARA, ["yaw"], [0.3, 1.2, 0.1, 0.2], [1.0]),
+        ("YYYY", ["x", "z", "pitch"], [0.3, 0.8, 0.4, 0.3], [-0.1, 0.1, 0.5]),
+    ],
+)
+def test_charts_serve_rows_without_a_closed_form(word, rows, start, by):
+    result = plan(chain(word), start, rows, [{"line": {"by": by}}])
+    assert result.verified
+    s, placements = tool_along(result.trajectory)
+    space = task_map_of(chain(word), rows)
+    values = space.of_placements(
+        np.array([placed.translation for placed in placements]),
+        np.array([placed.rotation for placed in placements]),
+    )
+    missed = space.difference(values, values[0] + np.outer(s, by))
+    assert np.abs(missed).max() < 1e-8
+
+
+IIWA = [0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.1]
+ABOUT_Y = {"rotate": {"axis": [0, 1, 0], "angle_deg": 20}}
+
+
+@pytest.mark.parametrize(
+    ("robot", "start", "space", "segment", "by"),
+    [
+        ("iiwa14", IIWA, "axis", {"turn": ABOUT_Y}, []),
+        (
+            "iiwa14",
+            IIWA,
+            ["y", "x", "axis"],
+            {"line": {"by": [0.1, 0.05]}, "orientation": ABOUT_Y},
+            [0.1, 0.05],
+        ),
+    ],
+)
+def test_the_axis_of_the_tool_and_rows_of_its_position(
+    robot, start, space, segment, by
+):
+    robot = getattr(brachis.robots, robot)
+    result = plan(robot, start, space, [segment])
+    assert result.verified
+    trajectory = result.trajectory
+    sample = trajectory.sample(trajectory.t_end / 100)
+    placements = [robot.tool_placement(q) for q in sample.q[:, : robot.n]]
+    axes = np.array([placed.rotation[:, 2] for placed in placements])
+    about = [pin.exp3(s * np.deg2rad([0.0, 20.0, 0.0])) for s in sample.s]
+    np.testing.assert_allclose(axes, np.array(about) @ axes[0], atol=1e-8)
+    if by:
+        moved = np.array([placed.translation for placed in placements])
+        expected = np.outer(sample.s, by)
+        np.testing.assert_allclose((moved - moved[0])[:, [1, 0]], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("rows", [["axis"], ["z", "axis"], ["y", "x", "axis"]], ids=str)
+def test_rows_with_the_axis_against_differences(rows):
+    robot, task_map = bind(brachis.robots.iiwa14, rows)
+    rng = np.random.default_rng(2)
+    q, qdot, qddot = rng.normal(size=(3, 4, robot.n))
+    h = 1e-5
+
+    def at(t):
+        """Postures on a parabola."""
+        return q + t * qdot + 0.5 * t * t * qddot
+
+    velocity = task_map.difference(task_map.values(at(h)), task_map.values(at(-h)))
+    jacobian = task_map.jacobian(task_map.twists(q))
+    rate = np.einsum("kmn,kn->km", jacobian, qdot)
+    np.testing.assert_allclose(rate, velocity / (2.0 * h), atol=1e-7)
+    slopes = task_map.derivatives(task_map.twists(q), qdot, qddot).velocity_q
+
+    def rate_at(t):
+        """Task velocities of the postures there, with the rates of the first."""
+        return np.einsum(
+            "kmn,kn->km", task_map.jacobian(task_map.twists(q + t * qdot)), qdot
+        )
+
+    changed = (rate_at(h) - rate_at(-h)) / (2.0 * h)
+    bias = np.einsum("kmn,kn->km", slopes, qdot)
+    np.testing.assert_allclose(bias, changed, atol=1e-6)
+
+
+def test_samples_of_a_path_with_the_axis_against_differences():
+    _, task_map = bind(brachis.robots.iiwa14, ["x", "y", "axis"])
+    turning = {"rotate": {"axis": [1, 2, 0.5], "angle_deg": 80, "profile": "smooth"}}
+    task = load_task(
+        {
+            "brachis": 1,
+            "robot": {"urdf": "iiwa14"},
+            "start": {"joints": IIWA},
+            "task_space": ["x", "y", "axis"],
+            "path": [{"line": {"by": [0.1, 0.2]}, "orientation": turning}],
+        }
+    )
+    start = task_map.value(np.append(IIWA, 0.0))
+    path = build_path(task.path, start, task_map.rows)
+    s = np.linspace(0.1, 0.9, 7)
+    h = 1e-5
+    before, here, after = (path.sample(s + step) for step in (-h, 0.0, h))
+    velocity = task_map.difference(after.target, before.target) / (2.0 * h)
+    np.testing.assert_allclose(here.xi, velocity, atol=1e-7)
+    np.testing.assert_allclose(here.xi_ds, (after.xi - before.xi) / (2 * h), atol=1e-7)
+    bend = (after.xi_ds - before.xi_ds) / (2 * h)
+    np.testing.assert_allclose(here.xi_dds, bend, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("word", "space"),
+    [
+        (SCARA, YAWING),
+        (PALLETISER, YAWING),
+        (GANTRY, YAWING),
+        ("xyzY", ["x", "y", "z", "pitch"]),
+        ("zzzZ", ["x", "y", "z"]),
+        ("YYY", ["x", "z"]),
+        ("ZZz", ["x", "y", "z"]),
+    ],
+)
+def test_the_task_space_that_a_robot_has_by_default(word, space):
+    assert default_task_space(chain(word)) == space
+
+
+TURN = [{"turn": ABOUT_Y}]
+
+
+@pytest.mark.parametrize(
+    ("word", "space", "path", "texts"),
+    [
+        ("zZz", ["x", "y", "yaw"], None, ["x, y of the tool depend", "moved by j2", "[x, yaw]"]),
+        ("ZZZZ", YAWING, None, ["no joint changes z", "allowed: [x, y, yaw]"]),
+        (SCARA, ["x", "y", "axis"], [{"line": {"by": [0.1, 0.0]}}], ["no joint changes rx, ry", "prescribe rows"]),
+        ("YYYY", "axis", TURN, ["rx, rz of the tool depend", "tool_roll"]),
+        (SCARA, "pose", [{"line": {"by": [0.1, 0, 0]}}], ["such as [x, y, z, yaw]"]),
+        (PALLETISER, ["x", "y", "pitch"], None, ["with j1, j4 about other axes", "[x, y, yaw]"]),
+        ("ZYZ", "axis", [{"line": {"by": [0.1]}}], ["not in the task space", "turn: {rotate"]),
+    ],
+)  # fmt: skip
+def test_rows_that_are_refused(word, space, path, texts):
+    robot = chain(word)
+    path = path or [{"line": {"by": [0.1] * len(space)}}]
+    with pytest.raises(brachis.BrachisError) as caught:
+        plan(robot, [0.3] * robot.n, space, path)
+    for text in texts:
+        assert text in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["position", "orientation"])
+def test_tolerances_are_refused_where_they_do_not_apply(name):
+    tolerances = {"position": {"sphere": 0.001}, "orientation": {"tilt": 3.0}}
+    with pytest.raises(TaskError, match=f"tolerances.{name}"):
+        plan(
+            chain(SCARA),
+            [0.3, 1.2, 0.1, 0.2],
+            YAWING,
+            [{"line": {"by": [0.1, 0.0, 0.0, 0.0]}}],
+            tolerances={name: tolerances[name]},
+        )
+
+
+def test_rows_with_the_axis_have_one_name():
+    def space(rows):
+        """Load the task space."""
+        content = {
+            "brachis": 1,
+            "robot": {"urdf": "iiwa14"},
+            "start": {"joints": IIWA},
+            "task_space": rows,
+            "path": TURN,
+        }
+        return load_task(content).task_space
+
+    assert space("axis") == space(["axis"]) == ("axis",)
+    assert space(["x", "y", "z", "axis"]) == "pose_free_roll"
