@@ -107,7 +107,8 @@ def test_the_time_of_a_quill_by_its_force():
     robot = chain(SCARA, (0.0, 0.0, -0.1)).with_limits(torque={"j3": 60.0})
     line = [{"line": {"by": [0.0, 0.0, 0.3, 0.0]}}]
     start = [0.3, 1.2, 0.1, 0.2]
-    result = plan(robot, start, YAWING, line, search={}, spline={})
+    at_rest = {"rest": "velocity"}
+    result = plan(robot, start, YAWING, line, search={}, spline=at_rest)
     mass = 4.0  # two bodies of 2 kg
     up, down = 60.0 / mass - 9.81, 60.0 / mass + 9.81
     exact = np.sqrt(2.0 * 0.3 * (1.0 / up + 1.0 / down))
