@@ -104,13 +104,14 @@ def test_the_time_where_one_joint_decides(word, start, by, accelerations):
 
 
 def test_the_time_of_a_quill_by_its_force():
-    robot = chain(SCARA, (0.0, 0.0, -0.1)).with_limits(torque={"j3": 60.0})
+    robot = chain(SCARA, (0.0, 0.0, -0.1)).with_limits(torque={"j3": 120.0})
     line = [{"line": {"by": [0.0, 0.0, 0.3, 0.0]}}]
     start = [0.3, 1.2, 0.1, 0.2]
     at_rest = {"rest": "velocity"}
     result = plan(robot, start, YAWING, line, search={}, spline=at_rest)
     mass = 4.0  # two bodies of 2 kg
-    up, down = 60.0 / mass - 9.81, 60.0 / mass + 9.81
+    up = 120.0 / mass - 9.81
+    down = 120.0 / mass + 9.81
     exact = np.sqrt(2.0 * 0.3 * (1.0 / up + 1.0 / down))
     assert result.t_end == pytest.approx(exact, rel=1e-3)
 

@@ -207,7 +207,7 @@ def _allowed_columns(rows: Rows) -> str:
 
 
 def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
-    position = POSITION
+    position: tuple[str, ...] = POSITION
     if isinstance(rows, tuple):
         if "axis" not in rows:
             return (rows,)
