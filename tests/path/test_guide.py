@@ -11,6 +11,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import brachis
+from brachis.path import build_path
 from support.poses import pose_path
 from support.seams import wave
 
@@ -25,8 +26,27 @@ EXAMPLES = [
 ]
 
 
+OF_ROWS = [text for text in EXAMPLES if "task_space: [" in text]
+OF_POSES = [text for text in EXAMPLES if text not in OF_ROWS]
+
+
 def test_there_are_examples() -> None:
-    assert len(EXAMPLES) == 4
+    assert (len(OF_ROWS), len(OF_POSES)) == (2, 4)
+
+
+@pytest.mark.parametrize("example", OF_ROWS)
+def test_examples_of_rows_are_paths(example: str) -> None:
+    content = yaml.safe_load(example)
+    start = {"joints": [0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.1]}
+    usual = {"brachis": 1, "robot": {"urdf": "iiwa14"}, "start": start}
+    task = brachis.load_task({**usual, **content})
+    rows = tuple(content["task_space"])
+    coordinates = np.zeros(4)
+    if rows[-1] == "axis":
+        rows = (*rows[:-1], "rx", "ry", "rz")
+        coordinates = np.concatenate([np.zeros(2), np.eye(3).ravel()])
+    path = build_path(task.path, coordinates, rows)
+    assert np.abs(path.sample([0.0, 0.5, 1.0]).xi[:, 3:]).max() > 0.1
 
 
 def test_the_curve_of_a_data_sheet_is_taken() -> None:
@@ -44,7 +64,7 @@ def test_the_limits_of_ros_are_read(tmp_path: Path) -> None:
     assert limits.velocity == {"shoulder_pan_joint": pytest.approx(np.radians(120.0))}
 
 
-@pytest.mark.parametrize("example", EXAMPLES)
+@pytest.mark.parametrize("example", OF_POSES)
 def test_examples_are_paths(
     example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

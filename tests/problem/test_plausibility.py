@@ -365,7 +365,8 @@ def test_yaw_of_the_path_start_in_degrees():
     )
     content["path"] = [{"line": {"by": [0.0, 0.2, 0.0]}}]
     with pytest.raises(
-        PlausibilityError, match="path_start: yaw looks like degrees; found 90 rad"
+        PlausibilityError,
+        match="path_start: the angle looks like degrees; found 90 rad",
     ):
         brachis.plan(content, strict=True)
 
@@ -427,7 +428,7 @@ def test_a_turn_in_degrees_is_out_of_reach_and_the_hint_says_why():
         pytest.raises(PathError, match="out of reach") as caught,
     ):
         brachis.plan(content)
-    assert caught.value.hint == "The turn of yaw looks like degrees: 90 rad"
+    assert caught.value.hint == "The turn of the angle looks like degrees: 90 rad"
 
 
 def test_a_path_that_is_too_long_in_metres_has_no_such_hint():

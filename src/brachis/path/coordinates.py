@@ -183,7 +183,8 @@ class PoseCoordinates(RowCoordinates):
         shape = segment.shape
         if isinstance(shape, SplineThrough) and shape.orientations is not None:
             return pose_spline(shape, context, rotation)
-        if isinstance(shape, BSplineCurve) and shape.has_orientations:
+        columns = len(self.rows) + 4
+        if isinstance(shape, BSplineCurve) and len(shape.control_points[0]) == columns:
             return pose_bspline(shape, context, rotation)
         curve = BUILDERS[type(shape)](shape, context)
         key = f"path[{index}].orientation"
