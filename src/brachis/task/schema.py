@@ -14,7 +14,7 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a task file.
 
     An editor with the YAML language server completes and checks keys with it, given a first line
-    ``# yaml-language-server: $schema=task.schema.json``. What crosses several keys (yaw only with two position rows, no
+    ``# yaml-language-server: $schema=task.schema.json``. What crosses several keys (an angle only as the last row, no
     blend on the last segment) is checked by `brachis.task.load_task` alone.
     """
     schema = Task.model_json_schema(mode="validation")

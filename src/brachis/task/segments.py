@@ -2,8 +2,8 @@
 
 A path is a list of mappings, ``- line: {to: [0.5, 0]}``, each with an optional ``blend`` and, in task spaces of poses,
 an optional ``orientation``. A segment begins where its predecessor ends, the first one at the task coordinates of the
-start posture. Lengths are in metres, angles in degrees except the yaw coordinate, which is a task coordinate and
-therefore in radians. Coordinates are those of all rows of the task space; of a pose they are x, y, z. Whether their
+start posture. Lengths are in metres, angles in degrees except yaw, pitch and roll as task coordinates, which are
+in radians. Coordinates are those of all rows of the task space; of a pose they are x, y, z. Whether their
 number fits the task space is for the path to say (`brachis.path.build_path`), which knows both.
 
 A kind of segment is a model here, in the union `Segment`, and the function in `brachis.path` that makes its curve.
@@ -68,7 +68,7 @@ class BSplineCurve(CheckedModel):
     """Knots in ascending order: the first and the last one degree + 1 times, others up to degree - 3 times. Lengths of
     blends and speeds are in m only if the knots are in m along the curve."""
     control_points: Annotated[tuple[Vector, ...], Field(min_length=SMOOTHNESS + 2)]
-    """Control points with all task coordinates (m, yaw in rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the
+    """Control points with all task coordinates (m, angles in rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the
     curve of quaternions is divided by its length."""
     relative: Flag = False
     """Whether the curve is moved to the segment's start, wherever that is, as with csv."""
@@ -126,7 +126,7 @@ class BSplineCurve(CheckedModel):
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw along the segment, for task spaces with yaw: fixed, or turning with the tangent."
+        description="Yaw, pitch or roll along the segment, in task spaces that have it: fixed, or turning with the tangent."
     ),
 ]
 Normal = Annotated[
@@ -136,7 +136,7 @@ Normal = Annotated[
     ),
 ]
 Centre = Annotated[
-    Vector, Field(description="Centre, m: the position coordinates, without yaw.")
+    Vector, Field(description="Centre, m: the position coordinates alone.")
 ]
 
 
@@ -158,18 +158,18 @@ class LineTo(Model):
     """A straight line to a point."""
 
     to: Coordinates
-    """End point: all task coordinates (m, yaw in rad)."""
+    """End point: all task coordinates (m, angles in rad)."""
 
 
 class LineBy(Model):
     """A straight line by a displacement."""
 
     by: Coordinates
-    """Displacement: all task coordinates (m, yaw in rad)."""
+    """Displacement: all task coordinates (m, angles in rad)."""
 
 
 class LineHeading(Model):
-    """A straight line of given length and direction, in the plane of two position rows; yaw stays."""
+    """A straight line of given length and direction, in the plane of two position rows; the angle stays."""
 
     length: NonNegative
     """Length, m."""
@@ -191,9 +191,9 @@ class ArcVia(Model):
     """A circular arc through a point to another one."""
 
     via: Vector
-    """A point between start and end, m: the position coordinates, without yaw."""
+    """A point between start and end, m: the position coordinates alone."""
     to: Vector
-    """End point, m: the position coordinates, without yaw."""
+    """End point, m: the position coordinates alone."""
     yaw: Yaw = "fixed"
 
 
@@ -223,7 +223,7 @@ class SplineThrough(CheckedModel):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
     through: NonEmpty[Coordinates]
-    """Waypoints, each with all task coordinates (m, yaw in rad)."""
+    """Waypoints, each with all task coordinates (m, angles in rad)."""
     orientations: tuple[Attitude, ...] | None = None
     """Orientation of the tool at each waypoint, for poses. Null: the segment's `orientation` counts."""
     relative: Flag = False
