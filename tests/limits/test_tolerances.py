@@ -138,7 +138,7 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
     ("tolerances", "space", "match"),
     [
         ({"orientation": {"tilt": 15}}, "position", "prescribe the orientation"),
-        ({"position": {"sphere": 0.1}}, ["x", "y"], "prescribe the whole position"),
+        ({"position": {"sphere": 0.1}}, ["x", "y"], "no tolerances of the position"),
         ({"orientation": {"roll": 5}}, "pose_free_roll", "roll is free"),
         ({"orientation": {"lead": [5, 2]}}, "pose", "not a range"),
         ({"orientation": {"lead": 100}}, "pose", "within 80 of zero"),

@@ -126,7 +126,7 @@ class BSplineCurve(CheckedModel):
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw, pitch or roll along the segment, in task spaces that have it: fixed, or turning with the tangent."
+        description="Yaw, pitch or roll along the segment, where a row: fixed, or turning with the tangent."
     ),
 ]
 Normal = Annotated[

@@ -108,7 +108,7 @@ def test_compare(run, recorded, tmp_path):
             ("--angle", "grad"),
             "there is no unit of angle named 'grad'; allowed: rad, mrad, deg",
         ),
-        (("--task-space", "x,z,y,yaw"), "yaw"),
+        (("--task-space", "yaw,x,y"), "yaw"),
         (
             ("--tolerance", "0.1"),
             "the tolerance of a path is out of range; found 0.1; allowed: 2e-07 to 0.001",
