@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -44,19 +44,19 @@ from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import Search, TaskProgram, first_guess, try_remedies
-from brachis.search.given_motion import with_tolerances
+from brachis.search.fewer_joints import search_motion
+from brachis.search.given_motion import widen_plan
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
 from brachis.task import (
     Source,
     Task,
     TaskKeywords,
-    Tolerances,
     check_keywords,
     task_with,
 )
 from brachis.timing import SlowTimingWarning
-from brachis.trajectory import Motion, Trajectory, motion_of
+from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -167,7 +167,8 @@ def plan(
             _report_plan(robot, asked, report)
             problem = Problem.of(robot, asked, own_limits)
             remarks += report_issues(of_places(problem), strict=asked.strict)
-            search = _search(problem, robot, known, families, deadline, report)
+            opening = partial(_open_search, families=families, report=report)
+            search = search_motion(problem, robot, known, opening, deadline, report)
             best = search.best
             assert best is not None
             searched = time.perf_counter()
@@ -218,33 +219,11 @@ def plan(
         )
 
 
-def _search(
-    problem: Problem,
-    robot: Robot,
-    known: Trajectory | None,
-    families: Sequence[ik.Family],
-    deadline: Deadline,
-    report: Listener,
-) -> Search:
-    """Search for the fastest motion, from a known one if one is given; raise what explains that none was found."""
-    search = _open_search(problem, families, deadline, report)
-    exact = None
-    if known is None and problem.task.tolerances != Tolerances():
-        exact = _plan_exactly(problem, robot, families, deadline, report)
-    with search.end_early():
-        search.run(known, exact if exact is not None and exact.verified else None)
-    if search.best is None and search.interrupted and exact is not None:
-        search.candidates.append(exact)
-        search.best = exact
-    if search.best is None:
-        raise search.explain()
-    return search
-
-
 def _open_search(
     problem: Problem,
-    families: Sequence[ik.Family],
     deadline: Deadline,
+    *,
+    families: Sequence[ik.Family],
     report: Listener,
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
@@ -260,32 +239,6 @@ def _open_search(
     return Search(problem, decompositions, deadline, report)
 
 
-def _plan_exactly(
-    problem: Problem,
-    robot: Robot,
-    families: Sequence[ik.Family],
-    deadline: Deadline,
-    report: Listener,
-) -> Candidate | None:
-    """Plan for a tool that stays on the path: fewer joints are redundant, and the search is short.
-
-    The motion need not be verified.
-    """
-    report("planning for a tool that stays exactly on the path")
-    task = problem.task.model_copy(update={"tolerances": Tolerances()})
-    try:
-        exact = Problem.of(robot, task, problem.user_limits)
-        soon = deadline.part(0.5)  # the rest is for the search with tolerances
-        search = _open_search(exact, families, soon, report)
-        search.run()
-    except BrachisError:  # the tolerances are needed
-        return None
-    if search.best is None:
-        return None
-    best = dataclasses.replace(search.best, origin="without tolerances")
-    return with_tolerances(best, problem)
-
-
 def _find_smoother(
     best: Candidate, problem: Problem, deadline: Deadline, report: Listener
 ) -> LeastMotion | None:
@@ -297,7 +250,7 @@ def _find_smoother(
     assert best.start is not None
     is_exact = best.start.problem.robot.n != problem.robot.n
     if is_exact and found.trajectory is not best.trajectory:
-        return with_tolerances(found, problem)
+        return widen_plan(found, problem)
     return found
 
 

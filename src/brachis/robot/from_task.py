@@ -145,9 +145,10 @@ def _current_settings(robot: Robot) -> RobotSettings:
     )
     if limits != to_spec(made, names):
         changes |= {"limits": limits, "speed_override": 1.0}
-    friction = _to_settings(robot.friction, len(names))
+    every = range(len(names))
+    friction = _to_settings(robot.friction, every)
     rubbing = Friction.of(names, robot.urdf_dynamics.friction, settings.friction)
-    if friction != _to_settings(rubbing, len(names)):
+    if friction != _to_settings(rubbing, every):
         changes["friction"] = friction
     gravity = tuple(float(component) for component in robot.model.gravity.linear)
     if gravity != settings.gravity:
@@ -155,10 +156,25 @@ def _current_settings(robot: Robot) -> RobotSettings:
     return settings.model_copy(update=changes) if changes else settings
 
 
-def _to_settings(friction: Friction, n: int) -> FrictionSettings:
-    """State the friction of the first n joints, joint by joint."""
+def lock_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
+    """Return the robot with joints held at positions, rad or m; its limits and friction hold for the others."""
+    names = robot.urdf_joints
+    moving = [i for i, name in enumerate(names) if name not in positions]
+    settings = _current_settings(robot)
+    changes: dict[str, object] = {
+        "locked_joints": {**settings.locked_joints, **positions},
+        "limits": to_spec(robot.limits, names),
+        "speed_override": 1.0,
+        "friction": _to_settings(robot.friction, moving),
+    }
+    locked = settings.model_copy(update=changes)
+    return Robot.from_settings(locked, robot.source, robot.urdf)
+
+
+def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
+    """State the friction of some joints, by their numbers."""
     keys = ("armature", "viscous", "coulomb", "coulomb_velocity")
-    columns = friction.table[:n].T.tolist()
+    columns = friction.table[list(joints)].T.tolist()
     return FrictionSettings.model_validate(dict(zip(keys, columns, strict=True)))
 
 

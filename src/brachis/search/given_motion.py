@@ -7,12 +7,13 @@ the time law. So limits, splines, coordinates and the path may be others than wh
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.kinematics import (
     CHART,
@@ -27,12 +28,13 @@ from brachis.optimise.backends import solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, PathMap
 from brachis.optimise.least_motion import LeastMotion
 from brachis.problem.problem import Decomposition, Problem
-from brachis.robot import Robot, bind
+from brachis.robot import Robot, TaskMap, bind
+from brachis.robot.from_task import lock_joints
 from brachis.robot.task_map import JointSpace
 from brachis.search.candidates import SELECTABLE
 from brachis.search.schedule import has_charts
 from brachis.search.starts import FAMILY, bring_onto_path
-from brachis.task import Tolerances
+from brachis.task import Task, Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
@@ -70,7 +72,7 @@ def given_guess(
     """
     joints = problem.robot.urdf_joints
     others = motion.robot.urdf_joints
-    if others != joints:
+    if not set(joints) <= set(others):
         raise UnreachableError(
             f"its joints are {', '.join(others)}, the robot's {', '.join(joints)}"
         )
@@ -104,8 +106,59 @@ def given_guess(
     )
 
 
-def with_tolerances(planned: Planned, problem: Problem) -> Planned:
-    """Return a plan without tolerances as one of a problem with them, in which the tool stays on the path."""
+def without_tolerances(task: Task) -> Task:
+    """Return the task for a tool that stays exactly on the path."""
+    return task.model_copy(update={"tolerances": Tolerances()})
+
+
+def lock_idle(
+    robot: Robot,
+    task: Task,
+    task_map: TaskMap,
+    postures: Mapping[str, np.ndarray],
+) -> tuple[Robot, Task] | None:
+    """Lock the idle joints, which no row of the task space depends on, of a robot and its task; None without any.
+
+    Parameters
+    ----------
+    robot : Robot
+        Without the virtual joints of tolerances.
+    task : Task
+    task_map : TaskMap
+    postures : mapping of str to (n,) ndarray
+        Those of ``start`` and ``end`` that are given; joints that differ in them are not idle.
+    """
+    count = len(robot.urdf_joints)
+    moves = np.abs(task_map.sample_jacobians()).max(axis=(0, 1)) > tolerances.ANGLE
+    still = stand_still(task_map.robot, postures)
+    for posture in postures.values():
+        moves |= np.abs(posture - still) > tolerances.COORDINATE
+    idle = np.flatnonzero(~moves[:count])
+    if not len(idle):
+        return None
+    positions = {robot.joint_names[i]: float(still[i]) for i in idle}
+    robot = lock_joints(robot, positions)
+    changes: dict[str, object] = {"robot": robot.settings}
+    for key, posture in postures.items():
+        given = getattr(task, key)
+        if given != "free":
+            joints = tuple(np.delete(posture[:count], idle).tolist())
+            changes[key] = given.model_copy(update={"joints": joints})
+    if task.redundant_joints != "auto":
+        named = [name for name in task.redundant_joints if name not in positions]
+        changes["redundant_joints"] = tuple(named) or "auto"
+    return robot, task.model_copy(update=changes)
+
+
+def stand_still(robot: Robot, postures: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the positions, (n,), at which idle joints stand still: as in a given posture, or else at zero."""
+    limits = robot.limits
+    nearest = np.clip(np.zeros(robot.n), limits.position_lower, limits.position_upper)
+    return next(iter(postures.values()), nearest)
+
+
+def widen_plan(planned: Planned, problem: Problem) -> Planned:
+    """Return a plan with fewer joints, see `lock_idle` and `without_tolerances`, as one of the problem itself."""
     motion = planned.trajectory
     assert motion is not None
     robot = problem.robot
@@ -133,27 +186,30 @@ def with_tolerances(planned: Planned, problem: Problem) -> Planned:
     return replace(planned, trajectory=motion, verification=verification)
 
 
-def without_tolerances(motion: Trajectory) -> Trajectory:
-    """Undo `with_tolerances`: the motion as one of its task without tolerances, of which it is an optimum.
+def narrow_motion(motion: Trajectory) -> Trajectory:
+    """Undo `widen_plan`: the motion as one of its simpler task, of which it is an optimum.
 
-    A motion that has curves for the virtual joints of its tolerances stays as it is.
+    A motion that has curves for idle joints, or for the virtual joints of tolerances, stays as it is.
     """
-    task = motion.task
     wider = motion.robot
-    _, task_map = bind(wider, task.task_space, task.tolerances)
+    _, task_map = bind(wider, motion.task.task_space, motion.task.tolerances)
     spline = motion.phase_splines[0]
     is_timed = motion.phases[0].speed is None
     curves = len(spline.control_points) - (1 if is_timed else 0)
-    if task.tolerances == Tolerances() or curves == wider.n - task_map.m:
+    if curves == wider.n - task_map.m:
         return motion
-    task = task.model_copy(update={"tolerances": Tolerances()})
     robot = Robot.from_settings(wider.settings, wider.source, wider.urdf)
-    robot, _ = bind(robot, task.task_space)
+    ends = {"start": motion.q[0], "end": motion.q[-1]}
+    idle = lock_idle(robot, motion.task, task_map, ends)
+    robot, task = idle or (robot, without_tolerances(motion.task))
+    if task == motion.task:
+        return motion
+    robot, _ = bind(robot, task.task_space, task.tolerances)
     columns = [wider.joint_names.index(name) for name in robot.joint_names]
     rows = motion.chart_rows
     if rows.size:
         rows = rows[..., [*columns, wider.n]]
-    return replace(
+    narrower = replace(
         motion,
         task=task,
         robot=robot,
@@ -163,13 +219,14 @@ def without_tolerances(motion: Trajectory) -> Trajectory:
         qddot_before=motion.qddot_before[:, columns],
         chart_rows=rows,
     )
+    return narrow_motion(narrower)
 
 
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
-    """Positions at times, (K, n), of the problem's joints; a tool without the same tolerance stays on the path."""
+    """Positions at times, (K, n), of the problem's joints; others than the motion's stand still."""
     robot = problem.robot
     known = dict(zip(motion.joint_names, motion.position(t).T, strict=True))
-    still = robot.posture(np.zeros(len(robot.urdf_joints)), "start")
+    still = stand_still(robot, problem.given_postures)
     columns = [
         known.get(name, np.full(len(t), value))
         for name, value in zip(robot.joint_names, still, strict=True)

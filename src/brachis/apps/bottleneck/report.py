@@ -35,7 +35,7 @@ from brachis.ik import Family
 from brachis.optimise.retiming import SOLVER
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.joints import shown_unit
-from brachis.search.given_motion import without_tolerances
+from brachis.search.given_motion import narrow_motion
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory, phase_rows
 
@@ -195,7 +195,7 @@ def report(
         active = saturations(trajectory)
         phases = limits_by_phase(trajectory, active)
         return BottleneckReport(trajectory.t_end, None, active, phases)
-    trajectory = without_tolerances(trajectory)
+    trajectory = narrow_motion(trajectory)
     refined = None
     if not isinstance(motion, Trajectory):
         refined = motion.candidate.refined

@@ -1,0 +1,101 @@
+"""The search for a plan's motion, and plans with fewer joints beside it.
+
+A plan whose tool stays exactly on the path is looked for before tolerances are used. Idle joints, which move no row of
+the task space, are held still afterwards, unless moving them pays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
+from brachis.errors import BrachisError
+from brachis.optimise.candidate import Candidate
+from brachis.problem.problem import Problem
+from brachis.robot import Robot
+from brachis.search.given_motion import lock_idle, widen_plan, without_tolerances
+from brachis.search.portfolio import Search
+from brachis.task import Task, Tolerances
+from brachis.trajectory import Trajectory
+
+Opening = Callable[[Problem, Deadline], Search]
+"""Opens the search for a problem."""
+_WORTH_MOVING = 2.0
+"""Tolerances of splines that moving idle joints has to gain: either plan may have lost one of them."""
+
+
+def search_motion(
+    problem: Problem,
+    robot: Robot,
+    known: Trajectory | None,
+    open_search: Opening,
+    deadline: Deadline,
+    report: Listener,
+) -> Search:
+    """Search for the fastest motion, from a known one if one is given; raise what explains that none was found."""
+    search = open_search(problem, deadline)
+    exact = None
+    if known is None and problem.task.tolerances != Tolerances():
+        report("planning for a tool that stays exactly on the path")
+        task = without_tolerances(problem.task)
+        soon = deadline.part(0.5)  # the rest is for the search with tolerances
+        exact = _plan_simpler(problem, robot, task, None, open_search, soon)
+    with search.end_early():
+        search.run(known, exact if exact is not None and exact.verified else None)
+    if search.best is None and search.interrupted and exact is not None:
+        search.candidates.append(exact)
+        search.best = exact
+    if search.best is None:
+        raise search.explain()
+    if search.is_satisfied and not search.interrupted:
+        best = search.best
+        with search.end_early():
+            held = _hold_idle_joints(problem, robot, best, open_search, deadline)
+            if held is not None:
+                search.candidates.append(held)
+                search.best = held
+    return search
+
+
+def _hold_idle_joints(
+    problem: Problem,
+    robot: Robot,
+    best: Candidate,
+    open_search: Opening,
+    deadline: Deadline,
+) -> Candidate | None:
+    """Plan again, from the best motion, with idle joints at rest; None where there are none, or moving them pays."""
+    postures = problem.given_postures
+    idle = lock_idle(robot, problem.task, problem.task_map, postures)
+    if idle is None:
+        return None
+    held = _plan_simpler(problem, *idle, best.trajectory, open_search, deadline)
+    worth = 1.0 - _WORTH_MOVING * problem.task.spline.tolerance
+    is_fast = held is not None and worth * held.t_end <= best.t_end
+    return held if held is not None and held.verified and is_fast else None
+
+
+def _plan_simpler(
+    problem: Problem,
+    robot: Robot,
+    task: Task,
+    known: Trajectory | None,
+    open_search: Opening,
+    deadline: Deadline,
+) -> Candidate | None:
+    """Plan with fewer joints: a short search, or from a known motion alone. The motion need not be verified."""
+    try:
+        simpler = Problem.of(robot, task, problem.user_limits)
+        search = open_search(simpler, deadline)
+        if known is None:
+            search.run()
+        else:
+            search.run(known, most=1)
+    except BrachisError:  # all joints are needed
+        return None
+    if search.best is None:
+        return None
+    origin = "without tolerances" if known is None else "with idle joints held"
+    return widen_plan(dataclasses.replace(search.best, origin=origin), problem)
