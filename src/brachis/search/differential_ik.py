@@ -13,6 +13,7 @@ import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kinematics import ClosedFormMap
+from brachis.search.stations import stations
 
 
 @dataclass(frozen=True)
@@ -80,20 +81,21 @@ def differential_ik_path(
     """
     if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
-    # No step is longer than 5 cm; before the first one the posture is unfolded in up to 20 steps.
-    steps = int(np.clip(np.ceil(joint_map.path.length / 0.05), 24, 1000))
-    s = np.append(np.zeros(20), np.linspace(0.0, 1.0, steps + 1)[1:])
+    # Before the first step the posture is unfolded in up to 20 steps.
+    s = np.append(np.zeros(20), stations(joint_map.path, joint_map.task_map)[1:])
     q = joint_map.start.astype(float)
     previous = np.zeros_like(q)
     joint_path = [np.append(0.0, q[joint_map.redundant])]
-    for station, target in zip(s, joint_map.path.sample(s).target, strict=True):
+    steps = np.diff(s, prepend=0.0)
+    targets = joint_map.path.sample(s).target
+    for station, step, target in zip(s, steps, targets, strict=True):
         if not station:
             margin = joint_map.branch_margins(q[None]).min(initial=1.0)
             if margin > 0.5 * strategy.threshold:
                 continue
         if deadline.passed:
             return None
-        step_s = 1.0 / steps if station else None
+        step_s = step if station else None
         moved = _follow(joint_map, strategy, q, previous, target, step_s)
         if moved is not None:
             q, previous = moved

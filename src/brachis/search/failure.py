@@ -24,7 +24,13 @@ from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
 from brachis.search.closed_form_lattice import solve_all
 from brachis.search.hopeless import speeds_of
-from brachis.search.joint_path import ALL_POSTURES, DeadEnd, least_excess, sampling_box
+from brachis.search.joint_path import (
+    ALL_POSTURES,
+    DeadEnd,
+    least_excess,
+    reaches,
+    sampling_box,
+)
 from brachis.task import SolverSettings, Task
 
 _NO_TIME = "The reason was not found in time: raise search.time_limit"
@@ -64,7 +70,7 @@ def explain_reach(
         anywhere = np.concatenate([found, wider], axis=1)
 
     for possible, cause, hint, remedies in _find_obstacles(
-        decomposition, given, found, anywhere
+        decomposition, given, s, found, anywhere
     ):
         if not possible.all():
             first, last = (float(end) for end in s[~possible][[0, -1]])
@@ -81,9 +87,13 @@ def explain_reach(
 
 
 def _find_obstacles(
-    decomposition: Decomposition, given: str, found: np.ndarray, anywhere: np.ndarray
+    decomposition: Decomposition,
+    given: str,
+    s: np.ndarray,
+    found: np.ndarray,
+    anywhere: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
-    """Yield where along the path something is possible, (S,) bool, and, if it is not: cause, hint and remedies.
+    """Yield at which of S stations something is possible, (S,) bool, and, if it is not: cause, hint and remedies.
 
     `found` and `anywhere` are postures, (S, T, B, A, n), with redundant joints within their ranges and beyond. On the
     branch of the `given` posture, ``start`` or ``end``, less is possible.
@@ -93,8 +103,11 @@ def _find_obstacles(
     branch = decomposition.branches[0]
     is_given = problem.start is not None or problem.end is not None
     own = found[:, :, [branch]] if is_given else found
+    exists = _has_any(_exist(anywhere))
+    if not exists.all() and reaches(problem, float(s[np.argmin(exists)])):
+        exists[:] = True
     yield (
-        _has_any(_exist(anywhere)),
+        exists,
         "the path is out of reach from s = {first:.3g} on{far} (no posture was found)",
         _unit_hint(problem)
         or "Shorten or move the path, or choose another start posture",
@@ -328,7 +341,7 @@ def _explain_dead_ends(
     scene = ", move bodies of the scene" if task.scene else ""
     hint = f"{start}shorten or move the path{scene}, or widen the joint ranges"
     return PathError(
-        f"no joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
+        f"no continuous joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
         s_interval=dead_ends[name].interval,
         hint=hint.capitalize() + more,
     )

@@ -28,8 +28,8 @@ from brachis.search.holding import explain_holding
 from brachis.search.phase_plane import (
     phase_plane_on,
     postures_along,
-    spread_stations,
 )
+from brachis.search.stations import spread_stations
 from brachis.timing import Timing
 
 _EXACT = 0.97

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.kinematics import Newton
 from brachis.limits import Limit, Moments
 from brachis.limits.joint import reciprocals_near
 from brachis.problem.feasibility import in_figures
@@ -20,6 +21,8 @@ OTHER_BRANCH = "the branch ends"
 NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
 NO_TIME = "the time was up"
+_TRIES = 1000
+"""Random postures from which one at a place is looked for, before it is called out of reach."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,15 @@ def sampling_box(
     low = np.where(np.isfinite(lower), lower, highest - 2.0 * reach)
     high = np.where(np.isfinite(upper), upper, low + 2.0 * reach)
     return low, high
+
+
+def reaches(problem: Problem, s: float) -> bool:
+    """Tell whether Newton's method finds a posture at a path coordinate from any of many random ones."""
+    low, high = sampling_box(problem.robot)
+    drawn = np.random.default_rng(0).uniform(low, high, (_TRIES, problem.robot.n))
+    targets = np.repeat(problem.path.sample([s]).target, _TRIES, axis=0)
+    found = Newton(problem.task_map).nearest(targets, drawn)
+    return bool(np.isfinite(found).all(axis=1).any())
 
 
 def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:

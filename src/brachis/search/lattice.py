@@ -32,9 +32,7 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kernel import largest_parts
 from brachis.limits import HasLatticeWeights
-from brachis.path import Path
 from brachis.problem.problem import Problem
-from brachis.robot import TaskMap
 from brachis.robot.joints import TURN
 from brachis.search.joint_path import (
     JUMPS,
@@ -46,8 +44,10 @@ from brachis.search.joint_path import (
     distinct,
     least_excess,
     leaving_range,
+    reaches,
     weights_near,
 )
+from brachis.search.stations import stations
 
 LARGEST_STEP = 0.8
 """Largest step of a joint between stations, rad or m."""
@@ -136,32 +136,6 @@ class Edges:
     key: np.ndarray
     elsewhere: np.ndarray | bool = True
     allowed: np.ndarray | bool = True
-
-
-def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
-    """Spread stations evenly over the path coordinate, as many as its length and its turns ask for.
-
-    Parameters
-    ----------
-    path : Path
-    task_map : TaskMap
-    density : float, optional
-        Factor on their number.
-
-    Returns
-    -------
-    (S + 1,) ndarray
-        From 0 to 1.
-    """
-    targets = path.sample(np.linspace(0.0, 1.0, 2001)).target
-    moves = np.diff(targets[:, : len(task_map.axes)], axis=0)
-    sizes = np.linalg.norm(moves, axis=1)
-    along = moves[sizes > 0.0] / sizes[sizes > 0.0, None]
-    bends = np.arccos(np.clip(np.sum(along[1:] * along[:-1], axis=1), -1.0, 1.0)).sum()
-    turns = task_map.norms(task_map.difference(targets[1:], targets[:-1]))[1].sum()
-    # No step between stations is longer than 0.05 m, and none turns by more than 0.25 rad.
-    steps = max(path.length / 0.05, max(bends, turns) / 0.25, 24)
-    return np.linspace(0.0, 1.0, int(min(np.ceil(density * steps), 600)) + 1)
 
 
 class Options(TypedDict, total=False):
@@ -270,7 +244,10 @@ class Lattice(ABC):
             else:
                 layer = self._first_layer(rng)
             if isinstance(layer, str):
-                return DeadEnd(float(self.s[station]), layer, backwards=self._backwards)
+                s = float(self.s[station])
+                if layer == NO_ANSWER and reaches(self.problem, s):
+                    layer = JUMPS
+                return DeadEnd(s, layer, backwards=self._backwards)
             layers.append(layer)
         length = layers[-1].length
         ends = np.argsort(length, kind="stable")

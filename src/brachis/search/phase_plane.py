@@ -11,7 +11,6 @@ are few, for a joint path that may be far from the best one: its timing leads to
 
 from __future__ import annotations
 
-import math
 from operator import itemgetter
 
 import numpy as np
@@ -27,14 +26,13 @@ from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of
 from brachis.path.legs import Leg
 from brachis.problem.problem import Problem
+from brachis.search.stations import spread_stations
 from brachis.timing import JointPath, PhasePlane
 
 _STATIONS = 401
 """Stations along a joint path of a guess."""
 FEW_VARIABLES = 60
 """Up to so many variables a solve over time begins over all knots that are given."""
-_LEAST_STATIONS = 41
-"""Fewest stations along a leg."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
 _ROUGH = 0.99
@@ -93,16 +91,6 @@ def fastest_times(
                 times = None
         found.append(None if times is None else (plane.path.s, times))
     return found
-
-
-def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
-    """Spread about so many path coordinates, (S,), evenly over each leg, the ends of the legs among them."""
-    parts = [np.zeros(1)]
-    for leg in problem.legs:
-        least = min(count, _LEAST_STATIONS)
-        own = max(least, math.ceil((count - 1) * (leg.end - leg.begin)) + 1)
-        parts.append(np.linspace(leg.begin, leg.end, own)[1:])
-    return np.concatenate(parts)
 
 
 def phase_plane_on(

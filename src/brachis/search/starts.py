@@ -29,9 +29,10 @@ from brachis.search.holding import explain_beyond
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, NO_TIME, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.phase_plane import fastest_times, least_time, spread_stations
+from brachis.search.phase_plane import fastest_times, least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screen
+from brachis.search.stations import spread_stations
 
 SCREENED = 4
 """So many times the joint paths that a level plans are looked at."""

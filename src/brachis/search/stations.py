@@ -1,0 +1,78 @@
+"""Stations along a path, closer where it bends or the tool turns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from brachis.common import tolerances
+from brachis.common.arrays import spread
+from brachis.path import Path
+from brachis.problem.problem import Problem
+from brachis.robot import TaskMap
+
+_STATIONS = 401
+"""Stations along a joint path of a guess."""
+_LEAST_STATIONS = 41
+"""Fewest stations along a leg."""
+_FEWEST = 24.0
+"""Steps of a lattice, no fewer."""
+_MOST = 600
+"""Steps of a lattice, no more."""
+_LONGEST = 0.05
+"""Length of a step of a lattice, m, no longer."""
+_LARGEST_TURN = 0.25
+"""Turn of a step of a lattice, rad, no larger: of the direction of motion, or of the tool."""
+_PLACES = 2000
+"""Places at which a path is measured, about."""
+
+
+def measure(path: Path, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
+    """Return path coordinates, (K,), and how many steps a lattice needs up to each of them, (K,)."""
+    knots = path.knots
+    s = spread(knots, max(8, _PLACES // (len(knots) - 1)))
+    targets = path.sample(s).target
+    moves = np.diff(targets[:, : len(task_map.axes)], axis=0)
+    sizes = np.linalg.norm(moves, axis=1)
+    along = moves / np.maximum(sizes, tolerances.LENGTH)[:, None]
+    bends = np.linalg.norm(np.diff(along, axis=0, prepend=along[:1]), axis=1)
+    change = task_map.difference(targets[1:], targets[:-1])
+    turns = np.maximum(task_map.norms(change)[1], bends) / _LARGEST_TURN
+    steps = np.max([_FEWEST * np.diff(s), sizes / _LONGEST, turns], axis=0)
+    return s, np.append(0.0, np.cumsum(steps))
+
+
+def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
+    """Spread the stations of a lattice, as many as the path's length and its turns ask for.
+
+    Parameters
+    ----------
+    path : Path
+    task_map : TaskMap
+    density : float, optional
+        Factor on their number.
+
+    Returns
+    -------
+    (S + 1,) ndarray
+        From 0 to 1.
+    """
+    s, steps = measure(path, task_map)
+    # Rounding of the sum adds no step.
+    count = int(min(np.ceil(density * steps[-1] - 1e-6), _MOST))
+    return np.interp(np.linspace(0.0, steps[-1], count + 1), steps, s)
+
+
+def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
+    """Spread about so many path coordinates, (S,), over the legs, the ends of the legs among them."""
+    s, steps = measure(problem.path, problem.task_map)
+    parts = [np.zeros(1)]
+    for leg in problem.legs:
+        first, last = np.interp([leg.begin, leg.end], s, steps)
+        least = min(count, _LEAST_STATIONS)
+        share = (last - first) / steps[-1]
+        own = max(least, math.ceil((count - 1) * share - 1e-6) + 1)
+        inner = np.interp(np.linspace(first, last, own)[1:-1], steps, s)
+        parts.append(np.append(inner, leg.end))
+    return np.concatenate(parts)

@@ -1,0 +1,117 @@
+"""Quick turns of the tool: stations follow them, so that lattices do; out of reach is only what is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import PathError
+from brachis.problem.problem import Problem, decompositions_of
+from brachis.robot.from_task import robot_for
+from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.joint_path import NO_ANSWER, DeadEnd, reaches
+from brachis.search.posture_lattice import PostureLattice
+from brachis.search.stations import spread_stations, stations
+
+TURNS = [
+    ("tx90l_rail", [0.6, -0.2, 0.5], [180, 0, 0], [0, 0.4, 0], [0, 0, 1], 120.0, 0.01),
+    ("tx90l_rail", [0.6, -0.2, 0.5], [180, 0, 0], [0, 0.4, 0], [0, 0, 1], -178.0, 0.01),
+    ("ur10_rail", [0.5, -0.1, 0.6], [180, 0, 0], [0, 0.2, 0], [0.3, 0, 1], 90.0, 0.005),
+    ("iiwa14", [0.5, -0.1, 0.4], [180, 0, 0], [0.1, 0.2, 0], [0, 0, 1], 100.0, 0.02),
+]
+"""Robot, beginning, direction of the line with its length, axis and angle of the turn, and the length it takes, m."""
+
+
+def task(robot, position, turned, line, axis, angle, length, **search):
+    line = np.array(line)
+    share = length / np.linalg.norm(line)
+    parts = ((0.5 - 0.5 * share, 10.0), (share, angle), (0.5 - 0.5 * share, 10.0))
+    segments = [
+        {
+            "line": {"by": (part * line).tolist()},
+            "orientation": {"rotate": {"axis": axis, "angle_deg": turn}},
+            "blend": 0.2 * length,
+        }
+        for part, turn in parts
+    ]
+    del segments[-1]["blend"]
+    return brachis.load_task(
+        {
+            "brachis": 1,
+            "robot": {"urdf": robot},
+            "start": "free",
+            "path_start": {"position": position, "rpy_deg": turned},
+            "task_space": "pose",
+            "path": segments,
+            "search": {"effort": "single", "least_motion": False, **search},
+        }
+    )
+
+
+def problem(case):
+    asked = task(*case)
+    return Problem.of(robot_for(None, asked.robot), asked)
+
+
+@pytest.mark.parametrize("case", TURNS)
+def test_no_step_of_the_stations_turns_far(case):
+    given = problem(case)
+    for s in (stations(given.path, given.task_map), spread_stations(given, 97)):
+        assert s[0] == 0.0
+        assert s[-1] == 1.0
+        targets = given.path.sample(s).target
+        step = given.task_map.difference(targets[1:], targets[:-1])
+        assert given.task_map.norms(step)[1].max() < 0.26
+
+
+def test_stations_of_a_line_are_even():
+    line = {"line": {"by": [0.0, 0.4, 0.0]}}
+    asked = task(*TURNS[0]).model_dump(mode="json") | {"path": [line]}
+    given = problem(TURNS[0]).of(
+        robot_for(None, task(*TURNS[0]).robot), brachis.load_task(asked)
+    )
+    even = np.linspace(0.0, 1.0, 25)
+    np.testing.assert_allclose(stations(given.path, given.task_map), even, atol=1e-12)
+
+
+@pytest.mark.parametrize("case", TURNS)
+def test_lattices_follow_quick_turns(case):
+    given = problem(case)
+    (first, *_) = decompositions_of(given)
+    lattices = [ClosedFormLattice(first)]
+    if case is TURNS[0]:
+        lattices.append(PostureLattice(given, [first]))
+    for lattice in lattices:
+        found = lattice.joint_paths(1)
+        assert not isinstance(found, DeadEnd), str(found)
+        limits = given.robot.limits
+        assert np.all(found[0].q >= limits.position_lower - 1e-6)
+        assert np.all(found[0].q <= limits.position_upper + 1e-6)
+        assert np.abs(np.diff(found[0].q, axis=0)).max() <= 0.8
+
+
+def test_a_quick_turn_is_planned():
+    assert brachis.plan(task(*TURNS[0]), intervals=12).verified
+
+
+def test_a_lattice_that_is_too_coarse_does_not_say_out_of_reach():
+    given = problem(TURNS[1])
+    (first, *_) = decompositions_of(given)
+    found = PostureLattice(given, [first], density=0.02).joint_paths(1)
+    assert isinstance(found, DeadEnd)
+    assert found.cause != NO_ANSWER
+    assert reaches(given, found.s)
+
+
+def test_out_of_reach_is_out_of_reach():
+    robot, position, turned, _, *others = TURNS[0]
+    given = problem((robot, position, turned, [2.5, 0.0, 0.0], *others))
+    assert reaches(given, 0.0)
+    assert not reaches(given, 1.0)
+    (first, *_) = decompositions_of(given)
+    found = ClosedFormLattice(first).joint_paths(1)
+    assert isinstance(found, DeadEnd)
+    assert found.cause == NO_ANSWER
+    with pytest.raises(PathError, match="out of reach"):
+        brachis.plan(given.task)
