@@ -8,7 +8,7 @@ import pytest
 import brachis
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
-from brachis.search.given_motion import narrow_motion, lock_idle
+from brachis.search.given_motion import lock_idle, narrow_motion
 from brachis.task import task_with
 from brachis.trajectory import Trajectory
 from support.effort import QUICK
