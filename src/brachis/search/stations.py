@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -28,10 +29,11 @@ _PLACES = 2000
 """Places at which a path is measured, about."""
 
 
+@lru_cache(maxsize=4)
 def measure(path: Path, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
     """Return path coordinates, (K,), and how many steps a lattice needs up to each of them, (K,)."""
     knots = path.knots
-    s = spread(knots, max(8, _PLACES // (len(knots) - 1)))
+    s = spread(knots, max(2, _PLACES // (len(knots) - 1)))
     targets = path.sample(s).target
     moves = np.diff(targets[:, : len(task_map.axes)], axis=0)
     sizes = np.linalg.norm(moves, axis=1)
