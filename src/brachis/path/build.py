@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from brachis.common import tolerances
+
 from brachis.common.words import write_apart
 from brachis.errors import StartError
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
@@ -15,6 +17,7 @@ from brachis.path.pose import OrientedPath, PosePath, rotations
 from brachis.path.protocol import Array, Curve
 from brachis.path.sequence import Path, PathFrame, Piece
 from brachis.robot import Robot, TaskMap
+from brachis.robot.joints import principal
 from brachis.robot.plausibility import (
     distance_hint,
     distances_from_base,
@@ -24,12 +27,16 @@ from brachis.robot.plausibility import (
     turn_hint,
 )
 from brachis.robot.task_map.protocol import (
+    ANGLES,
     POSE_ROWS,
     TURN_ROWS,
     joints_of,
     position_rows,
 )
 from brachis.task import Segment, Task
+from brachis.task.orientation import Target, TurnTo
+from brachis.task.points.units import quaternions_of
+from brachis.task.segments import LineTo, LineToPosture
 
 
 def build_path(
@@ -37,6 +44,7 @@ def build_path(
     start: Sequence[float] | Array,
     task_space_rows: Sequence[str],
     frame: PathFrame | None = None,
+    postures: Mapping[str, Array] | None = None,
 ) -> Path:
     """Return the path that segments describe.
 
@@ -51,6 +59,8 @@ def build_path(
         or the rows of all joints (`brachis.robot.task_map.protocol.joint_rows`).
     frame : PathFrame, optional
         Frame in which the segments are given; the world's unless given. The start is in the world either way.
+    postures : mapping of str to ndarray, optional
+        Task coordinates in the world, (c,), of the postures that lines lead to.
 
     Returns
     -------
@@ -87,6 +97,10 @@ def build_path(
         point = frame.to_frame(point)
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
+        if isinstance(segment.shape, LineToPosture):
+            place = (postures or {})[segment.shape.to_posture]
+            place = place if frame is None else frame.to_frame(place)
+            segment = _line_to(segment, place, point, rows)
         curve = coordinates.curve(segment, i, point)
         point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
         curves.append(curve)
@@ -94,6 +108,24 @@ def build_path(
     positions = len(position_rows(coordinates.rows))
     stopping = [i for i, segment in enumerate(segments) if segment.stop]
     return path_type.of(pieces, positions, frame, stopping)
+
+
+def _line_to(
+    segment: Segment, place: Array, start: Array, rows: tuple[str, ...]
+) -> Segment:
+    """Return a line to a posture as the line from `start` to its `place`, (c,), the shorter way round."""
+    if rows[-3:] == TURN_ROWS:
+        turn = Rotation.from_matrix(rotations(place))
+        target = Target(quaternion_wxyz=tuple(quaternions_of(turn).tolist()))
+        orientation = TurnTo(to=target)
+        place = place[:-9]
+    else:
+        orientation = None
+        if rows[-1] in ANGLES:
+            angle = start[-1] + principal(place[-1] - start[-1])
+            place = np.append(place[:-1], angle)
+    line = LineTo(to=tuple(place.tolist()))
+    return segment.model_copy(update={"line": line, "orientation": orientation})
 
 
 def _join(
@@ -149,20 +181,26 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     PathError, UnknownNameError, InputError
         See `build_path`; or ``path_start`` does not fit the task space.
     """
-    placement = task.path_placement
-    frame = None if placement is None else PathFrame.of(placement, task_map.rows)
+    frame = None
+    if task.path_frame is not None:
+        frame = PathFrame.of(task.placement_of(task.path_frame), task_map.rows)
     given = None
     if task.path_start is not None:
         given = task_map.read(task.path_start, "path_start")
         if frame is not None:
             given = frame.to_world(given)
-    if task.start == "free":
+    postures = {
+        name: task_map.value(task_map.robot.posture(joints, f"postures.{name}"))
+        for name, joints in task.postures.items()
+    }
+    given_joints = task.joints_at("start")
+    if given_joints is None:
         assert given is not None
-        return build_path(task.path, given, task_map.rows, frame)
-    start = task_map.robot.posture(task.start.joints, "start.joints")
+        return build_path(task.path, given, task_map.rows, frame, postures)
+    start = task_map.robot.posture(*given_joints)
     if given is not None:
         check_on_path(task_map, start, given, "start")
-    return build_path(task.path, task_map.value(start), task_map.rows, frame)
+    return build_path(task.path, task_map.value(start), task_map.rows, frame, postures)
 
 
 def check_on_path(

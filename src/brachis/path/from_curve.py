@@ -193,7 +193,10 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     for (begin, end), piece in zip(pairwise(path.breaks), path.pieces, strict=True):
         if piece.segment is None:
             continue
-        speeds = getattr(segments[piece.segment].shape, "speeds", ())
+        segment = segments[piece.segment]
+        speeds = getattr(segment.shape, "speeds", ())
+        if getattr(segment, "speed", None):  # a process speed
+            speeds = ()
         for sigma, speed in map(np.transpose, speeds):
             at = np.unique(np.clip(sigma, piece.first, piece.last))
             if len(at) > 1:

@@ -25,6 +25,7 @@ from brachis.path import (
     path_speed,
     time_law_of,
     with_feed_rates,
+    with_segment_speeds,
 )
 from brachis.problem.feasibility import (
     branch_of,
@@ -93,13 +94,12 @@ class Problem(Summary):
             for a limit.
         """
         robot, task_map = bind(robot, task.task_space, task.tolerances)
+        joints = {"start": task.joints_at("start"), "end": task.joints_at("end")}
         postures = {
-            key: robot.posture(given.joints, f"{key}.joints")
-            for key, given in (("start", task.start), ("end", task.end))
-            if given != "free"
+            end: robot.posture(*given) for end, given in joints.items() if given
         }
         path = path_of(task_map, task)
-        task = with_feed_rates(task, path)
+        task = with_segment_speeds(with_feed_rates(task, path), task_map, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
             if "start" in postures:

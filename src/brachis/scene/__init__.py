@@ -1,7 +1,7 @@
 """Bodies of the robot and around it, and the distances between them."""
 
-from brachis.scene.build import scene_of
+from brachis.scene.build import MANY_POSTURES, find_never_free, scene_of
 from brachis.scene.scene import UNIT, ClosePairs, Scene
 from brachis.scene.solids import Solid
 
-__all__ = ["UNIT", "ClosePairs", "Scene", "Solid", "scene_of"]
+__all__ = ["MANY_POSTURES", "UNIT", "ClosePairs", "Scene", "Solid", "find_never_free", "scene_of"]

@@ -52,7 +52,9 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
             allowed="a URDF with <collision> elements",
             hint="Add them, or set collisions.capsules: auto, or collisions.mode: off",
         )
-    solids = (*own, *itertools.chain(*map(build_solids, task.scene)))
+    solids = list(own)
+    for body in task.scene:
+        solids += build_solids(body, placement_matrix(task.placement_of(body.frame)))
     mounted = placement_matrix(robot.settings.mounting)
     hint = (
         "Leave out bodies that the robot cannot reach, or join small ones in one mesh"
@@ -87,7 +89,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     ]
     check_most(len(pairs), _MOST_PAIRS, "pairs that keep apart", problem, "scene", hint)
     numbers = np.reshape(pairs, (-1, 2)).astype(int)
-    scene = Scene(solids, joints, placements, numbers, len(own))
+    scene = Scene(tuple(solids), joints, placements, numbers, len(own))
     return scene.with_pairs(_find_hazards(scene, robot, tree, task))
 
 
@@ -104,18 +106,35 @@ def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.
         {end_of(joint, "parent"), end_of(joint, "child")}
         for joint in tree.joints.values()
     ]
+    inner = scene.with_pairs(is_within)
+    is_stuck = _always_closer(inner, robot, 0.0, _POSTURES)
+    is_hazard[is_within] = [
+        not stuck and {scene.solids[i].link for i in pair} not in joined
+        for pair, stuck in zip(inner.pairs, is_stuck, strict=True)
+    ]
+    return is_hazard
+
+
+def _always_closer(
+    scene: Scene, robot: Robot, distance: float, count: int
+) -> np.ndarray:
+    """Tell which pairs, (P,), are closer than a distance, m, in every one of so many random postures."""
     ends = robot.limits.both_ways("position")
     half = np.where(robot.revolute, np.pi, 1.0)  # rad or m, for joints without an end
     low, high = np.where(np.isfinite(ends), ends, [-half, half])
-    q = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))
-    inner = scene.with_pairs(is_within)
-    close = inner.find_close(Chain.of(robot.model).place(q), 0.0)
-    counts = np.bincount(close.pair, minlength=len(inner.pairs))
-    is_hazard[is_within] = [
-        count < _POSTURES and {scene.solids[i].link for i in pair} not in joined
-        for pair, count in zip(inner.pairs, counts, strict=True)
-    ]
-    return is_hazard
+    q = np.random.default_rng(0).uniform(low, high, (count, robot.n))
+    close = scene.find_close(Chain.of(robot.model).place(q), distance)
+    return np.bincount(close.pair, minlength=len(scene.pairs)) == count
+
+
+MANY_POSTURES = 2000
+"""Random postures in which pairs that are never free are found: one in a hundred that is free is not missed."""
+
+
+def find_never_free(scene: Scene, robot: Robot, clearance: float) -> Scene:
+    """Return the scene with the pairs that keep the clearance, m, in none of `MANY_POSTURES` random postures."""
+    few = scene.with_pairs(_always_closer(scene, robot, clearance, _POSTURES))
+    return few.with_pairs(_always_closer(few, robot, clearance, MANY_POSTURES))
 
 
 def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:

@@ -79,8 +79,8 @@ class Solid:
         return self.geometry.aabb_radius + self.padding
 
 
-def build_solids(body: SceneBody) -> Iterator[Solid]:
-    """Make the solids of a scene's body: one, or those of its URDF.
+def build_solids(body: SceneBody, frame: np.ndarray) -> Iterator[Solid]:
+    """Make the solids of a scene's body, whose frame is placed so, (4, 4): one, or those of its URDF.
 
     Raises
     ------
@@ -90,12 +90,12 @@ def build_solids(body: SceneBody) -> Iterator[Solid]:
         A shape of a URDF cannot be read.
     """
     if body.urdf is None:
-        yield _build_solid(body)
+        yield _build_solid(body, frame)
         return
     where = f"scene: {body.name}: {body.urdf}"
     path = Path(body.urdf)
     tree = read_tree(read_text(path, where=where, folder=Path.cwd()), where)
-    placed = {tree.downward[0]: placement_matrix(body.placement)}
+    placed = {tree.downward[0]: frame @ placement_matrix(body.placement)}
     for link in tree.downward[1:]:
         joint = tree.joints[tree.above[link]]
         if joint.get("type") != "fixed":
@@ -121,11 +121,14 @@ def build_solids(body: SceneBody) -> Iterator[Solid]:
         yield Solid(name, body.link, solid.geometry, placement)
 
 
-def _build_solid(body: SceneBody) -> Solid:
+def _build_solid(body: SceneBody, frame: np.ndarray) -> Solid:
     shape = getattr(body, body.shape)
+    placement = frame @ placement_matrix(body.placement)
     if body.half_space is not None:
-        normal = np.array(shape.normal)
-        geometry = coal.Halfspace(normal / np.linalg.norm(normal), shape.offset)
+        # Its plane is in the world, whatever its frame.
+        normal = frame[:3, :3] @ shape.normal / np.linalg.norm(shape.normal)
+        geometry = coal.Halfspace(normal, shape.offset + normal @ frame[:3, 3])
+        placement = np.eye(4)
     elif body.mesh is not None:
         try:
             geometry = _hull(Path(shape), np.full(3, body.scale))
@@ -135,7 +138,6 @@ def _build_solid(body: SceneBody) -> Solid:
         is_round = isinstance(shape, Round)
         lengths = (shape.radius, shape.length) if is_round else np.ravel(shape)
         geometry = _SHAPES[body.shape][0](*lengths)
-    placement = placement_matrix(body.placement)
     return Solid(str(body.name), body.link, geometry, placement)
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from brachis.errors import PlanningError, Remedy
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.motion import follow_law
+from brachis.path.legs import key_of_speed
 from brachis.problem.problem import Problem
 from brachis.search.holding import explain_holding
 from brachis.search.phase_plane import (
@@ -107,7 +108,7 @@ def speeds_of(problem: Problem) -> list[_Speed]:
     given = [i for i, leg in enumerate(problem.legs) if leg.speed is not None]
     parts = problem.task.tool_limits.process_speed
     for number, (part, leg) in enumerate(zip(parts, given, strict=True)):
-        key = f"tool_limits.process_speed[{number}].speed"
+        key = key_of_speed(part, number, ".speed")
         speeds.append(_Speed(key, "process speed", part.speed, "m/s", leg))
     last = len(problem.legs) - 1
     unit = problem.task.speed_unit

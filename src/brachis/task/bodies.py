@@ -20,8 +20,10 @@ class Where(TypedDict, total=False):
     """Unique; left out: its shape and its number in the scene."""
     link: str
     """Link that carries it; left out: it stands still."""
+    frame: str
+    """Frame of the task in which it is placed; left out: the world."""
     position: Sequence[float]
-    """In the world, or in the link's frame, m."""
+    """In the world, in its frame, or in the link's frame, m."""
     rpy_deg: Sequence[float]
     """Roll, pitch, yaw about fixed axes, degrees."""
 
@@ -77,7 +79,11 @@ def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody: 
 
 
 def HalfSpace(  # noqa: N802
-    normal: Sequence[float], offset: float = 0.0, *, name: str | None = None
+    normal: Sequence[float],
+    offset: float = 0.0,
+    *,
+    name: str | None = None,
+    frame: str | None = None,
 ) -> SceneBody:
     """Make all that is behind a plane, such as a floor.
 
@@ -86,8 +92,10 @@ def HalfSpace(  # noqa: N802
     normal : sequence of float
         Direction out of the half-space, any length.
     offset : float, optional
-        Distance of the plane from the world's origin along the normal, m.
+        Distance of the plane from the origin along the normal, m.
     name : str, optional
+    frame : str, optional
+        Frame of the task in which the plane is; left out: the world.
 
     Examples
     --------
@@ -96,7 +104,10 @@ def HalfSpace(  # noqa: N802
     -0.1
     """
     return _make(
-        "HalfSpace", half_space={"normal": normal, "offset": offset}, name=name
+        "HalfSpace",
+        half_space={"normal": normal, "offset": offset},
+        name=name,
+        frame=frame,
     )
 
 

@@ -355,14 +355,15 @@ class ByForm:
     ) -> CoreSchema:
         """Tag every member with its form."""
         members = {_form_of_type(member): member for member in get_args(union)}
-        words = get_args(members.get("<word>"))
+        word = members.get("<word>")
+        words = get_args(word) if get_origin(word) is Literal else ()
 
         def choose(value: object) -> str | None:
             """Return the tag of the member for a value; None if there is none."""
             if hasattr(value, "homogeneous"):  # a transform, such as Pinocchio's SE3
                 return "<mapping>"
             form = _form_of_class(type(value))
-            return None if form == "<word>" and value not in words else form
+            return None if form == "<word>" and words and value not in words else form
 
         by_tag = Discriminator(
             choose,

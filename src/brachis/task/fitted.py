@@ -100,7 +100,7 @@ def segments_along(
 
 def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
     """Return the keys that the last curve along a file takes from the file's segment."""
-    shared = ("orientation", "blend", "stop", "dwell")
+    shared = ("orientation", "speed", "blend", "stop", "dwell")
     return {key: getattr(segment, key) for key in shared}
 
 

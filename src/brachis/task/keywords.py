@@ -33,7 +33,7 @@ Posture = (
     | Sequence[float]
     | Mapping[str, float]
     | Mapping[str, Sequence[float]]
-    | Literal["free"]
+    | str
 )
 Settings = Mapping[str, Any]
 
@@ -69,6 +69,7 @@ class TaskKeywords(RobotKeywords, total=False):
     start: Posture
     end: Posture
     frames: Mapping[str, Placement | Settings | Transform]
+    postures: Mapping[str, Array | Sequence[float] | Mapping[str, float]]
     path_frame: str | None
     path_start: (
         Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None

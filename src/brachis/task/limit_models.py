@@ -30,6 +30,7 @@ from brachis.task.fields import (
     AnyPositive,
     ByForm,
     CheckedModel,
+    Count,
     Mistake,
     Model,
     Name,
@@ -287,6 +288,8 @@ class ProcessSpeed(Model):
     """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
     allow. A part may begin at 0 or end at 1 only if the speed of the boundary there equals its speed, or the motion is
     periodic. A stop needs room beside it."""
+    segment: Count | None = None
+    """Index of the segment whose speed this is; written by brachis."""
 
 
 class ToolLimits(CheckedModel):

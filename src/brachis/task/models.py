@@ -47,12 +47,14 @@ from brachis.task.scene import (
 )
 from brachis.task.segments import (
     CsvSegment,
+    LineToPosture,
     Segment,
     SegmentModel,
     are_matrices,
 )
 from brachis.task.settings import (
     BoundarySettings,
+    FramePlacement,
     Placement,
     RefinementSettings,
     RobotSettings,
@@ -123,8 +125,8 @@ PathStart = Annotated[
     ),
 ]
 FreePosture = Annotated[
-    Literal["free"] | Posture,
-    ByForm("free, or a mapping {joints: [...]}"),
+    Name | Posture,
+    ByForm("free, the name of a posture, or a mapping {joints: [...]}"),
 ]
 
 
@@ -174,7 +176,7 @@ class Task(CheckedModel):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
-    """Configuration at the start of the path: {joints: ...} or free. With free, path_start is required unless the path
+    """Configuration at the start of the path: {joints: ...}, a name out of postures, or free. With free, path_start is required unless the path
     begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, angles in rad). For a pose, or with axis:
@@ -182,7 +184,7 @@ class Task(CheckedModel):
     count. Null: the tool's place in the start posture, or the first waypoint. It must agree with a given start posture.
     """
     end: FreePosture = "free"
-    """Configuration at the end of the path: free or {joints: ...}. Its tool must be at the path's end, to 1e-6 m or
+    """Configuration at the end of the path: free, {joints: ...} or a name out of postures. Its tool must be at the path's end, to 1e-6 m or
     rad; the nearest posture on the path is then used."""
     task_space: TaskSpace
     """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
@@ -194,8 +196,12 @@ class Task(CheckedModel):
     )
     """Segments of the path, in order. A list of points, each with all task coordinates, is the spline through them from
     the first one on. For a file of points: [{csv: {file: ...}}]. For another frame: {frame: NAME, segments: [...]}."""
-    frames: dict[Name, Placement] = Field(default={})
-    """Places of frames in the world, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...}."""
+    frames: dict[Name, FramePlacement] = Field(default={})
+    """Places of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...} in the world, or with frame: NAME
+    in another one."""
+    postures: dict[Name, JointValues] = Field(default={})
+    """Postures by name, for start, end and line: {to_posture: NAME}: joint positions, rad (m), as a list in the order of
+    the chain or by joint name."""
     path_frame: Name | None = None
     """Name of the frame of path and path_start, with all their points, directions and orientations. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
@@ -297,10 +303,24 @@ class Task(CheckedModel):
             )
         return path
 
-    @property
-    def path_placement(self) -> Placement | None:
-        """Where the frame of the path is in the world; None where it is the world."""
-        return None if self.path_frame is None else self.frames[self.path_frame]
+    def placement_of(self, frame: str | None) -> Placement:
+        """Return where a frame is in the world, through all frames in which it is placed; None is the world."""
+        if frame is None:
+            return Placement()
+        placed = self.frames[frame]
+        if placed.frame is None:
+            return placed
+        outer = self.placement_of(placed.frame).transform
+        return Placement.model_validate(outer * placed.transform)
+
+    def joints_at(self, end: Literal["start", "end"]) -> tuple[Any, str] | None:
+        """Return the joint positions that the task gives at an end of the path, and their key; None where it is free."""
+        posture = getattr(self, end)
+        if isinstance(posture, Posture):
+            return posture.joints, f"{end}.joints"
+        if posture == "free":
+            return None
+        return self.postures[posture], f"postures.{posture}"
 
     @property
     def _start_forms(self) -> str:
@@ -312,10 +332,57 @@ class Task(CheckedModel):
         return "a list of all joints"
 
     def _mistakes(self) -> Iterator[Mistake]:
+        self._check_names()
         yield from self._mistakes_at_the_start()
         yield from self._mistakes_in_the_path()
         yield from self._mistakes_in_tolerances()
         yield from self._mistakes_in_splines()
+
+    def _check_names(self) -> None:
+        """Refuse frames and postures that are not defined, and frames that are placed in themselves."""
+        placed = {f"frames.{name}": frame.frame for name, frame in self.frames.items()}
+        placed |= {f"scene[{i}]": body.frame for i, body in enumerate(self.scene)}
+        frames = {f"{key}.frame": name for key, name in placed.items()}
+        postures = {
+            f"path[{i}].line.to_posture": segment.shape.to_posture
+            for i, segment in enumerate(self.path)
+            if isinstance(segment.shape, LineToPosture)
+        }
+        ends = {"start": self.start, "end": self.end}
+        postures |= {end: name for end, name in ends.items() if isinstance(name, str)}
+        self._refuse_unknown("frame", {"path_frame": self.path_frame, **frames})
+        self._refuse_unknown("posture", postures)
+        if "free" in self.postures:
+            raise refuse(
+                "free is not the name of a posture: it leaves the posture open",
+                key="postures.free",
+                allowed="another name",
+            )
+        for name in self.frames:
+            chain = [name]
+            while outer := self.frames[chain[-1]].frame:
+                chain.append(outer)
+                if outer in chain[:-1]:
+                    raise refuse(
+                        "the frame is placed in itself",
+                        key=f"frames.{name}.frame",
+                        found=" in ".join(chain),
+                        allowed="frames that lead to the world",
+                    )
+
+    def _refuse_unknown(self, kind: str, names: Mapping[str, str | None]) -> None:
+        """Refuse names of frames or postures, by the keys that state them, that are not defined."""
+        known = [*getattr(self, f"{kind}s")]
+        for key, name in names.items():
+            words = ["free", *known] if key in {"start", "end"} else known
+            if name is None or name in words:
+                continue
+            raise refuse(
+                f"this {kind} is not defined in {kind}s",
+                key=key,
+                found=name,
+                allowed=", ".join(words) or f"{kind}s: {{{name}: ...}} in the task",
+            )
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]
@@ -369,17 +436,9 @@ class Task(CheckedModel):
                 "the last segment cannot stop: the path ends there, and the motion with it",
                 "no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
             )
-        name = self.path_frame
-        if name is not None and name not in self.frames:
-            yield (
-                "path_frame",
-                "this frame is not defined in frames",
-                ", ".join(self.frames)
-                or f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} in the task",
-            )
         if self.task_space != "joints":
             return
-        if name is not None:
+        if self.path_frame is not None:
             yield (
                 "path_frame",
                 "a path of joints cannot be in a frame",

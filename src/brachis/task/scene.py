@@ -73,8 +73,11 @@ class SceneBody(CheckedModel):
     """Factor from the mesh's unit to m."""
     link: Name | None = None
     """Link of the robot that carries it. Null: it is fixed to the world."""
+    frame: Name | None = None
+    """Name of the frame, out of frames, in which it is placed, with all of its points and directions. Null: the world.
+    """
     position: Vector3 = (0.0, 0.0, 0.0)
-    """Position of its origin in the world, or in the link's frame, m."""
+    """Position of its origin in the world, in its frame, or in the link's frame, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw, degrees, as in a URDF."""
 
@@ -95,7 +98,7 @@ class SceneBody(CheckedModel):
 
     @property
     def placement(self) -> Placement:
-        """Where it is in the world, or in the link's frame."""
+        """Where it is in the world, in its frame, or in the link's frame."""
         return Placement(xyz=self.position, rpy_deg=self.rpy_deg)
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -105,6 +108,12 @@ class SceneBody(CheckedModel):
                 "a body has exactly one shape",
                 found=given or "none",
                 allowed=f"one of {', '.join(SHAPES)}",
+            )
+        if self.link is not None and self.frame is not None:
+            yield (
+                "frame",
+                "a body is placed in the frame of its link",
+                "either link or frame",
             )
         if self.half_space is None:
             return
@@ -163,7 +172,7 @@ class SceneFile(Model):
     brachis_scene: Version
     """Version of the format."""
     bodies: tuple[SceneBody, ...]
-    """Bodies as in scene; files are relative to this file."""
+    """Bodies as in scene; files are relative to this file, and frames are those of the task."""
 
 
 def with_scene_of_file(
@@ -183,19 +192,26 @@ def with_scene_of_file(
     scene = content.get("scene")
     if not isinstance(scene, Mapping):
         return content
-    if set(scene) != {"file"}:
+    if set(scene) not in ({"file"}, {"file", "frame"}):
         raise TaskError(
             "scene must be a list of bodies or a file",
             where=f"{source}: scene",
             found=show(scene),
-            allowed="[{box: [...], position: [...]}, ...] or {file: cell.yaml}",
+            allowed="[{box: [...], position: [...]}, ...], {file: cell.yaml} or {file: cell.yaml, frame: NAME}",
         )
     name = str(scene["file"])
     path = folder / name
     where = f"{source}: scene.file"
     text = read_text(path, where=where, folder=folder, found=name)
     file = validate(SceneFile, read_yaml(text, str(path)), str(path))
-    return {**content, "scene": with_paths(file.bodies, path.absolute().parent)}
+    bodies = with_paths(file.bodies, path.absolute().parent)
+    if "frame" in scene:
+        frame = {"frame": scene["frame"]}
+        bodies = tuple(
+            body if body.link or body.frame else body.model_copy(update=frame)
+            for body in bodies
+        )
+    return {**content, "scene": bodies}
 
 
 def with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     BeforeValidator,
@@ -168,6 +168,14 @@ class LineBy(Model):
     """Displacement: all task coordinates (m, angles in rad)."""
 
 
+class LineToPosture(Model):
+    """A straight line to the tool's place in a posture, with its orientation in task spaces of poses."""
+
+    to_posture: Name
+    """Name of the posture, out of postures."""
+    has_orientations: ClassVar[bool] = True
+
+
 class LineHeading(Model):
     """A straight line of given length and direction, in the plane of two position rows; the angle stays."""
 
@@ -282,7 +290,8 @@ def are_matrices(values: Any) -> bool:
 
 
 LineForm = Annotated[
-    LineTo | LineBy | LineHeading, ByKey("a line needs exactly one of its forms")
+    LineTo | LineBy | LineHeading | LineToPosture,
+    ByKey("a line needs exactly one of its forms"),
 ]
 ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its forms")]
 _Start = tuple[tuple[float, ...], Attitude | None]
@@ -363,7 +372,10 @@ class MovingSegment(SegmentModel):
 
     orientation: OrientationMode = None
     """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
-    Null: the `orientations` of a spline, else fixed."""
+    Null: the `orientations` of a spline, or that of a posture, else fixed."""
+    speed: Positive | None = None
+    """Process speed: constant speed of the tool along the segment, m/s. Blends beside it are free, and so is a part of
+    0.1 s times the change of speed next to stops and to other speeds. It replaces feed rates of points. Null: none."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()
@@ -377,7 +389,7 @@ class MovingSegment(SegmentModel):
 
 
 class LineSegment(MovingSegment):
-    """A straight line: `to` a point, `by` a displacement, or of a `length` in a direction."""
+    """A straight line: `to` a point, `by` a displacement, of a `length` in a direction, or to a named posture."""
 
     line: LineForm
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -27,6 +27,9 @@ from brachis.task.fields import (
 from brachis.task.limit_models import FROM_URDF, LimitSpec
 from brachis.task.orientation import Vector3
 
+if TYPE_CHECKING:
+    from pinocchio import SE3
+
 
 class Placement(Model):
     """Where a frame is in another one."""
@@ -47,6 +50,20 @@ class Placement(Model):
         matrix = np.array(given.homogeneous)
         angles = np.degrees(rpy.matrixToRpy(matrix[:3, :3]))
         return {"xyz": matrix[:3, 3].tolist(), "rpy_deg": angles.tolist()}
+
+    @property
+    def transform(self) -> SE3:
+        """The placement as Pinocchio's transform."""
+        from pinocchio import SE3, rpy
+
+        return SE3(rpy.rpyToMatrix(*np.radians(self.rpy_deg)), np.array(self.xyz))
+
+
+class FramePlacement(Placement):
+    """Where a frame is in the world, or in another frame."""
+
+    frame: Name | None = None
+    """Name of the frame in which it is placed. Null: the world."""
 
 
 class InertiaMatrix(Model):

@@ -5,6 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 _UNITS = {
+    "frames.xyz": "m",
+    "scene.position": "m",
+    "path.speed": "m/s",
     "tool_offset.xyz": "m",
     "mounting.xyz": "m",
     "robot.gravity": "m/s^2",
@@ -67,6 +70,10 @@ def unit_of(key: str) -> str:
     ('kg', 'deg', '')
     """
     names = [part for part in key.split(".") if not part.isdecimal()]
+    if names[0] == "postures":
+        return "rad (m)"
+    if names[0] == "frames":
+        del names[1:2]  # its name
     units = (_UNITS.get(".".join(pair)) for pair in reversed([*pairwise(names)]))
     other = "deg" if key.endswith("_deg") else ""
     return next((unit for unit in units if unit is not None), other)

@@ -189,9 +189,9 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         meta.joint_names,
         robot.joint_names,
     )
-    for key, posture in (("start", task.start), ("end", task.end)):
-        if posture != "free":
-            robot.posture(posture.joints, f"task.{key}.joints")
+    for given in (task.joints_at("start"), task.joints_at("end")):
+        if given:
+            robot.posture(given[0], f"task.{given[1]}")
     redundant = [name for name in robot.joint_names if name in meta.redundant_joints]
     _refuse_unless(
         meta.redundant_joints == redundant,

@@ -62,13 +62,13 @@ def check_ends(given: Given) -> list[Check]:
     boundary = task.boundary
     states = given.states
     ends = (
-        ("start", states.only([0]), 0.0, task.start, boundary.start_speed),
-        ("end", states.only([-1]), 1.0, task.end, boundary.end_speed),
+        ("start", states.only([0]), 0.0, task.joints_at("start"), boundary.start_speed),
+        ("end", states.only([-1]), 1.0, task.joints_at("end"), boundary.end_speed),
     )
     checks = []
-    for name, state, s, posture, speed in ends:
-        if posture != "free":
-            wanted = given.robot.posture(posture.joints, f"{name}.joints")
+    for name, state, s, joints, speed in ends:
+        if joints is not None:
+            wanted = given.robot.posture(*joints)
             target = given.path.sample(np.array([s])).target
             miss = state.q - _move_onto(wanted, given.task_map, target)
             allowed = given.options.posture_tolerance

@@ -15,6 +15,8 @@ from brachis.apps.cli.app import (
     Changes,
     Degrees,
     Json,
+    Verbosity,
+    get_verbosity,
     load_changed_task,
     read_changes,
     refuse_options,
@@ -29,7 +31,7 @@ from brachis.apps.cli.output import (
 )
 from brachis.common.files import is_task_file
 from brachis.common.words import write_count
-from brachis.errors import InputError
+from brachis.errors import InputError, check_names
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 _NONE = "none"
 """What a table shows for a missing limit or mass, and for a joint without friction."""
 _LISTED = 12
-"""Choices without a closed form, and pairs that may collide, that are listed on the screen."""
+"""Choices of redundant joints that are listed on the screen."""
 _OTHER_TASKS = (
     "this family does not solve poses",
     "this family solves only poses",
@@ -57,6 +59,7 @@ def inspect(
     tool_frame: str | None = None,
     base_frame: str | None = None,
     posture: str | None = None,
+    frame: str | None = None,
     lock: list[str] | None = None,
     degrees: Degrees = False,
     changes: Changes = None,
@@ -64,7 +67,8 @@ def inspect(
 ) -> None:
     """Show a robot's joints and its closed forms.
 
-    Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
+    Limits, masses and friction of every joint, and which choices of redundant joints have a closed form. With --verbose
+    also the branches, the reasons against the other choices, and the pairs that may collide.
 
     Parameters
     ----------
@@ -75,7 +79,9 @@ def inspect(
         What the path prescribes: rows such as x,y or x,y,z,yaw, or a word such as pose or axis. Default: the task's,
         or all that the robot can.
     posture : str, optional
-        Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.
+        Say where the tool is at these joint positions, for example '0, 0.3, 1.2', or in a named posture of the task.
+    frame : str, optional
+        Say it in this frame of the task. Default: the world.
     lock : list of str, optional
         Joint held at a position: name=value, repeatable.
 
@@ -89,11 +95,17 @@ def inspect(
     from brachis.robot import bind
     from brachis.robot.from_task import robot_from_settings
     from brachis.robot.plausibility import report_issues
+    from brachis.scene import MANY_POSTURES
     from brachis.task import name_task_file
 
     remarks: list[str] = []
     task = None
     problem = None
+    tolerances = None
+    place: dict[str, Any] = {}
+    collisions: dict[str, list[Any]] = {"solids": [], "pairs": [], "never_free": []}
+    if posture is None:
+        refuse_options({"--frame": frame}, "no posture", "--posture")
     keys = read_changes(changes)
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
@@ -103,43 +115,63 @@ def inspect(
         task = load_changed_task(source, keys)
         with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
+            if posture is not None:
+                place = _place_tool(robot, posture, frame, task, remarks)
+            tolerances = task.tolerances
+            space = space or task.task_space
             try:
+                collisions = _collisions(robot, task)
+                remarks += [
+                    f"{' and '.join(pair)} are never free, in none of {MANY_POSTURES} random postures; if they may "
+                    f"touch, add [{', '.join(pair)}] to collisions.disable"
+                    for pair in collisions["never_free"]
+                ]
                 problem = Problem.of(robot, task)
                 check_within_reach(problem.task_map, problem.path)
-            except InputError:
+            except InputError as error:
                 report_issues(of_robot(robot) + of_task(task), strict=task.strict)
-                raise
-        space = space or task.task_space
+                if posture is None and not collisions["never_free"]:
+                    raise
+                remarks.append(f"the task cannot be planned: {error}")
+                task = problem = None
     else:
-        refuse_options({"--set": changes}, "a URDF", "a task file")
+        refuse_options({"--set": changes, "--frame": frame}, "a URDF", "a task file")
         source = urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
+        if posture is not None:
+            place = _place_tool(robot, posture, None, None, remarks)
     if space is None:
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
     with name_task_file(None if task_space else source, keys):
-        robot, task_map = bind(robot, space, None if task is None else task.tolerances)
+        robot, task_map = bind(robot, space, tolerances)
         candidates = brachis.ik.find_all(robot, task_map)
     with name_task_file(source, keys):
         remarks += _warnings(robot, problem)
-    remarks += _remarks(robot, candidates, posture)
+    if candidates and not any(candidate.solver for candidate in candidates):
+        remarks.append(brachis.ik.NO_CLOSED_FORM)
+    if missing := brachis.ik.missing_eaik(candidates):
+        remarks.append(missing)
     found = {
         "robot": str(source),
+        "tool": place,
         "task_space": list(task_map.rows),
         "degree_of_redundancy": robot.n - task_map.m,
         "remarks": remarks,
         "decompositions": [_decomposition(candidate) for candidate in candidates],
     }
-    data = found | _describe(robot, problem)
+    data = found | _describe(robot, problem, collisions)
     if json:
         print_json(data)
     else:
         _print_robot(robot, task, data, degrees=degrees)
 
 
-def _describe(robot: Robot, problem: Problem | None) -> dict[str, Any]:
+def _describe(
+    robot: Robot, problem: Problem | None, collisions: dict[str, list[Any]]
+) -> dict[str, Any]:
     """Describe a robot, and what a task says of it, its ends (None where free) and its path, as plain data for JSON.
 
     The path's length is None without positions.
@@ -147,7 +179,6 @@ def _describe(robot: Robot, problem: Problem | None) -> dict[str, Any]:
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
 
-    task = None if problem is None else problem.task
     limits = joint_limits_of(robot) if problem is None else problem.limits
     data = {
         "tool_frame": robot.tool_frame,
@@ -155,8 +186,8 @@ def _describe(robot: Robot, problem: Problem | None) -> dict[str, Any]:
         "in_use": in_use(robot),
         "joints": _joint_rows(robot),
         "guarantees": describe_guarantees(limits),
-        "collisions": _collisions(robot, task),
-        "fits": [fit.to_dict() for fit in task.fits] if task else [],
+        "collisions": collisions,
+        "fits": [fit.to_dict() for fit in problem.task.fits] if problem else [],
     }
     if problem is None:
         return data
@@ -187,26 +218,42 @@ def _warnings(robot: Robot, problem: Problem | None) -> list[str]:
     return [f"warning: {issue}" for issue in refuse_issues(issues, strict=strict)]
 
 
-def _remarks(
-    robot: Robot, candidates: list[ik.TriedDecomposition], posture: str | None
-) -> list[str]:
-    """Say whether closed forms are missing, and where the tool is in a posture."""
+def _place_tool(
+    robot: Robot,
+    posture: str,
+    frame: str | None,
+    task: Task | None,
+    remarks: list[str],
+) -> dict[str, Any]:
+    """Say where the tool is in a frame of the task, or in the world, by the keys of a task; doubts go to `remarks`."""
+    import numpy as np
+    from scipy.spatial.transform import Rotation
+
     from brachis.common.arguments import numbers
+    from brachis.common.arrays import clear_rounding
     from brachis.problem.plausibility import of_posture
     from brachis.robot.plausibility import refuse_issues
+    from brachis.task.points.units import CONVENTIONS, values_of
 
-    remarks = []
-    if candidates and not any(candidate.solver for candidate in candidates):
-        remarks.append(brachis.ik.NO_CLOSED_FORM)
-    if missing := brachis.ik.missing_eaik(candidates):
-        remarks.append(missing)
-    if posture is not None:
-        values = numbers(posture.replace(",", " ").split(), "--posture", "rad or m")
-        q = robot.posture(values, "--posture")
-        issues = refuse_issues(of_posture(robot, "--posture", q), strict=False)
-        remarks += [f"warning: {issue}" for issue in issues]
-        remarks.append(_tool_pose(robot, q))
-    return remarks
+    joints: object = None if task is None else task.postures.get(posture)
+    if joints is None:
+        words = posture.replace(",", " ").split()
+        joints = numbers(words, "--posture", "rad or m")
+    q = robot.posture(joints, "--posture")
+    issues = refuse_issues(of_posture(robot, "--posture", q), strict=False)
+    remarks += [f"warning: {issue}" for issue in issues]
+    placement = robot.tool_placement(q)
+    if task is not None and frame is not None:
+        check_names("frame", [frame], task.frames, "--frame")
+        placement = task.placement_of(frame).transform.actInv(placement)
+    position = clear_rounding(placement.translation).tolist()
+    place = {"frame": frame, "position": position}
+    for name, convention in CONVENTIONS.items():
+        values = values_of(name, Rotation.from_matrix(placement.rotation))
+        values = np.degrees(values) if convention.euler else values
+        key = f"{name}_deg" if convention.euler else name
+        place[key] = clear_rounding(values).tolist()
+    return place
 
 
 def _print_robot(
@@ -215,21 +262,22 @@ def _print_robot(
     """Print all for a person."""
     chain = f"{robot.base_frame} -> {robot.tool_frame}"
     joints = write_count(robot.n, "joint")
-    print_lines(f"{data['robot']}: {chain}, {joints}", *data["remarks"])
+    print_lines(f"{data['robot']}: {chain}, {joints}")
+    _print_place(data["tool"])
+    print_lines(*data["remarks"])
     rows = _joint_rows(robot, degrees=degrees)
     shown = [key for key in rows[0] if any(row[key] != _NONE for row in rows)]
     cells = [[row[key] for key in shown] for row in rows]
     print_table("joints", shown, cells, numbers={*shown} - {"joint", "type"})
     print_lines(*(f"{name}: {text}" for name, text in data["in_use"].items()))
-    guarantees = data["guarantees"].items()
-    print_lines(*(f"{name} limit: {text}" for name, text in guarantees))
+    guarantees = data["guarantees"]
+    for text in dict.fromkeys(guarantees.values()):
+        names = [name for name in guarantees if guarantees[name] == text]
+        print_lines(f"{', '.join(names)} limit: {text}")
     pairs = data["collisions"]["pairs"]
     if pairs:
-        more = ", ..." if len(pairs) > _LISTED else ""
-        print_lines(
-            f"{write_count(len(pairs), 'pair')} that may collide (all: --json):",
-            f"  {'; '.join(pairs[:_LISTED])}{more}",
-        )
+        listed = f":\n  {'; '.join(pairs)}" if get_verbosity() is Verbosity.VERBOSE else " (--verbose lists them)"
+        print_lines(f"{write_count(len(pairs), 'pair')} that may collide{listed}")
     if task is not None:
         for end in ("start", "end"):
             posture = write_posture(data, f"{end}_posture", degrees=degrees)
@@ -252,18 +300,22 @@ def _print_robot(
         _print_decompositions(data["decompositions"])
 
 
-def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:
-    """List the solids of robot and scene, and the pairs of them that may collide, by name."""
-    from brachis.scene import scene_of
+def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
+    """List the solids of robot and scene, and the pairs of them that may collide, or always do, by name."""
+    from brachis.scene import find_never_free, scene_of
 
-    scene = None if task is None else scene_of(robot, task)
+    scene = scene_of(robot, task)
     if scene is None:
-        return {"solids": [], "pairs": []}
+        return {"solids": [], "pairs": [], "never_free": []}
+    stuck = find_never_free(scene, robot, task.collisions.clearance)
     # Those with bodies of the scene first.
     pairs = (-scene.pairs.max(axis=1)).argsort(kind="stable").tolist()
     return {
         "solids": [solid.name for solid in scene.solids],
         "pairs": [scene.names(pair) for pair in pairs],
+        "never_free": [
+            [scene.solids[number].name for number in pair] for pair in stuck.pairs
+        ],
     }
 
 
@@ -406,36 +458,38 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
 
 def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
-    solved = [row for row in rows if row["solver"] != "-"]
-    refused = [row for row in rows if row["solver"] == "-"]
+    is_reasoned = get_verbosity() is Verbosity.VERBOSE
     columns = ["redundant joints", "solver", "branches"]
-    if any(row["remark"] for row in solved):
+    if any(row["remark"] for row in rows):
         columns.append("remark")
-    if solved:
-        cells = [[row[name] for name in columns] for row in solved]
-        print_table("choices of redundant joints", columns, cells)
-    for labels in dict.fromkeys(row["labels"] for row in solved):
-        alike = [row["redundant joints"] for row in solved if row["labels"] == labels]
+    rows = sorted(rows, key=lambda row: row["solver"] == "-")
+    shown = rows if is_reasoned else rows[:_LISTED]
+    cells = [[row[name] for name in columns] for row in shown]
+    print_table("choices of redundant joints (-: no closed form)", columns, cells)
+    if len(rows) > len(shown):
+        print_lines(f"... and {len(rows) - len(shown)} more, which --verbose lists")
+    if not is_reasoned:
+        print_lines("--verbose lists the branches, and the reasons against choices")
+        return
+    for labels in dict.fromkeys(row["labels"] for row in rows if row["labels"]):
+        alike = [row["redundant joints"] for row in rows if row["labels"] == labels]
         print_lines(f"branches with {'; '.join(alike)} redundant: {labels}")
-    if refused:
-        print_lines(
-            f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
-        )
-    for row in refused[:_LISTED]:
-        print_lines(f"  {row['redundant joints']}: {row['why not']}")
-    if len(refused) > _LISTED:
-        more = len(refused) - _LISTED
-        print_lines(f"  ... and {more} more, which --json lists")
+    for row in rows:
+        if row["why not"]:
+            print_lines(f"not {row['redundant joints']}: {row['why not']}")
 
 
-def _tool_pose(robot: Robot, q: np.ndarray) -> str:
-    """Say where the tool is in a posture, (n,), in the form of ``path_start`` in a task of poses."""
-    import pinocchio as pin
+def _print_place(place: dict[str, Any]) -> None:
+    """Print where the tool is, as a task file writes it: the position, and the orientation in every convention."""
+    if not place:
+        return
+    from brachis.task.points.units import CONVENTIONS
 
-    from brachis.common.arrays import clear_rounding
-
-    placement = robot.tool_placement(q)
-    x, y, z, qx, qy, qz, qw = clear_rounding(pin.SE3ToXYZQUAT(placement))
-    position = ", ".join(f"{value:.9g}" for value in (x, y, z))
-    turn = ", ".join(f"{value:.9g}" for value in (qw, qx, qy, qz))
-    return f"the tool is at {{position: [{position}], quaternion_wxyz: [{turn}]}}, m"
+    print_lines(f"the tool in {place['frame'] or 'the world'}:")
+    for key, values in place.items():
+        if key == "frame":
+            continue
+        convention = CONVENTIONS.get(key.removesuffix("_deg"))
+        about = f"{convention.meaning}: {convention.makers}" if convention else "m"
+        numbers = ", ".join(f"{value:.9g}" for value in values)
+        print_lines(f"  {key}: [{numbers}]  # {about}")

@@ -5,6 +5,7 @@ How orientations are written down: by quaternions, rotation vectors, and the ang
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
@@ -104,6 +105,18 @@ def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     if convention == "rotation_vector":
         return Rotation.from_rotvec(values)
     return Rotation.from_euler(CONVENTIONS[convention].euler, values)
+
+
+def values_of(convention: str, rotation: Rotation) -> npt.NDArray[Any]:
+    """Return the numbers, (..., 3) in rad or (..., 4), of rotations in one of the `CONVENTIONS`."""
+    if convention.startswith("quaternion"):
+        return rotation.as_quat(scalar_first=convention.endswith("wxyz"))
+    if convention == "rotation_vector":
+        return rotation.as_rotvec()
+    with warnings.catch_warnings():
+        # One of the many ways to write a rotation is as good as another.
+        warnings.filterwarnings("ignore", "Gimbal lock")
+        return rotation.as_euler(CONVENTIONS[convention].euler)
 
 
 def quaternions_of(rotation: Rotation) -> npt.NDArray[Any]:
