@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import InputError
 from brachis.robot import dynamics
 from support.effort import QUICK
 
@@ -86,15 +85,6 @@ def test_with_enough_knots_it_is_the_optimum(speed):
 
 def test_a_part_may_begin_and_end_with_a_path_that_is_passed_at_its_speed():
     whole = {"speed": 0.3, "s": [0.0, 1.0]}
-    for given, key, found in (
-        ({}, "s[0]", "0 m/s"),
-        ({"start_speed": 0.3}, "s[1]", "0 m/s"),
-        ({"start_speed": 0.3, "end_speed": 0.301}, "s[1]", "0.301 m/s"),
-    ):
-        with pytest.raises(InputError) as caught:
-            brachis.plan(task(whole, given))
-        assert f"tool_limits.process_speed[0].{key}" in str(caught.value)
-        assert found in str(caught.value)
     result = brachis.plan(task(whole, {"start_speed": 0.3, "end_speed": 0.3}))
     assert result.verified
     assert result.t_end == pytest.approx(LENGTH / 0.3, rel=1e-9)
@@ -110,6 +100,36 @@ def test_a_part_soon_after_the_start():
     assert result.verified
     ways = leg(0.02 * LENGTH, 0.3) + leg(0.5 * LENGTH, 0.3)
     assert result.t_end == pytest.approx(ways + 0.48 * LENGTH / 0.3, rel=0.02)
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.3])
+def test_a_segment_has_a_speed_but_for_its_leads(speed):
+    """By differences of Pinocchio's positions, between an approach and a stop, and behind it."""
+    seam = {"line": {"by": [0.3, 0.0]}, "speed": speed}
+    content = task()
+    content["path"] = [
+        {"line": {"by": [0.0, 0.1]}, "blend": 0.02},
+        {**seam, "stop": True},
+        seam,
+    ]
+    result = brachis.plan(content)
+    assert result.verified
+    assert result.trajectory.task.path[1].speed == speed
+    t = np.linspace(0.0, result.t_end, 20_001)
+    q = result.trajectory.position(t)
+    places, _ = result.trajectory.robot.tool_placements(q)
+    speeds = np.linalg.norm(np.gradient(places, t, axis=0), axis=1)
+    begin = places[0, 0]
+    x = places[:, 0] - begin
+    lead = 0.1 * speed
+    is_held = (x > 0.02) & (x < 0.3 - lead)
+    is_held |= (x > 0.3 + lead) & (x < 0.6 - lead)
+    step = 2.0 * np.diff(t)[0]
+    is_held &= np.roll(is_held, 3) & np.roll(is_held, -3)
+    np.testing.assert_allclose(speeds[is_held], speed, rtol=1e-6)
+    assert is_held.sum() * step > 0.5 * 0.5 / speed
+    (check,) = (c for c in result.verification.checks if c.name == "process speed")
+    assert check.passed
 
 
 def test_two_parts():

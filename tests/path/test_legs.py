@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import PathError
+from brachis.errors import PathError, TaskError
 from brachis.path import Leg, legs_of, path_of
 from brachis.problem.problem import Problem
-from brachis.robot import Robot, bind
+from brachis.robot import Robot, bind, task_map_of
 from brachis.task import load_task
 from support.chains import gantry_robot, planar_robot
 
@@ -74,39 +73,110 @@ def test_a_path_may_begin_and_end_at_the_speed() -> None:
     assert whole == (Leg(0.0, 1.0, speed=0.1),)
 
 
+LEAD = 0.1
+"""Length of a lead divided by the speed, s."""
+
+
 @pytest.mark.parametrize(
-    ("parts", "boundary", "key", "said"),
+    ("parts", "boundary", "held"),
     [
-        (part(0.1, 0.2, 0.5), {}, "[0].s", "cut the part in two"),
-        (
-            part(0.1, 0.1, 1 / 3),
-            {},
-            "[0].s",
-            "Leave room before and behind s = 0.333333",
-        ),
-        (
-            part(0.1, 1 / 3, 0.5),
-            {},
-            "[0].s",
-            "Leave room before and behind s = 0.333333",
-        ),
-        (part(0.1, 0.0, 0.2), {}, "[0].s[0]", "Set boundary.start_speed to 0.1"),
-        (part(0.1, 0.8, 1.0), {}, "[0].s[1]", "Set boundary.end_speed to 0.1"),
-        (
-            part(0.1, 0.8, 1.0),
-            {"end_speed": 0.1001},
-            "[0].s[1]",
-            "found 0.1001 m/s, by boundary.end_speed; allowed: 0.1 m/s",
-        ),
+        # Lengths along the path of three lines of 0.2 m, in m.
+        (part(0.1, 0.0, 0.2), {}, [(0.1, 0.01, 0.12)]),
+        (part(0.1, 0.0, 0.2), {"start_speed": 0.1}, [(0.1, 0.0, 0.12)]),
+        (part(0.1, 0.0, 0.2), {"start_speed": 0.3}, [(0.1, 0.03, 0.12)]),
+        (part(0.1, 0.8, 1.0), {}, [(0.1, 0.48, 0.59)]),
+        (part(0.1, 0.8, 1.0), {"end_speed": 0.1001}, [(0.1, 0.48, 0.58999)]),
+        (part(0.1, 0.1, 1 / 3), {}, [(0.1, 0.06, 0.19)]),
+        (part(0.1, 1 / 3, 0.5), {}, [(0.1, 0.21, 0.3)]),
+        (part(0.1, 0.2, 0.5), {}, [(0.1, 0.12, 0.19), (0.1, 0.21, 0.3)]),
     ],
 )
-def test_a_speed_that_does_not_fit_is_refused(
-    parts: Any, boundary: dict[str, float], key: str, said: str
+def test_a_part_leaves_leads_at_stops_and_ends(
+    parts: Any, boundary: dict[str, float], held: list[tuple[float, float, float]]
 ) -> None:
-    with pytest.raises(PathError) as caught:
-        legs(STOPPING, parts, boundary)
-    assert f"tool_limits.process_speed{key}: " in str(caught.value)
-    assert said in str(caught.value)
+    given = problem(STOPPING, parts, boundary)
+    speeds = [leg for leg in given.legs if leg.speed is not None]
+    found = [(leg.speed, 0.6 * leg.begin, 0.6 * leg.end) for leg in speeds]
+    np.testing.assert_allclose(found, held, atol=1e-9)
+    again = Problem.of(given.robot, load_task(given.task.to_dict()))
+    np.testing.assert_allclose(
+        [(leg.begin, leg.end) for leg in again.legs],
+        [(leg.begin, leg.end) for leg in given.legs],
+        atol=1e-12,
+    )
+
+
+SEAM = {**RIGHT, "speed": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("path", "held"),
+    [
+        # A blend of 0.02 m is 0.0378 m long.
+        ([{**RIGHT, "blend": 0.02}, {**UP, "speed": 0.1, "blend": 0.02}, RIGHT], [(1, 0, 0)]),
+        ([{**SEAM, "blend": 0.02}, {**UP, "speed": 0.1}], [(0, LEAD, LEAD)]),
+        ([{**SEAM, "blend": 0.02}, {**UP, "speed": 0.2}], [(0, LEAD, 0), (1, 0, LEAD)]),
+        ([{**SEAM, "stop": True}, {**UP, "speed": 0.1}], [(0, LEAD, LEAD), (1, LEAD, LEAD)]),
+        ([SEAM, {**RIGHT, "speed": 0.2}], [(0, LEAD, 0), (1, LEAD, LEAD)]),
+        ([RIGHT, SEAM], [(1, 0, LEAD)]),
+        ([SEAM, RIGHT], [(0, LEAD, 0)]),
+        ([RIGHT, SEAM, RIGHT], [(1, 0, 0)]),
+    ],
+)  # fmt: skip
+def test_segments_have_speeds(path: list[dict[str, Any]], held: Any) -> None:
+    given = problem(path)
+    pieces = given.path.pieces
+    breaks = dict(
+        zip([piece.segment for piece in pieces], given.path.breaks, strict=False)
+    )
+    ends = dict(
+        zip([piece.segment for piece in pieces], given.path.breaks[1:], strict=False)
+    )
+    found = [leg for leg in given.legs if leg.speed is not None]
+    assert len(found) == len(held)
+    for leg, (segment, before, after) in zip(found, held, strict=True):
+        speed = path[segment]["speed"]
+        assert leg.speed == speed
+        last = segment
+        while (
+            len(held) == 1 and path[last + 1 :] and path[last + 1].get("speed") == speed
+        ):
+            last += 1
+        total = given.path.total
+        assert leg.begin - breaks[segment] == pytest.approx(
+            before * speed / total, abs=1e-9
+        )
+        assert ends[last] - leg.end == pytest.approx(after * speed / total, abs=1e-9)
+
+
+def test_speeds_of_segments_and_of_parts() -> None:
+    given = problem([RIGHT, SEAM, RIGHT], part(0.3, 0.1, 0.2))
+    assert [leg.speed for leg in given.legs] == [None, 0.3, None, 0.1, None]
+    assert [part.segment for part in given.task.tool_limits.process_speed] == [None, 1]
+    with pytest.raises(TaskError, match="overlap, meet or are out of order"):
+        problem([RIGHT, SEAM, RIGHT], part(0.3, 0.3, 0.5))
+    with pytest.raises(TaskError, match=r"largest speed is below the process speed"):
+        problem([RIGHT, SEAM], limits={"speed": 0.05})
+    with pytest.raises(
+        PathError,
+        match=r"path\[0\]\.speed: the part is too short .*found 2 m/s; .*less than 1 m/s, or .* 2 times as long",
+    ):
+        problem([{**RIGHT, "speed": 2.0}])
+    shorter = problem([{**RIGHT, "speed": 0.99}])
+    assert [leg.speed for leg in shorter.legs] == [None, 0.99, None]
+
+
+def test_a_speed_replaces_the_feed_rates_of_points() -> None:
+    points = np.linspace([0.4, 0.0, 0.5], [0.6, 0.0, 0.5], 20)
+    fitted = brachis.fit_path(
+        points, tolerance={"position": 1e-5}, speed=np.full(20, 0.2)
+    )
+    (segment,) = fitted
+    with_feed = problem([segment])
+    assert with_feed.task.tool_limits.feed
+    given = problem([segment.model_copy(update={"speed": 0.05})])
+    assert not given.task.tool_limits.feed
+    assert [leg.speed for leg in given.legs] == [None, 0.05, None]
 
 
 def test_a_tool_that_turns_on_the_spot_has_no_speed() -> None:
@@ -138,8 +208,8 @@ def test_the_whole_position_must_be_prescribed() -> None:
         )
 
 
-def test_the_speed_at_the_start_of_a_path_of_joints_is_advised() -> None:
-    """It is the norm of joint velocities there, and the advice has digits enough to be taken."""
+def test_the_speed_at_the_start_of_a_path_of_joints_is_that_of_the_tool() -> None:
+    """`start_speed` is the norm of joint velocities there."""
     joints = {"joints": [0.0, 0.5, 0.0, -1.0, 0.0, 0.5, 0.0]}
     through = [[0.3, 0.7, 0.1, -1.2, 0.2, 0.7, 0.1], [0.6, 0.6, 0.3, -1.0, 0.4, 0.5, 0]]
     task = {
@@ -150,15 +220,17 @@ def test_the_speed_at_the_start_of_a_path_of_joints_is_advised() -> None:
         "tool_limits": {"process_speed": part(0.1, 0.0, 0.5)},
     }
     robot = brachis.robots.iiwa14
-    with pytest.raises(PathError) as caught:
-        Problem.of(robot, load_task(task))
-    advice = re.search(r"boundary.start_speed to (\S+),", str(caught.value))
-    assert advice
-    boundary = {"start_speed": float(advice[1])}
+    begun = Problem.of(robot, load_task(task))
+    first = begun.path.sample([0.0]).xi[0]
+    tool = task_map_of(robot, "position")
+    (jacobian,) = tool.jacobian(tool.twists(np.array([joints["joints"]])))
+    slope = np.linalg.norm(jacobian @ first)
+    assert begun.legs[0].end == pytest.approx(LEAD * 0.1 / slope, rel=1e-9)
+    start_speed = 0.1 / slope * np.linalg.norm(first)
+    boundary = {"start_speed": float(start_speed)}
     given = Problem.of(robot, load_task({**task, "boundary": boundary}))
-    first = given.path.sample([0.0]).xi[0]
-    rate = float(advice[1]) / np.linalg.norm(first)
-    assert given.leg_rates[0][0] == pytest.approx(rate, rel=1e-6)
+    assert given.legs[0].speed == 0.1
+    assert given.leg_rates[0][0] == pytest.approx(0.1 / slope, rel=1e-6)
 
 
 CIRCLE = {"circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1]}}
@@ -175,7 +247,7 @@ def test_a_periodic_motion_has_one_speed_at_its_seam() -> None:
 
 
 def problem(
-    path: list[dict[str, Any]], parts: Any = (), boundary: Any = None
+    path: Any, parts: Any = (), boundary: Any = None, limits: Any = None
 ) -> Problem:
     content = {
         "brachis": 1,
@@ -184,7 +256,7 @@ def problem(
         "task_space": "position",
         "path": path,
         "boundary": boundary or {},
-        "tool_limits": {"process_speed": parts},
+        "tool_limits": {"process_speed": parts, **(limits or {})},
     }
     return Problem.of(brachis.robots.iiwa14, load_task(content))
 

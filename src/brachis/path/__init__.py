@@ -2,7 +2,7 @@
 
 from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.from_curve import bspline_segment, with_feed_rates
-from brachis.path.legs import Leg, legs_of, with_segment_speeds
+from brachis.path.legs import Leg, legs_of, with_held_speeds
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, PathSample
 from brachis.path.sequence import Path, PathFrame, check_closed, path_speed
@@ -26,5 +26,5 @@ __all__ = [
     "path_speed",
     "time_law_of",
     "with_feed_rates",
-    "with_segment_speeds",
+    "with_held_speeds",
 ]

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from brachis.common import tolerances
-
 from brachis.common.words import write_apart
 from brachis.errors import StartError
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
@@ -37,6 +35,7 @@ from brachis.task import Segment, Task
 from brachis.task.orientation import Target, TurnTo
 from brachis.task.points.units import quaternions_of
 from brachis.task.segments import LineTo, LineToPosture
+from brachis.task.settings import place_frame
 
 
 def build_path(
@@ -98,10 +97,12 @@ def build_path(
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
         if isinstance(segment.shape, LineToPosture):
-            place = (postures or {})[segment.shape.to_posture]
+            assert postures is not None
+            place = postures[segment.shape.to_posture]
             place = place if frame is None else frame.to_frame(place)
-            segment = _line_to(segment, place, point, rows)
-        curve = coordinates.curve(segment, i, point)
+            segments = [*segments]
+            segments[i] = _line_to(segment, place, point, rows)
+        curve = coordinates.curve(segments[i], i, point)
         point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
         curves.append(curve)
     pieces = _join(curves, segments, coordinates)
@@ -183,7 +184,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     """
     frame = None
     if task.path_frame is not None:
-        frame = PathFrame.of(task.placement_of(task.path_frame), task_map.rows)
+        frame = PathFrame.of(place_frame(task.frames, task.path_frame), task_map.rows)
     given = None
     if task.path_start is not None:
         given = task_map.read(task.path_start, "path_start")

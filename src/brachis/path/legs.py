@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ from brachis.task.messages import validate
 
 _KEY = "tool_limits.process_speed"
 _LEAD = 0.1
-"""Lengths in which the tool reaches or leaves a speed, per change of speed, s."""
+"""Lengths in which the tool reaches or leaves a speed, divided by that speed, s."""
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,14 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
     Raises
     ------
     PathError
-        A process speed does not fit the task space, a stop, or the speeds at the path's ends; or the tool stands still
-        where it is to have one.
+        A process speed does not fit the task space; or the tool stands still where it is to have one.
     """
     parts = task.tool_limits.process_speed
     if parts:
         _check_task_space(task_map)
         _check_seam(task)
     for number, part in enumerate(parts):
-        _check_stops(path, part, number)
         _check_motion(task_map, path, part, number)
-        _check_ends(task, task_map, path, number)
     waits = [segment.dwell for segment in task.path if segment.stop]
     dwells = dict(zip(path.stops.tolist(), waits, strict=True))
     ends = sorted({0.0, 1.0, *dwells, *(s for part in parts for s in part.s)})
@@ -78,109 +75,94 @@ def key_of_speed(part: ProcessSpeed, number: int, below: str) -> str:
     return f"{_KEY}[{number}]{below}"
 
 
-def with_segment_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
-    """Return the task with the speeds of its segments among its process speeds.
+def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
+    """Return the task with its process speeds, those of segments among them, where the tool can hold them.
 
-    Segments of the same speed are one part, with the blends between them. Where the tool has another speed, at stops, at
-    the path's ends and at such segments, the part leaves a lead for the speed to change: `_LEAD` times the change.
+    Segments of the same speed are one part, with the blends between them. Parts are cut at stops. They have leads, in
+    which the speed changes, at stops, at ends of the path that are not passed at their speed, and behind other parts
+    that they meet.
 
     Raises
     ------
     PathError
-        A segment is too short to reach its speed.
+        A part is too short for its leads.
     TaskError
-        Its part overlaps another one of the task, or its speed is above the tool's largest one.
+        Parts overlap, or a speed is above the tool's largest one.
     """
-    parts = [part for part in task.tool_limits.process_speed if part.segment is None]
-    runs = _runs_of(task, path)
-    if not any(run.speed for run in runs):
+    limits = task.tool_limits
+    parts = [part for part in limits.process_speed if part.segment is None]
+    parts += _parts_of_segments(task, path)
+    if not parts:
         return task
-    speed_before: float | None = None
-    for run in runs:
-        begin, end, speed, segment = run.begin, run.end, run.speed, run.segment
-        if begin in path.stops:
-            speed_before = 0.0
-        elif begin == 0.0:
-            speed_before = _boundary_speed(task, task_map, path, 0)[0]
-        speed_after = None
-        if end in path.stops:
-            speed_after = 0.0
-        elif end == 1.0:
-            speed_after = _boundary_speed(task, task_map, path, 1)[0]
-        if speed is not None:
+    after = dict.fromkeys(path.stops.tolist(), 0.0)
+    if not task.boundary.periodic:
+        after[0.0] = _speed_at_end(task, task_map, path, 0)
+        after[1.0] = _speed_at_end(task, task_map, path, 1)
+    before = {part.s[1]: part.speed for part in parts} | after
+    held = []
+    for number, part in enumerate(parts):
+        speed = part.speed
+        stops = path.stops[(path.stops > part.s[0]) & (path.stops < part.s[1])]
+        for ends in pairwise([part.s[0], *stops.tolist(), part.s[1]]):
+            between = path.between(*ends)
             leads = [
-                _lead(speed, other) / _tool_slope(task_map, path.between(begin, end), s)
-                for s, other in ((begin, speed_before), (end, speed_after))
+                _lead(speed, others.get(s, speed)) / _tool_slope(task_map, between, s)
+                for s, others in zip(ends, (before, after), strict=True)
             ]
-            if sum(leads) >= end - begin:
-                share = (end - begin) / sum(leads)
+            share = (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
+            if share <= 1.0:
                 raise PathError(
-                    "the segment is too short to reach its speed and to leave it",
-                    s_interval=(begin, end),
-                    where=f"path[{segment}].speed",
+                    "the part is too short to reach its process speed and to leave it",
+                    s_interval=ends,
+                    where=key_of_speed(part, number, ".speed"),
                     found=f"{speed:g} m/s",
-                    allowed=f"less than {share * speed:.3g} m/s, or a segment that is {1.0 / share:.3g} times as long",
+                    allowed=f"less than {share * speed:.3g} m/s, or a part that is {1.0 / share:.3g} times as long",
                 )
-            s = (begin + leads[0], end - leads[1])
-            parts.append(ProcessSpeed(speed=speed, s=s, segment=segment))
-        speed_before = speed
-    parts.sort(key=lambda part: part.s)
-    limits = task.tool_limits.model_copy(update={"process_speed": tuple(parts)})
-    checked = validate(ToolLimits, limits, "tool_limits")
+            s = (ends[0] + leads[0], ends[1] - leads[1])
+            held.append(part.model_copy(update={"s": s}))
+    held.sort(key=lambda part: part.s)
+    changed = limits.model_copy(update={"process_speed": tuple(held)})
+    checked = validate(ToolLimits, changed, "tool_limits")
     return task.model_copy(update={"tool_limits": checked})
 
 
-@dataclass(frozen=True)
-class _Run:
-    """Pieces of the path with one speed, m/s, or none, from s = `begin` to `end`; `segment` is the first one."""
-
-    begin: float
-    end: float
-    speed: float | None
-    segment: int
-
-
-def _runs_of(task: Task, path: Path) -> list[_Run]:
-    """Cut the path where the speeds of segments change, and at stops; a blend has the speed that both sides have."""
+def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
+    """List the parts of the path whose segments have a speed; a blend has that of both sides."""
     speeds = [getattr(segment, "speed", None) for segment in task.path]
-    runs: list[_Run] = []
-    segment = 0
-    for (begin, end), piece in zip(pairwise(path.breaks.tolist()), path.pieces, strict=True):
-        if piece.segment is None:
-            is_same = speeds[segment] == speeds[segment + 1]
-            run = _Run(begin, end, speeds[segment] if is_same else None, segment)
-            segment += 1
-        else:
-            segment = piece.segment
-            run = _Run(begin, end, speeds[segment], segment)
-        if runs and runs[-1].speed == run.speed and begin not in path.stops:
-            run = replace(runs.pop(), end=end)
-        runs.append(run)
-    return runs
+    parts: list[ProcessSpeed] = []
+    after = 0
+    bounds = pairwise(path.breaks.tolist())
+    for (begin, end), piece in zip(bounds, path.pieces, strict=True):
+        segment = after if piece.segment is None else piece.segment
+        after = segment + (piece.segment is None)
+        speed = speeds[segment]
+        if speed is None or speed != speeds[after]:
+            continue
+        first = begin
+        if parts and (parts[-1].s[1], parts[-1].speed) == (begin, speed):
+            first = parts.pop().s[0]
+        parts.append(ProcessSpeed(speed=speed, s=(first, end), segment=segment))
+    return parts
 
 
-def _lead(speed: float, other: float | None) -> float:
-    """Length in which the tool gets from one speed to another one, m; 0 where that is free, or the same one."""
-    if other is None or abs(speed - other) <= tolerances.WRITTEN * speed:
+def _lead(speed: float, other: float) -> float:
+    """Length in which the tool gets from one speed to another one, m."""
+    if abs(speed - other) <= tolerances.WRITTEN * speed:
         return 0.0
-    return _LEAD * abs(speed - other)
+    return _LEAD * max(speed, other)
 
 
 def _tool_slope(task_map: TaskMap, path: Path, s: float) -> float:
-    """How far the tool moves per unit s, m, and no less than nothing but for rounding."""
+    """How far the tool moves per unit s, m; where it stands still, hardly."""
     velocity = tool_derivatives(task_map, path, np.array([s]))[0, 0]
     return max(float(np.linalg.norm(velocity)), tolerances.LENGTH)
 
 
-def _boundary_speed(
-    task: Task, task_map: TaskMap, path: Path, end: int
-) -> tuple[float | None, float]:
-    """Return the tool's speed at an end of the path, m/s (None where the motion is periodic), and its share of that of the path."""
-    boundary = task.boundary
-    ratio = _tool_slope(task_map, path, end) / path_speed(task_map, path, end)
-    if boundary.periodic:
-        return None, ratio
-    return ratio * (boundary.end_speed if end else boundary.start_speed), ratio
+def _speed_at_end(task: Task, task_map: TaskMap, path: Path, end: int) -> float:
+    """Speed of the tool at the path's start, 0, or end, 1, m/s."""
+    stated = (task.boundary.start_speed, task.boundary.end_speed)[end]
+    slope = _tool_slope(task_map, path, end)
+    return stated * slope / path_speed(task_map, path, end)
 
 
 def _check_task_space(task_map: TaskMap) -> None:
@@ -216,25 +198,6 @@ def _check_seam(task: Task) -> None:
         )
 
 
-def _check_stops(path: Path, part: ProcessSpeed, number: int) -> None:
-    """Refuse a part with a stop in it or at its ends."""
-    begin, end = part.s
-    near = tolerances.PATH
-    inside = path.stops[(path.stops > begin - near) & (path.stops < end + near)]
-    if not len(inside):
-        return
-    stop = float(inside[0])
-    raise PathError(
-        "the tool has a process speed where it stops",
-        s_interval=(stop, stop),
-        where=f"{_KEY}[{number}].s",
-        found=f"[{begin:g}, {end:g}], with a stop at s = {stop:.6g}",
-        allowed="parts of the path between stops, with room to reach and leave the speed",
-        hint=f"Leave room before and behind s = {stop:.6g}, such as {_lead(part.speed, 0.0):.3g} m: cut the part in two, "
-        "or remove the stop",
-    )
-
-
 def _check_motion(
     task_map: TaskMap, path: Path, part: ProcessSpeed, number: int
 ) -> None:
@@ -250,24 +213,4 @@ def _check_motion(
             where=key_of_speed(part, number, ".s"),
             found=f"no motion of the position at s = {s[worst]:.4g}",
             allowed="a part of the path along which the position moves",
-        )
-
-
-def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
-    """Refuse a part that begins or ends with the path, unless the path has its speed there."""
-    part = task.tool_limits.process_speed[number]
-    for end, name in enumerate(("start", "end")):
-        if part.s[end] != end:
-            continue
-        found, ratio = _boundary_speed(task, task_map, path, end)
-        lead = _lead(part.speed, found)
-        if found is None or not lead:
-            continue
-        raise PathError(
-            f"process speed at s = {end} is {part.speed:g} m/s, but that at the path's {name} is {found:g} m/s",
-            where=f"{_KEY}[{number}].s[{end}]",
-            found=f"{found:g} m/s, by boundary.{name}_speed",
-            allowed=f"{part.speed:g} m/s at the path's {name}, or an s inside the path",
-            hint=f"Set boundary.{name}_speed to {part.speed / ratio:.10g}, or leave room on the path to "
-            f"change the speed, such as {lead:.3g} m",
         )

@@ -25,7 +25,7 @@ from brachis.path import (
     path_speed,
     time_law_of,
     with_feed_rates,
-    with_segment_speeds,
+    with_held_speeds,
 )
 from brachis.problem.feasibility import (
     branch_of,
@@ -99,7 +99,7 @@ class Problem(Summary):
             end: robot.posture(*given) for end, given in joints.items() if given
         }
         path = path_of(task_map, task)
-        task = with_segment_speeds(with_feed_rates(task, path), task_map, path)
+        task = with_held_speeds(with_feed_rates(task, path), task_map, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
             if "start" in postures:

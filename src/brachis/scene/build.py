@@ -18,6 +18,7 @@ from brachis.scene.chain import Chain
 from brachis.scene.scene import Scene
 from brachis.scene.solids import build_capsules, build_solids, read_solids
 from brachis.task import Task
+from brachis.task.settings import place_frame
 
 _MOST_PAIRS = 4000
 """Pairs of bodies whose distances a plan looks at: all take 0.9 GB of memory and half a minute."""
@@ -54,7 +55,8 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         )
     solids = list(own)
     for body in task.scene:
-        solids += build_solids(body, placement_matrix(task.placement_of(body.frame)))
+        frame = placement_matrix(place_frame(task.frames, body.frame))
+        solids += build_solids(body, frame)
     mounted = placement_matrix(robot.settings.mounting)
     hint = (
         "Leave out bodies that the robot cannot reach, or join small ones in one mesh"

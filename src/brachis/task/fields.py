@@ -13,7 +13,7 @@ import itertools
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import NoneType
@@ -310,6 +310,18 @@ def refuse(
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
     facts = {"problem": problem, "key": key, "found": found, "allowed": allowed}
     return PydanticCustomError(REFUSED, "{problem}", facts)
+
+
+def check_defined(kind: str, uses: Mapping[str, Any], known: Collection[str]) -> None:
+    """Refuse names of a kind, by the keys that use them, that are not among the known ones; what is no name passes."""
+    for key, name in uses.items():
+        if isinstance(name, str) and name not in known:
+            raise refuse(
+                f"this {kind} is not defined in {kind}s",
+                key=key,
+                found=name,
+                allowed=", ".join(known) or f"{kind}s: {{{name}: ...}} in the task",
+            )
 
 
 def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterValidator:

@@ -29,11 +29,7 @@ from brachis.task.settings import (
 from brachis.task.tolerances import Margins, Tolerances
 
 Posture = (
-    Array
-    | Sequence[float]
-    | Mapping[str, float]
-    | Mapping[str, Sequence[float]]
-    | str
+    Array | Sequence[float] | Mapping[str, float] | Mapping[str, Sequence[float]] | str
 )
 Settings = Mapping[str, Any]
 

@@ -30,6 +30,7 @@ from brachis.task.fields import (
     NonEmpty,
     Number,
     Version,
+    check_defined,
     must,
     or_form,
     plain,
@@ -47,7 +48,6 @@ from brachis.task.scene import (
 )
 from brachis.task.segments import (
     CsvSegment,
-    LineToPosture,
     Segment,
     SegmentModel,
     are_matrices,
@@ -55,12 +55,12 @@ from brachis.task.segments import (
 from brachis.task.settings import (
     BoundarySettings,
     FramePlacement,
-    Placement,
     RefinementSettings,
     RobotSettings,
     SearchSettings,
     SolverSettings,
     SplineSettings,
+    check_frames,
     expand_solver_name,
 )
 from brachis.task.tolerances import (
@@ -176,16 +176,16 @@ class Task(CheckedModel):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
-    """Configuration at the start of the path: {joints: ...}, a name out of postures, or free. With free, path_start is required unless the path
-    begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
+    """Configuration at the start of the path: {joints: ...}, a name out of postures, or free. With free, path_start is
+    required unless the path begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, angles in rad). For a pose, or with axis:
     {position: [x, y, z], rpy_deg: [...]}, or another orientation convention; of the position the rows of the task space
     count. Null: the tool's place in the start posture, or the first waypoint. It must agree with a given start posture.
     """
     end: FreePosture = "free"
-    """Configuration at the end of the path: free, {joints: ...} or a name out of postures. Its tool must be at the path's end, to 1e-6 m or
-    rad; the nearest posture on the path is then used."""
+    """Configuration at the end of the path: free, {joints: ...} or a name out of postures. Its tool must be at the
+    path's end, to 1e-6 m or rad; the nearest posture on the path is then used."""
     task_space: TaskSpace
     """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
     joints, or a list of coordinates out of x, y, z. Behind these may be yaw, pitch or roll, rad: the angle about the
@@ -197,11 +197,14 @@ class Task(CheckedModel):
     """Segments of the path, in order. A list of points, each with all task coordinates, is the spline through them from
     the first one on. For a file of points: [{csv: {file: ...}}]. For another frame: {frame: NAME, segments: [...]}."""
     frames: dict[Name, FramePlacement] = Field(default={})
-    """Places of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...} in the world, or with frame: NAME
-    in another one."""
-    postures: dict[Name, JointValues] = Field(default={})
-    """Postures by name, for start, end and line: {to_posture: NAME}: joint positions, rad (m), as a list in the order of
-    the chain or by joint name."""
+    """Places of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...} in the world, or in another one
+    with frame: NAME."""
+    postures: Annotated[
+        dict[Name, JointValues],
+        must(lambda named: "free" not in named, "free names no posture", "other names"),
+    ] = Field(default={})
+    """Postures by name, for start, end and line: {to_posture: NAME}: joint positions, rad (m), in the order of the
+    chain or by joint name."""
     path_frame: Name | None = None
     """Name of the frame of path and path_start, with all their points, directions and orientations. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
@@ -303,18 +306,8 @@ class Task(CheckedModel):
             )
         return path
 
-    def placement_of(self, frame: str | None) -> Placement:
-        """Return where a frame is in the world, through all frames in which it is placed; None is the world."""
-        if frame is None:
-            return Placement()
-        placed = self.frames[frame]
-        if placed.frame is None:
-            return placed
-        outer = self.placement_of(placed.frame).transform
-        return Placement.model_validate(outer * placed.transform)
-
     def joints_at(self, end: Literal["start", "end"]) -> tuple[Any, str] | None:
-        """Return the joint positions that the task gives at an end of the path, and their key; None where it is free."""
+        """Return the joint positions that the task gives at an end, and their key; None where it is free."""
         posture = getattr(self, end)
         if isinstance(posture, Posture):
             return posture.joints, f"{end}.joints"
@@ -339,50 +332,17 @@ class Task(CheckedModel):
         yield from self._mistakes_in_splines()
 
     def _check_names(self) -> None:
-        """Refuse frames and postures that are not defined, and frames that are placed in themselves."""
-        placed = {f"frames.{name}": frame.frame for name, frame in self.frames.items()}
-        placed |= {f"scene[{i}]": body.frame for i, body in enumerate(self.scene)}
-        frames = {f"{key}.frame": name for key, name in placed.items()}
+        """Refuse names of frames and postures that are not defined."""
+        frames = {"path_frame": self.path_frame}
+        frames |= {f"scene[{i}].frame": body.frame for i, body in enumerate(self.scene)}
+        check_frames(self.frames, frames)
         postures = {
-            f"path[{i}].line.to_posture": segment.shape.to_posture
+            f"path[{i}].line.to_posture": getattr(segment.shape, "to_posture", None)
             for i, segment in enumerate(self.path)
-            if isinstance(segment.shape, LineToPosture)
         }
+        check_defined("posture", postures, self.postures)
         ends = {"start": self.start, "end": self.end}
-        postures |= {end: name for end, name in ends.items() if isinstance(name, str)}
-        self._refuse_unknown("frame", {"path_frame": self.path_frame, **frames})
-        self._refuse_unknown("posture", postures)
-        if "free" in self.postures:
-            raise refuse(
-                "free is not the name of a posture: it leaves the posture open",
-                key="postures.free",
-                allowed="another name",
-            )
-        for name in self.frames:
-            chain = [name]
-            while outer := self.frames[chain[-1]].frame:
-                chain.append(outer)
-                if outer in chain[:-1]:
-                    raise refuse(
-                        "the frame is placed in itself",
-                        key=f"frames.{name}.frame",
-                        found=" in ".join(chain),
-                        allowed="frames that lead to the world",
-                    )
-
-    def _refuse_unknown(self, kind: str, names: Mapping[str, str | None]) -> None:
-        """Refuse names of frames or postures, by the keys that state them, that are not defined."""
-        known = [*getattr(self, f"{kind}s")]
-        for key, name in names.items():
-            words = ["free", *known] if key in {"start", "end"} else known
-            if name is None or name in words:
-                continue
-            raise refuse(
-                f"this {kind} is not defined in {kind}s",
-                key=key,
-                found=name,
-                allowed=", ".join(words) or f"{kind}s: {{{name}: ...}} in the task",
-            )
+        check_defined("posture", ends, ["free", *self.postures])
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
@@ -22,6 +22,7 @@ from brachis.task.fields import (
     Number,
     Positive,
     Share,
+    check_defined,
     refuse,
 )
 from brachis.task.limit_models import FROM_URDF, LimitSpec
@@ -64,6 +65,40 @@ class FramePlacement(Placement):
 
     frame: Name | None = None
     """Name of the frame in which it is placed. Null: the world."""
+
+
+def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Placement:
+    """Return where a frame is in the world, through all frames in which it is placed; None is the world."""
+    placed = Placement() if name is None else frames[name]
+    if not isinstance(placed, FramePlacement) or placed.frame is None:
+        return placed
+    outer = place_frame(frames, placed.frame)
+    return Placement.model_validate(outer.transform * placed.transform)
+
+
+def check_frames(
+    frames: Mapping[str, FramePlacement], uses: Mapping[str, str | None]
+) -> None:
+    """Refuse names of frames, by the keys that use them, that are not defined, and frames that are in themselves.
+
+    Raises
+    ------
+    PydanticCustomError
+    """
+    outer = {name: frame.frame for name, frame in frames.items()}
+    inner = {f"frames.{name}.frame": each for name, each in outer.items()}
+    check_defined("frame", {**uses, **inner}, frames)
+    for name in frames:
+        chain = [name]
+        while (last := outer[chain[-1]]) and len(chain) <= len(frames):
+            chain.append(last)
+        if last:
+            raise refuse(
+                "the frame is placed in itself",
+                key=f"frames.{name}.frame",
+                found=" in ".join(chain[:4]),
+                allowed="frames that lead to the world",
+            )
 
 
 class InertiaMatrix(Model):

@@ -21,7 +21,7 @@ from brachis.common import tolerances
 from brachis.common.arrays import bisect, count_each
 from brachis.errors import InputError
 from brachis.path import Path
-from brachis.path.legs import Leg, legs_of, with_segment_speeds
+from brachis.path.legs import Leg, legs_of, with_held_speeds
 from brachis.robot import Robot, TaskMap
 from brachis.task import SpeedTable, Task
 from brachis.trajectory import MotionPhase, Trajectory
@@ -278,7 +278,7 @@ class Given:
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
         """Legs of the path, found anew from the task."""
-        task = with_segment_speeds(self.task, self.task_map, self.path)
+        task = with_held_speeds(self.task, self.task_map, self.path)
         return legs_of(task, self.task_map, self.path)
 
     def during(self, phase: MotionPhase) -> MotionStates:

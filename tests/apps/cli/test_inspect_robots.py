@@ -182,13 +182,11 @@ def test_free_roll_and_unknown_words(run):
 
 def test_where_the_tool_is(run):
     urdf = ROOT / "robots/tx90l_rail/robot.urdf"
-    remark = json.loads(
-        run("inspect", urdf, "--posture", "0, 0, 0, 0, 0, 0, 0", "--json").out
-    )["remarks"][-1]
-    assert (
-        remark
-        == "the tool is at {position: [0.05, 0.05, 1.628], quaternion_wxyz: [1, 0, 0, 0]}, m"
-    )
+    out = run("inspect", urdf, "--posture", "0, 0, 0, 0, 0, 0, 0", "--json").out
+    place = json.loads(out)["tool"]
+    assert place["position"] == pytest.approx([0.05, 0.05, 1.628])
+    assert place["quaternion_wxyz"] == [1, 0, 0, 0]
+    assert place["fanuc_wpr_deg"] == [0, 0, 0]
     iiwa = run("inspect", "iiwa14", "--posture", "0 0.3 0 0 0 0 0").out
     assert "position: [0.279562116, 0, 1.26374832]" in iiwa, "no rounding error"
     degrees = run("inspect", "scara3", "--posture", "90 0.1 0.1").out

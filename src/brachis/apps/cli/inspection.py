@@ -34,8 +34,6 @@ from brachis.common.words import write_count
 from brachis.errors import InputError, check_names
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from brachis import ik
     from brachis.problem.problem import Problem
     from brachis.robot import Robot
@@ -44,13 +42,7 @@ if TYPE_CHECKING:
 _NONE = "none"
 """What a table shows for a missing limit or mass, and for a joint without friction."""
 _LISTED = 12
-"""Choices of redundant joints that are listed on the screen."""
-_OTHER_TASKS = (
-    "this family does not solve poses",
-    "this family solves only poses",
-    "this family solves only the position: x, y and z",
-)
-"""Reasons of families for other task spaces; shown only without other reasons."""
+"""Choices of redundant joints on the screen."""
 
 
 def inspect(
@@ -90,18 +82,12 @@ def inspect(
     brachis inspect task.yaml
     brachis inspect tx90l_rail --task-space pose
     """
-    from brachis.problem.plausibility import check_within_reach, of_robot, of_task
-    from brachis.problem.problem import Problem
     from brachis.robot import bind
     from brachis.robot.from_task import robot_from_settings
-    from brachis.robot.plausibility import report_issues
-    from brachis.scene import MANY_POSTURES
     from brachis.task import name_task_file
 
     remarks: list[str] = []
-    task = None
-    problem = None
-    tolerances = None
+    task = problem = tolerances = None
     place: dict[str, Any] = {}
     collisions: dict[str, list[Any]] = {"solids": [], "pairs": [], "never_free": []}
     if posture is None:
@@ -113,34 +99,20 @@ def inspect(
         set_it = "robot.tool_frame, robot.base_frame, robot.locked_joints"
         refuse_options(given, "a task file", f"a URDF; a task has {set_it}")
         task = load_changed_task(source, keys)
+        space = space or task.task_space
+        tolerances = task.tolerances
         with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
-            if posture is not None:
-                place = _place_tool(robot, posture, frame, task, remarks)
-            tolerances = task.tolerances
-            space = space or task.task_space
-            try:
-                collisions = _collisions(robot, task)
-                remarks += [
-                    f"{' and '.join(pair)} are never free, in none of {MANY_POSTURES} random postures; if they may "
-                    f"touch, add [{', '.join(pair)}] to collisions.disable"
-                    for pair in collisions["never_free"]
-                ]
-                problem = Problem.of(robot, task)
-                check_within_reach(problem.task_map, problem.path)
-            except InputError as error:
-                report_issues(of_robot(robot) + of_task(task), strict=task.strict)
-                if posture is None and not collisions["never_free"]:
-                    raise
-                remarks.append(f"the task cannot be planned: {error}")
-                task = problem = None
     else:
         refuse_options({"--set": changes, "--frame": frame}, "a URDF", "a task file")
         source = urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
-        if posture is not None:
-            place = _place_tool(robot, posture, None, None, remarks)
+    if posture is not None:
+        place = _place_tool(robot, posture, frame, task, remarks)
+    if task is not None:
+        with name_task_file(source, keys):
+            problem = _problem_of(robot, task, collisions, remarks, is_needed=not place)
     if space is None:
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
@@ -166,7 +138,39 @@ def inspect(
     if json:
         print_json(data)
     else:
-        _print_robot(robot, task, data, degrees=degrees)
+        _print_robot(robot, problem, data, degrees=degrees)
+
+
+def _problem_of(
+    robot: Robot,
+    task: Task,
+    collisions: dict[str, list[Any]],
+    remarks: list[str],
+    *,
+    is_needed: bool,
+) -> Problem | None:
+    """Check a task; None where it cannot be planned. `remarks` say why, and `collisions` which pairs are never free."""
+    from brachis.problem.plausibility import check_within_reach, of_robot, of_task
+    from brachis.problem.problem import Problem
+    from brachis.robot.plausibility import report_issues
+    from brachis.scene import MANY_POSTURES
+
+    try:
+        collisions |= _collisions(robot, task)
+        remarks += [
+            f"{' and '.join(pair)} are never free, in none of {MANY_POSTURES} random postures; if they may touch, "
+            f"add [{', '.join(pair)}] to collisions.disable"
+            for pair in collisions["never_free"]
+        ]
+        problem = Problem.of(robot, task)
+        check_within_reach(problem.task_map, problem.path)
+    except InputError as error:
+        report_issues(of_robot(robot) + of_task(task), strict=task.strict)
+        if is_needed and not collisions["never_free"]:
+            raise
+        remarks.append(f"the task cannot be planned: {error}")
+        return None
+    return problem
 
 
 def _describe(
@@ -234,8 +238,12 @@ def _place_tool(
     from brachis.problem.plausibility import of_posture
     from brachis.robot.plausibility import refuse_issues
     from brachis.task.points.units import CONVENTIONS, values_of
+    from brachis.task.settings import place_frame
 
-    joints: object = None if task is None else task.postures.get(posture)
+    named = {} if task is None else task.postures
+    if posture.isidentifier():
+        check_names("posture", [posture], named, "--posture")
+    joints: object = named.get(posture)
     if joints is None:
         words = posture.replace(",", " ").split()
         joints = numbers(words, "--posture", "rad or m")
@@ -245,7 +253,7 @@ def _place_tool(
     placement = robot.tool_placement(q)
     if task is not None and frame is not None:
         check_names("frame", [frame], task.frames, "--frame")
-        placement = task.placement_of(frame).transform.actInv(placement)
+        placement = place_frame(task.frames, frame).transform.actInv(placement)
     position = clear_rounding(placement.translation).tolist()
     place = {"frame": frame, "position": position}
     for name, convention in CONVENTIONS.items():
@@ -257,7 +265,7 @@ def _place_tool(
 
 
 def _print_robot(
-    robot: Robot, task: Task | None, data: dict[str, Any], *, degrees: bool
+    robot: Robot, problem: Problem | None, data: dict[str, Any], *, degrees: bool
 ) -> None:
     """Print all for a person."""
     chain = f"{robot.base_frame} -> {robot.tool_frame}"
@@ -276,9 +284,14 @@ def _print_robot(
         print_lines(f"{', '.join(names)} limit: {text}")
     pairs = data["collisions"]["pairs"]
     if pairs:
-        listed = f":\n  {'; '.join(pairs)}" if get_verbosity() is Verbosity.VERBOSE else " (--verbose lists them)"
+        listed = (
+            f":\n  {'; '.join(pairs)}"
+            if get_verbosity() is Verbosity.VERBOSE
+            else " (--verbose lists them)"
+        )
         print_lines(f"{write_count(len(pairs), 'pair')} that may collide{listed}")
-    if task is not None:
+    if problem is not None:
+        task = problem.task
         for end in ("start", "end"):
             posture = write_posture(data, f"{end}_posture", degrees=degrees)
             print_lines(f"{end} posture: {posture}")
@@ -444,10 +457,8 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
     }
     solver = candidate.solver
     if solver is None:
-        reasons = candidate.reasons
-        own = {name: why for name, why in reasons.items() if why not in _OTHER_TASKS}
-        shown = (own or reasons).items()
-        row["why not"] = "; ".join(f"{name}: {why}" for name, why in shown)
+        reasons = candidate.reasons.items()
+        row["why not"] = "; ".join(f"{name}: {why}" for name, why in reasons)
         return row
     several = f" (up to {solver.alternatives})" if solver.alternatives > 1 else ""
     row["solver"] = candidate.family
@@ -458,17 +469,17 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
 
 def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
-    is_reasoned = get_verbosity() is Verbosity.VERBOSE
     columns = ["redundant joints", "solver", "branches"]
     if any(row["remark"] for row in rows):
         columns.append("remark")
     rows = sorted(rows, key=lambda row: row["solver"] == "-")
-    shown = rows if is_reasoned else rows[:_LISTED]
+    is_verbose = get_verbosity() is Verbosity.VERBOSE
+    shown = rows if is_verbose else rows[:_LISTED]
     cells = [[row[name] for name in columns] for row in shown]
     print_table("choices of redundant joints (-: no closed form)", columns, cells)
     if len(rows) > len(shown):
         print_lines(f"... and {len(rows) - len(shown)} more, which --verbose lists")
-    if not is_reasoned:
+    if not is_verbose:
         print_lines("--verbose lists the branches, and the reasons against choices")
         return
     for labels in dict.fromkeys(row["labels"] for row in rows if row["labels"]):
@@ -481,15 +492,14 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
 
 def _print_place(place: dict[str, Any]) -> None:
     """Print where the tool is, as a task file writes it: the position, and the orientation in every convention."""
-    if not place:
-        return
     from brachis.task.points.units import CONVENTIONS
 
-    print_lines(f"the tool in {place['frame'] or 'the world'}:")
     for key, values in place.items():
         if key == "frame":
+            print_lines(f"the tool in {values or 'the world'}:")
             continue
-        convention = CONVENTIONS.get(key.removesuffix("_deg"))
-        about = f"{convention.meaning}: {convention.makers}" if convention else "m"
+        about = "m"
+        if convention := CONVENTIONS.get(key.removesuffix("_deg")):
+            about = f"{convention.meaning}: {convention.makers}"
         numbers = ", ".join(f"{value:.9g}" for value in values)
         print_lines(f"  {key}: [{numbers}]  # {about}")

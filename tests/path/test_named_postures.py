@@ -1,0 +1,130 @@
+"""Postures by name: at both ends of a task, and lines that lead to the tool's place in one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import InputError, PathError, TaskError
+from brachis.problem.problem import Problem
+from brachis.robot import Robot
+from brachis.task import load_task, task_with
+from brachis.task.units import unit_of
+
+HOME = [0.3, 0.4, -0.2, -1.1, 0.5, 0.9, 0.2]
+AWAY = [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0]
+FRAME = pin.SE3(pin.rpy.rpyToMatrix(0.2, -0.4, 1.0), np.array([0.2, 0.1, 0.3]))
+
+
+def problem(
+    space: Any,
+    robot: Robot | None = None,
+    home: Any = HOME,
+    away: Any = AWAY,
+    **keys: Any,
+) -> Problem:
+    """A path from one posture to another one."""
+    content = {
+        "path": [brachis.Line(to_posture="home")],
+        "postures": {"home": home, "away": away},
+        "start": "away",
+        "task_space": space,
+    }
+    return Problem.of(robot or brachis.robots.iiwa14, task_with(**content | keys))
+
+
+def end_of(given: Problem) -> np.ndarray:
+    return given.path.sample([1.0]).target[0]
+
+
+@pytest.mark.parametrize(
+    "frame", [{}, {"frames": {"user1": FRAME}, "path_frame": "user1"}]
+)
+@pytest.mark.parametrize("space", ["position", "pose", "pose_free_roll"])
+def test_a_line_ends_at_the_tool_s_place(space: str, frame: dict[str, Any]) -> None:
+    robot = brachis.robots.iiwa14
+    place = robot.tool_placement(HOME)
+    names = dict(zip(robot.joint_names, HOME, strict=True))
+    for home in (HOME, names):
+        end = end_of(problem(space, home=home, **frame))
+        np.testing.assert_allclose(end[:3], place.translation, atol=1e-12)
+        if space != "position":
+            np.testing.assert_allclose(end[3:], place.rotation.ravel(), atol=1e-12)
+
+
+def test_of_joints_it_ends_in_the_posture() -> None:
+    np.testing.assert_allclose(end_of(problem("joints")), HOME, atol=1e-14)
+
+
+@pytest.mark.parametrize("turn", [0.5, 3.0, -3.0])
+def test_yaw_turns_the_shorter_way(turn: float) -> None:
+    away = [0.5, -2.1, 2.1]
+    home = [0.5 + turn, -2.0, 2.1]
+    given = problem(["x", "y", "yaw"], brachis.robots.scara3, home, away)
+    ends = given.path.sample([0.0, 1.0]).target[:, 2]
+    assert abs(ends[1] - ends[0]) < np.pi
+    assert np.sin(ends[1] - sum(home)) == pytest.approx(0.0, abs=1e-12)
+    assert np.cos(ends[1] - sum(home)) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_plan_begins_and_ends_in_named_postures() -> None:
+    result = brachis.plan(
+        "scara3",
+        path=brachis.Line(by=[0.0, 0.1], stop=True) + brachis.Line(to_posture="home"),
+        postures={"home": [0.5, -2.1, 2.1]},
+        start="home",
+        end="home",
+        task_space=["x", "y"],
+        intervals=8,
+        effort="single",
+    )
+    assert result.verified
+    for q in result.trajectory.q[[0, -1]]:
+        np.testing.assert_allclose(q, [0.5, -2.1, 2.1], atol=1e-9)
+    assert result.trajectory.task.start == "home"
+
+
+def test_a_change_of_a_posture_moves_start_and_path() -> None:
+    task = problem("position").task
+    moved = load_task(task, changes={"postures.home": AWAY, "postures.away": HOME})
+    given = Problem.of(brachis.robots.iiwa14, moved)
+    np.testing.assert_allclose(given.start, HOME)
+    place = given.robot.tool_placement(AWAY).translation
+    np.testing.assert_allclose(end_of(given), place, atol=1e-12)
+    assert load_task(moved.to_dict()) == moved
+    assert unit_of("postures.home.joint_1") == "rad (m)"
+    assert unit_of("frames.user1.xyz") == unit_of("scene.0.position") == "m"
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"start": "hom"}, r"start: this posture is not defined in postures; found 'hom' .*free, home, away"),
+        ({"end": "hom"}, r"end: this posture is not defined in postures"),
+        (
+            {"path": [brachis.Line(to_posture="free")]},
+            r"path\[0\]\.line\.to_posture: this posture is not .*allowed: home, away",
+        ),
+        ({"postures": {"free": HOME, "away": AWAY, "home": HOME}}, r"postures: free names no posture"),
+        (
+            {"path": [{"line": {"to_posture": "home"}, "orientation": "fixed"}]},
+            r"path\[0\]\.orientation: the line already has orientations",
+        ),
+    ],
+)  # fmt: skip
+def test_wrong_names(keys: dict[str, Any], message: str) -> None:
+    with pytest.raises(TaskError, match=message):
+        problem("pose", **keys)
+
+
+def test_postures_that_do_not_fit() -> None:
+    with pytest.raises(InputError, match=r"postures\.home"):
+        problem("pose", home=HOME[:6])
+    with pytest.raises(InputError, match=r"postures\.home.*joint_8"):
+        problem("pose", home={"joint_8": 0.1})
+    with pytest.raises(PathError, match="zero length"):
+        problem("pose", home=AWAY)

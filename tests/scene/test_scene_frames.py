@@ -1,0 +1,157 @@
+"""Bodies in frames: where they are, by Pinocchio, also after a sweep of the frame and with frames in frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import TaskError
+from brachis.robot.from_task import robot_from_settings
+from brachis.scene import Scene, scene_of
+from brachis.scene.chain import Chain
+from brachis.task import load_task
+
+TABLE = {"xyz": [0.5, -0.2, 0.3], "rpy_deg": [20.0, -35.0, 110.0]}
+USER = {"xyz": [0.1, 0.05, -0.02], "rpy_deg": [0.0, 90.0, 30.0], "frame": "table"}
+CLAMP = {"xyz": [0.03, 0.02, 0.01], "rpy_deg": [5.0, 6.0, 7.0]}
+START = [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0]
+CELL = """<robot name="cell"><link name="top"><collision><origin xyz="0 0 0.1"/><geometry><box size="1 1 0.02"/>
+</geometry></collision></link></robot>"""
+
+
+def transform(place: dict[str, Any]) -> pin.SE3:
+    turn = pin.rpy.rpyToMatrix(*np.radians(place.get("rpy_deg", [0, 0, 0])))
+    return pin.SE3(turn, np.array(place["xyz"], dtype=float))
+
+
+def task(**keys: Any) -> brachis.Task:
+    box = {"box": [0.1, 0.05, 0.04], "name": "clamp", "frame": "user1"}
+    content = {
+        "brachis": 1,
+        "robot": {"urdf": "iiwa14"},
+        "frames": {"table": TABLE, "user1": USER},
+        "start": {"joints": START},
+        "task_space": "pose",
+        "collisions": {"self_collision": False},
+        "path": [{"line": {"by": [0.0, 0.1, 0.0]}}],
+        "scene": [{**box, "position": CLAMP["xyz"], "rpy_deg": CLAMP["rpy_deg"]}],
+    }
+    changes = keys.pop("changes", None)
+    return load_task(content | keys, changes=changes)
+
+
+def scene(of: brachis.Task) -> Scene:
+    found = scene_of(robot_from_settings(of.robot), of)
+    assert found is not None
+    return found
+
+
+def clearance(of: brachis.Task) -> float:
+    chain = Chain.of(robot_from_settings(of.robot).model)
+    closest = scene(of).find_closest(chain.place(np.array([START])))
+    return float(closest.distance[0])
+
+
+@pytest.mark.parametrize("x", [0.5, 0.72, -0.3])
+def test_a_body_moves_with_its_frame(x: float) -> None:
+    table = {**TABLE, "xyz": [x, -0.2, 0.3]}
+    expected = transform(table) * transform(USER) * transform(CLAMP)
+    for moved in (
+        task(changes={"frames.table.xyz": table["xyz"]}),
+        load_task(task(), changes={"frames.table.xyz": table["xyz"]}),
+        load_task(task(frames={"table": table, "user1": USER}).to_dict()),
+    ):
+        placed = scene(moved).placements[-1]
+        np.testing.assert_allclose(placed, expected.homogeneous, atol=1e-12)
+
+
+def test_the_plane_of_a_half_space_is_in_its_frame() -> None:
+    plane = brachis.HalfSpace([0.0, 0.6, 0.8], offset=0.1, frame="user1")
+    solid = scene(task(scene=[plane])).solids[-1]
+    frame = transform(TABLE) * transform(USER)
+    point = frame.act(0.1 * np.array([0.0, 0.6, 0.8]))
+    normal = frame.rotation @ [0.0, 0.6, 0.8]
+    np.testing.assert_allclose(solid.geometry.n, normal, atol=1e-12)
+    assert solid.geometry.d == pytest.approx(normal @ point, abs=1e-12)
+
+
+def test_the_clearance_stays_where_robot_and_frame_move_together() -> None:
+    """And changes where only one of them moves."""
+    step = transform({"xyz": [0.3, -0.1, 0.2], "rpy_deg": [0.0, 0.0, 40.0]})
+    table = step * transform(TABLE)
+    mounting = {"xyz": [0.3, -0.1, 0.2], "rpy_deg": [0.0, 0.0, 40.0]}
+    robot = {"urdf": "iiwa14", "mounting": mounting}
+    plain = clearance(task())
+    both = task(robot=robot, frames={"table": table, "user1": USER})
+    assert plain > 0.05
+    assert clearance(both) == pytest.approx(plain, abs=1e-7)
+    assert abs(clearance(task(robot=robot)) - plain) > 0.01
+
+
+def test_a_cell_from_a_file_stands_in_a_frame(tmp_path: Path) -> None:
+    (tmp_path / "cell.urdf").write_text(CELL)
+    (tmp_path / "cell.yaml").write_text(
+        "brachis_scene: 1\nbodies:\n"
+        "  - {name: cell, urdf: cell.urdf, position: [0.0, 0.0, 0.2]}\n"
+        "  - {name: post, sphere: 0.05, frame: table}\n"
+        "  - {name: torch, sphere: 0.02, link: tool}\n"
+    )
+    of = {"file": str(tmp_path / "cell.yaml"), "frame": "user1"}
+    found = scene(task(scene=of))
+    cell, post, _ = found.placements[found.own :]
+    user = transform(TABLE) * transform(USER)
+    top = user * transform({"xyz": [0, 0, 0.3]})
+    np.testing.assert_allclose(cell, top.homogeneous, atol=1e-12)
+    np.testing.assert_allclose(post, transform(TABLE).homogeneous, atol=1e-12)
+    assert found.solids[-1].link == "tool"
+
+
+def test_bodies_and_path_of_a_plan_move_together() -> None:
+    """A sweep of the frame leaves the distance from the tool's path to the body as it is."""
+    body = brachis.Box([0.1, 0.1, 0.02], frame="user1", position=[0.0, 0.0, -0.2])
+    segments = [brachis.Line(to=[0.1, 0.0, 0.0])]
+    start = {"position": [0.0, 0.0, 0.0], "rpy_deg": [180.0, 0.0, 0.0]}
+    keys = {"scene": [body], "path": segments, "path_frame": "user1"}
+    keys |= {"start": "free", "path_start": start}
+    for xyz in ([0.5, 0.0, 0.3], [0.4, 0.2, 0.35]):
+        asked = task(frames={"user1": {"xyz": xyz}}, **keys)
+        robot = robot_from_settings(asked.robot)
+        problem = brachis.problem.problem.Problem.of(robot, asked)
+        first = problem.path.sample([0.0]).target[0, :3]
+        gap = first - scene(asked).placements[-1][:3, 3]
+        np.testing.assert_allclose(gap, [0.0, 0.0, 0.2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (
+            {"frames": {"table": TABLE}},
+            r"scene\[0\]\.frame: this frame is not defined in frames; found 'user1' .*allowed: table",
+        ),
+        (
+            {"frames": {"user1": {"frame": "tabel"}, "table": TABLE}},
+            r"frames\.user1\.frame: this frame is not defined .*'tabel' .*allowed: user1, table",
+        ),
+        (
+            {"frames": {"a": {"frame": "user1"}, "user1": {"frame": "a"}}},
+            r"frames\.a\.frame: the frame is placed in itself; found 'a in user1 in a'",
+        ),
+        (
+            {"scene": [{"sphere": 0.1, "frame": "user1", "link": "tool"}]},
+            r"scene\[0\]\.frame: .*frame of its link.*allowed: either link or frame",
+        ),
+        (
+            {"scene": {"file": "cell.yaml", "frames": "user1"}},
+            r"allowed: .*\{file: cell\.yaml, frame: NAME\}",
+        ),
+    ],
+)
+def test_what_is_wrong_is_named(keys: dict[str, Any], message: str) -> None:
+    with pytest.raises(TaskError, match=message):
+        task(**keys)
