@@ -42,9 +42,11 @@ from brachis.task.segments import (
     LineBy,
     LineHeading,
     LineTo,
+    LineToPosture,
     MovingSegment,
     SplineThrough,
 )
+from brachis.task.settings import FramePlacement
 
 PAGE = Path(__file__).parent / "task_files.md"
 
@@ -58,6 +60,7 @@ PARTS: dict[str, type] = {
     "robot.payload": Payload,
     "robot.payload.inertia": InertiaMatrix,
     "robot.tool_offset, robot.mounting": Placement,
+    "frames.NAME": FramePlacement,
     "boundary": BoundarySettings,
     "tool_limits": ToolLimits,
     "tool_limits.speed": SpeedTable,
@@ -72,7 +75,7 @@ PARTS: dict[str, type] = {
     "refinement": RefinementSettings,
 }
 SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
-    "line": (LineTo, LineBy, LineHeading),
+    "line": (LineTo, LineBy, LineHeading, LineToPosture),
     "arc": (ArcCenter, ArcVia),
     "circle": (CircleTurns,),
     "helix": (HelixTurns,),
@@ -95,6 +98,16 @@ with `# yaml-language-server: $schema=task.schema.json`.
 ```yaml
 start: {joints: [!degrees 30, !degrees -120, 2.0944]}   # rad without a tag
 end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
+```
+
+**Postures by name.** `start`, `end` and lines take them; a line ends at the tool's place in the posture, and for poses
+with its orientation:
+
+```yaml
+postures: {home: [0.5, -2.1, 2.1]}                      # rad (m)
+start: home
+end: home
+path: [{line: {by: [0, 0.3]}, stop: true}, {line: {to_posture: home}}]
 ```
 
 **Limits.** If a key is absent, the URDF's limit holds; `null` removes the limit. A number holds for all joints. A list
@@ -211,9 +224,10 @@ Rows that depend on each other, or that no joint changes, are refused.
 
 Points are in the world frame, or in one of the `frames`, for example that of a workpiece. Write `path: {frame:
 workpiece, segments: [...]}`, or the key `path_frame` next to `path`. Segments, files of points, directions,
-orientations and `path_start` are then in this frame. If the workpiece moves, only one key changes; a sweep over
-`frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be rotated only
-within these coordinates. Results, plots and exports are in the world frame.
+orientations and `path_start` are then in this frame. Bodies of the scene stand in it with `frame: workpiece`, and other
+frames too. If the workpiece moves, only one key changes; a sweep over `frames.workpiece.xyz` finds its best place. If
+the task space has only some of x, y, z, the frame may be rotated only within these coordinates. Results, plots and exports
+are in the world frame.
 
 ```yaml
 frames:

@@ -157,13 +157,8 @@ def test_speeds_of_segments_and_of_parts() -> None:
         problem([RIGHT, SEAM, RIGHT], part(0.3, 0.3, 0.5))
     with pytest.raises(TaskError, match=r"largest speed is below the process speed"):
         problem([RIGHT, SEAM], limits={"speed": 0.05})
-    with pytest.raises(
-        PathError,
-        match=r"path\[0\]\.speed: the part is too short .*found 2 m/s; .*less than 1 m/s, or .* 2 times as long",
-    ):
-        problem([{**RIGHT, "speed": 2.0}])
-    shorter = problem([{**RIGHT, "speed": 0.99}])
-    assert [leg.speed for leg in shorter.legs] == [None, 0.99, None]
+    (short,) = (leg for leg in problem([{**RIGHT, "speed": 2.0}]).legs if leg.speed)
+    assert (short.begin, short.end) == pytest.approx((0.25, 0.75))
 
 
 def test_a_speed_replaces_the_feed_rates_of_points() -> None:
@@ -236,14 +231,16 @@ def test_the_speed_at_the_start_of_a_path_of_joints_is_that_of_the_tool() -> Non
 CIRCLE = {"circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1]}}
 
 
-def test_a_periodic_motion_has_one_speed_at_its_seam() -> None:
-    periodic = {"periodic": True}
-    with pytest.raises(
-        PathError, match=r"process_speed\[1\].speed: .* changes at once"
-    ):
-        legs([CIRCLE], [part(0.1, 0.0, 0.3), part(0.2, 0.6, 1.0)], periodic)
-    found = legs([CIRCLE], [part(0.1, 0.0, 0.3), part(0.1, 0.6, 1.0)], periodic)
-    assert [leg.speed for leg in found] == [0.1, None, 0.1]
+@pytest.mark.parametrize("last", [0.1, 0.2])
+def test_the_seam_of_a_periodic_motion_has_a_lead_between_two_speeds(
+    last: float,
+) -> None:
+    parts = [part(0.1, 0.0, 0.3), part(last, 0.6, 1.0)]
+    given = problem([CIRCLE], parts, {"periodic": True})
+    speeds = [leg.speed for leg in given.legs]
+    assert speeds == [0.1, None, 0.1] if last == 0.1 else [None, 0.1, None, last]
+    if last > 0.1:
+        assert given.legs[0].end == pytest.approx(LEAD * last / given.path.length)
 
 
 def problem(

@@ -55,7 +55,6 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
     parts = task.tool_limits.process_speed
     if parts:
         _check_task_space(task_map)
-        _check_seam(task)
     for number, part in enumerate(parts):
         _check_motion(task_map, path, part, number)
     waits = [segment.dwell for segment in task.path if segment.stop]
@@ -78,14 +77,12 @@ def key_of_speed(part: ProcessSpeed, number: int, below: str) -> str:
 def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
     """Return the task with its process speeds, those of segments among them, where the tool can hold them.
 
-    Segments of the same speed are one part, with the blends between them. Parts are cut at stops. They have leads, in
-    which the speed changes, at stops, at ends of the path that are not passed at their speed, and behind other parts
-    that they meet.
+    Segments of the same speed are one part, with the blends between them. Parts are cut at stops. They leave leads, in
+    which the speed changes, at stops, at ends of the path that are not passed at their speed, and where they follow
+    another part at once. Leads take up no more than half of a part.
 
     Raises
     ------
-    PathError
-        A part is too short for its leads.
     TaskError
         Parts overlap, or a speed is above the tool's largest one.
     """
@@ -99,8 +96,10 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
         after[0.0] = _speed_at_end(task, task_map, path, 0)
         after[1.0] = _speed_at_end(task, task_map, path, 1)
     before = {part.s[1]: part.speed for part in parts} | after
+    if task.boundary.periodic and 1.0 in before:
+        before[0.0] = before[1.0]
     held = []
-    for number, part in enumerate(parts):
+    for part in parts:
         speed = part.speed
         stops = path.stops[(path.stops > part.s[0]) & (path.stops < part.s[1])]
         for ends in pairwise([part.s[0], *stops.tolist(), part.s[1]]):
@@ -109,16 +108,11 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
                 _lead(speed, others.get(s, speed)) / _tool_slope(task_map, between, s)
                 for s, others in zip(ends, (before, after), strict=True)
             ]
-            share = (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
-            if share <= 1.0:
-                raise PathError(
-                    "the part is too short to reach its process speed and to leave it",
-                    s_interval=ends,
-                    where=key_of_speed(part, number, ".speed"),
-                    found=f"{speed:g} m/s",
-                    allowed=f"less than {share * speed:.3g} m/s, or a part that is {1.0 / share:.3g} times as long",
-                )
-            s = (ends[0] + leads[0], ends[1] - leads[1])
+            # The planner knows whether less is enough.
+            share = min(
+                1.0, 0.5 * (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
+            )
+            s = (ends[0] + share * leads[0], ends[1] - share * leads[1])
             held.append(part.model_copy(update={"s": s}))
     held.sort(key=lambda part: part.s)
     changed = limits.model_copy(update={"process_speed": tuple(held)})
@@ -180,21 +174,6 @@ def _check_task_space(task_map: TaskMap) -> None:
             found=f"task_space [{', '.join(task_map.rows)}], which leaves {' and '.join(free)} free",
             allowed="a task space with all coordinates of the position in which the tool can move",
             hint="Set task_space: position, or tool_limits.speed instead",
-        )
-
-
-def _check_seam(task: Task) -> None:
-    """Refuse two process speeds where a periodic motion begins anew."""
-    first = task.tool_limits.process_speed[0]
-    last = task.tool_limits.process_speed[-1]
-    meets = first.s[0] == 0.0 and last.s[1] == 1.0
-    if task.boundary.periodic and meets and first.speed != last.speed:
-        number = len(task.tool_limits.process_speed) - 1
-        raise PathError(
-            "the process speed changes at once where the periodic motion begins anew",
-            where=key_of_speed(last, number, ".speed"),
-            found=f"{last.speed:g} m/s, then {first.speed:g} m/s",
-            allowed="one speed, or a gap in which the speed changes",
         )
 
 

@@ -286,8 +286,8 @@ class ProcessSpeed(Model):
         ),
     ]
     """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
-    allow. A part may begin at 0 or end at 1 only if the speed of the boundary there equals its speed, or the motion is
-    periodic. A stop needs room beside it."""
+    allow. At stops, and at ends of the path that are not passed at this speed, the part is shorter by what the tool
+    moves in 0.1 s at the higher speed."""
     segment: Count | None = None
     """Index of the segment whose speed this is; written by brachis."""
 

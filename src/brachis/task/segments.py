@@ -374,8 +374,8 @@ class MovingSegment(SegmentModel):
     """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
     Null: the `orientations` of a spline, or that of a posture, else fixed."""
     speed: Positive | None = None
-    """Process speed: constant speed of the tool along the segment, m/s. Blends beside it are free, and so is a part of
-    0.1 s times the change of speed next to stops and to other speeds. It replaces feed rates of points. Null: none."""
+    """Process speed: constant speed of the tool along the segment, m/s; see tool_limits.process_speed. Blends beside it
+    are free. It replaces feed rates of points. Null: none."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()

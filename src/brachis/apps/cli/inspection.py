@@ -90,8 +90,6 @@ def inspect(
     task = problem = tolerances = None
     place: dict[str, Any] = {}
     collisions: dict[str, list[Any]] = {"solids": [], "pairs": [], "never_free": []}
-    if posture is None:
-        refuse_options({"--frame": frame}, "no posture", "--posture")
     keys = read_changes(changes)
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
@@ -108,7 +106,9 @@ def inspect(
         source = urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
-    if posture is not None:
+    if posture is None:
+        refuse_options({"--frame": frame}, "no posture", "--posture")
+    else:
         place = _place_tool(robot, posture, frame, task, remarks)
     if task is not None:
         with name_task_file(source, keys):
@@ -176,10 +176,7 @@ def _problem_of(
 def _describe(
     robot: Robot, problem: Problem | None, collisions: dict[str, list[Any]]
 ) -> dict[str, Any]:
-    """Describe a robot, and what a task says of it, its ends (None where free) and its path, as plain data for JSON.
-
-    The path's length is None without positions.
-    """
+    """Describe robot and task as plain data for JSON; free ends, and the length without positions, are None."""
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
 
@@ -498,8 +495,7 @@ def _print_place(place: dict[str, Any]) -> None:
         if key == "frame":
             print_lines(f"the tool in {values or 'the world'}:")
             continue
-        about = "m"
-        if convention := CONVENTIONS.get(key.removesuffix("_deg")):
-            about = f"{convention.meaning}: {convention.makers}"
+        convention = CONVENTIONS.get(key.removesuffix("_deg"))
+        about = f"{convention.meaning}: {convention.makers}" if convention else "m"
         numbers = ", ".join(f"{value:.9g}" for value in values)
         print_lines(f"  {key}: [{numbers}]  # {about}")

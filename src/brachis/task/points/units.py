@@ -116,7 +116,7 @@ def values_of(convention: str, rotation: Rotation) -> npt.NDArray[Any]:
     with warnings.catch_warnings():
         # One of the many ways to write a rotation is as good as another.
         warnings.filterwarnings("ignore", "Gimbal lock")
-        return rotation.as_euler(CONVENTIONS[convention].euler)
+        return rotation.as_euler(CONVENTIONS[convention].euler)  # type: ignore[call-overload]
 
 
 def quaternions_of(rotation: Rotation) -> npt.NDArray[Any]:
