@@ -226,8 +226,8 @@ Points are in the world frame, or in one of the `frames`, for example that of a 
 workpiece, segments: [...]}`, or the key `path_frame` next to `path`. Segments, files of points, directions,
 orientations and `path_start` are then in this frame. Bodies of the scene stand in it with `frame: workpiece`, and other
 frames too. If the workpiece moves, only one key changes; a sweep over `frames.workpiece.xyz` finds its best place. If
-the task space has only some of x, y, z, the frame may be rotated only within these coordinates. Results, plots and exports
-are in the world frame.
+the task space has only some of x, y, z, the frame may be rotated only within these coordinates. Results, plots and
+exports are in the world frame.
 
 ```yaml
 frames:
