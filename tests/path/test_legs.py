@@ -171,6 +171,7 @@ def test_a_speed_replaces_the_feed_rates_of_points() -> None:
     assert with_feed.task.tool_limits.feed
     given = problem([segment.model_copy(update={"speed": 0.05})])
     assert not given.task.tool_limits.feed
+    assert brachis.fit_path(points, speed=0.05)[0].speed == 0.05
     assert [leg.speed for leg in given.legs] == [None, 0.05, None]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -14,7 +15,7 @@ from brachis.errors import TaskError
 from brachis.robot.from_task import robot_from_settings
 from brachis.scene import Scene, scene_of
 from brachis.scene.chain import Chain
-from brachis.task import load_task
+from brachis.task import json_schema, load_task
 
 TABLE = {"xyz": [0.5, -0.2, 0.3], "rpy_deg": [20.0, -35.0, 110.0]}
 USER = {"xyz": [0.1, 0.05, -0.02], "rpy_deg": [0.0, 90.0, 30.0], "frame": "table"}
@@ -102,6 +103,7 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path: Path) -> None:
         "  - {name: torch, sphere: 0.02, link: tool}\n"
     )
     of = {"file": str(tmp_path / "cell.yaml"), "frame": "user1"}
+    jsonschema.validate({**task().to_dict(), "scene": of}, json_schema())
     found = scene(task(scene=of))
     cell, post, _ = found.placements[found.own :]
     user = transform(TABLE) * transform(USER)

@@ -287,8 +287,9 @@ def fit_path(
     orientations : Rotation, or array_like, (n, 3, 3) or (n,), optional
         Of the tool, beside positions: SciPy's rotations (``Rotation.from_quat(q)`` takes quaternions x, y, z, w);
         rotation matrices; yaw.
-    speed : array_like, (n,), optional
-        Speed of the tool on the way to each point; NaN where none is prescribed. With a tolerance only.
+    speed : float or array_like, (n,), optional
+        One number is a process speed: it is held all along. Several are largest speeds on the way to each point; NaN
+        where none is prescribed; with a tolerance only.
     units : mapping or FileUnits, optional
         ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``; m, rad (of yaw) and m/s unless given.
     corner : {"blend", "refuse", "stop"}, optional
@@ -327,6 +328,9 @@ def fit_path(
     }
     file = validate(PointFile, settings, "fit_path")
     content = {"csv": file, "orientation": orientation}
+    if isinstance(speed, int | float):
+        content["speed"] = speed
+        speed = None
     segment = validate(CsvSegment, content, "fit_path")
     given = points_from(points, orientations, speed, segment.csv.units, "points")
     return tuple(segments_along(given, segment, "points"))

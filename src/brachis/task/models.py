@@ -140,7 +140,7 @@ _SCENE_FILE: Final[dict[str, Any]] = {
     "type": "object",
     "required": ["file"],
     "additionalProperties": False,
-    "properties": {"file": {"type": "string"}},
+    "properties": {"file": {"type": "string"}, "frame": {"type": "string"}},
 }
 
 

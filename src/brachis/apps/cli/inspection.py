@@ -316,7 +316,7 @@ def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
 
     scene = scene_of(robot, task)
     if scene is None:
-        return {"solids": [], "pairs": [], "never_free": []}
+        return {}
     stuck = find_never_free(scene, robot, task.collisions.clearance)
     # Those with bodies of the scene first.
     pairs = (-scene.pairs.max(axis=1)).argsort(kind="stable").tolist()
@@ -474,10 +474,9 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     shown = rows if is_verbose else rows[:_LISTED]
     cells = [[row[name] for name in columns] for row in shown]
     print_table("choices of redundant joints (-: no closed form)", columns, cells)
-    if len(rows) > len(shown):
-        print_lines(f"... and {len(rows) - len(shown)} more, which --verbose lists")
     if not is_verbose:
-        print_lines("--verbose lists the branches, and the reasons against choices")
+        more = f"... and {len(rows) - len(shown)} more; " if rows != shown else ""
+        print_lines(f"{more}--verbose lists branches, and reasons against choices")
         return
     for labels in dict.fromkeys(row["labels"] for row in rows if row["labels"]):
         alike = [row["redundant joints"] for row in rows if row["labels"] == labels]
