@@ -9,6 +9,7 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import PathError
+from brachis.path.protocol import Array
 from brachis.path.sequence import Path, path_speed, tool_derivatives
 from brachis.robot import TaskMap, task_map_of
 from brachis.robot.task_map import JointSpace
@@ -104,8 +105,9 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
     held = []
     for part in parts:
         speed = part.speed
-        stops = path.stops[(path.stops > part.s[0]) & (path.stops < part.s[1])]
-        for ends in pairwise([part.s[0], *stops.tolist(), part.s[1]]):
+        first, last = (_snap(s, path.stops) for s in part.s)
+        stops = path.stops[(path.stops > first) & (path.stops < last)]
+        for ends in pairwise([first, *stops.tolist(), last]):
             between = path.between(*ends)
             leads = [
                 _lead(speed, others.get(s, speed)) / _tool_slope(task_map, between, s)
@@ -140,6 +142,12 @@ def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
             first = parts.pop().s[0]
         parts.append(ProcessSpeed(speed=speed, s=(first, end), segment=segment))
     return parts
+
+
+def _snap(s: float, stops: Array) -> float:
+    """Return the stop that a path coordinate means but for its last digits; itself where there is none."""
+    near = stops[np.abs(stops - s) <= tolerances.WRITTEN]
+    return float(near[0]) if len(near) else s
 
 
 def _lead(speed: float, other: float) -> float:

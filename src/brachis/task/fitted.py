@@ -327,7 +327,7 @@ def fit_path(
         "corner": corner,
     }
     file = validate(PointFile, settings, "fit_path")
-    content = {"csv": file, "orientation": orientation}
+    content: dict[str, Any] = {"csv": file, "orientation": orientation}
     if isinstance(speed, int | float):
         content["speed"] = speed
         speed = None
