@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -160,6 +161,18 @@ def test_speeds_of_segments_and_of_parts() -> None:
         problem([RIGHT, SEAM], limits={"speed": 0.05})
     (short,) = (leg for leg in problem([{**RIGHT, "speed": 2.0}]).legs if leg.speed)
     assert (short.begin, short.end) == pytest.approx((0.25, 0.75))
+
+
+def test_a_file_has_a_speed_between_its_stops(tmp_path: Path) -> None:
+    """Which replaces its feed rates."""
+    file = tmp_path / "seam.nc"
+    file.write_text("G21 G90\nG1 X400 Y0 Z500 F600\nG1 X500\nG1 Y100\n")
+    segment = {"csv": {"file": str(file), "corner": "stop"}, "speed": 0.05}
+    given = problem([segment])
+    found = [(leg.begin, leg.end, leg.speed) for leg in given.legs]
+    lead = LEAD * 0.05 / 0.2
+    expected = [(lead, 0.5 - lead, 0.05), (0.5 + lead, 1.0 - lead, 0.05)]
+    np.testing.assert_allclose([leg for leg in found if leg[2]], expected)
 
 
 def test_a_speed_replaces_the_feed_rates_of_points() -> None:

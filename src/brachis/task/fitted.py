@@ -70,7 +70,7 @@ def segments_along(
     parts: Sequence[Points | FittedCurve]
     if settings.tolerance is not None:
         parts, report = fit_curves(points, settings.tolerance, notes, stops=stops)
-    elif points.speed is not None:
+    elif points.speed is not None and segment.speed is None:
         raise TaskError(
             "feed rates need a fitted path",
             found="feed rates",
