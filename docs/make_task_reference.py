@@ -103,7 +103,7 @@ end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
 **Postures by name.** `start`, `end` and lines take them; a line ends at the tool's place in the posture, and for poses
 with its orientation:
 
-```yaml
+```yml
 postures: {home: [0.5, -2.1, 2.1]}                      # rad (m)
 start: home
 end: home
