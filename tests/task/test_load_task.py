@@ -375,7 +375,10 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         ["start.joints[1]: wrong type; found '2' (a string); allowed: a number"],
     ),
     ({"start": {}}, ["start.joints: this key is required, and missing"]),
-    ({"end": "fre"}, ["task: end: ", "found 'fre'", "not defined in postures", "allowed: free"]),
+    (
+        {"end": "fre"},
+        ["task: end: ", "found 'fre'", "not defined in postures", "allowed: free"],
+    ),
     (
         {"task_space": ["x", "yaw", "roll"]},
         ["task_space: only one row of rotation", "for example [x, y, z, yaw]"],
