@@ -332,7 +332,7 @@ WORKS = {
     "limits as a mapping": lambda: brachis.plan(
         "scara3", **LINE, limits={"torque": 12}
     ),
-    "a solver's name": lambda: brachis.plan("scara3", **LINE, solver="slsqp"),
+    "a solver's name": lambda: brachis.plan("scara3", **LINE, solver="uno_interior"),
 }
 
 
@@ -438,15 +438,15 @@ def test_what_is_there_is_not_hidden_by_answers(result):
 
 def test_a_solvers_name_keeps_the_solvers_other_settings():
     file = {**LINE, "solver": {"tolerance": 1e-7}}
-    assert task_with(task_with(**file), solver="slsqp").solver.model_dump(
+    assert task_with(task_with(**file), solver="uno_interior").solver.model_dump(
         exclude_defaults=True
     ) == {
-        "name": "slsqp",
+        "name": "uno_interior",
         "tolerance": 1e-7,
     }
     assert (
         brachis.load_task(
-            {**task_with(**LINE).to_dict(), "solver": "slsqp"}
+            {**task_with(**LINE).to_dict(), "solver": "uno_interior"}
         ).solver.name
-        == "slsqp"
+        == "uno_interior"
     )

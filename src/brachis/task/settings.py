@@ -330,7 +330,7 @@ class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
     name: Name = "auto"
-    """Name of the solver: auto, uno, ipopt (if ipyopt is installed), uno_interior or slsqp. auto begins with uno."""
+    """Name of the solver: auto, uno, ipopt (if ipyopt is installed) or uno_interior. auto begins with uno."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
     time_limit: Positive = Field(default=60.0, le=1e6)

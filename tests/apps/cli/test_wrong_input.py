@@ -65,7 +65,11 @@ WRONG_TASKS = {
         ["'elbow_up'", "elbow_positive, elbow_negative"],
     ),
     "other branch": ("branch", "elbow_positive", ["another branch", "elbow_negative"]),
-    "unknown solver": ("solver.name", "snopt", ["'snopt'", "uno", "ipopt", "slsqp"]),
+    "unknown solver": (
+        "solver.name",
+        "slsqp",
+        ["'slsqp'", "uno", "ipopt", "uno_interior"],
+    ),
     "unknown tool frame": ("robot.tool_frame", "tol", ["'tol'", "Did you mean 'tool'"]),
     "missing URDF": (
         "robot.urdf",

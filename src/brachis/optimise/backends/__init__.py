@@ -3,7 +3,7 @@
 from importlib.util import find_spec
 
 from brachis.errors import NotInstalledError, UnknownNameError
-from brachis.optimise.backends import ipopt, slsqp, uno, uno_interior
+from brachis.optimise.backends import ipopt, uno, uno_interior
 from brachis.optimise.backends.child_process import Solver
 from brachis.optimise.backends.monitor import objective_at, residual
 from brachis.optimise.backends.protocol import (
@@ -33,7 +33,7 @@ __all__ = [
 ]
 TABLE = {
     backend.NAME: Solver(backend.NAME, backend.run, backend in (ipopt, uno_interior))
-    for backend in (uno, ipopt, uno_interior, slsqp)
+    for backend in (uno, ipopt, uno_interior)
 }
 """Backends by name, in the order in which ``auto`` tries them; of the two interior-point methods it takes one."""
 NAMES = ("auto", *TABLE)
@@ -53,13 +53,13 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
         It is ``ipopt``, whose package has wheels for one platform alone.
     """
     if name == "auto":
-        return TABLE["uno"], _interior(), TABLE["slsqp"]
+        return TABLE["uno"], _interior()
     if name not in TABLE:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
     if name == "ipopt" and _interior() is not TABLE[name]:
         library = "ipyopt (it has wheels for Linux on x86_64 alone)"
         error = NotInstalledError("solver.name: ipopt", library, "ipopt")
-        error.put_advice("Set solver.name: auto, uno, uno_interior or slsqp")
+        error.put_advice("Set solver.name: auto, uno or uno_interior")
         raise error
     return (TABLE[name],)
 
