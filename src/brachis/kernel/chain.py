@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import Structured, address, as_doubles, load
+from brachis.kernel.library import (
+    Structured,
+    address,
+    as_doubles,
+    declare_fields,
+    load,
+)
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
 """In the order of tool.c."""
@@ -16,24 +22,10 @@ _QUANTITIES = ("speed", "angular speed", "acceleration")
 class _Chain(ctypes.Structure):
     """`chain` of chain.h."""
 
-    _fields_ = [
-        ("joints", ctypes.c_long),
-        *(
-            (name, ctypes.c_void_p)
-            for name in (
-                "turns",
-                "axes",
-                "points",
-                "tool_position",
-                "tool_rotation",
-                "masses",
-                "centers",
-                "inertias",
-                "gravity",
-                "friction",
-            )
-        ),
-    ]
+    _fields_ = declare_fields(
+        "l joints;"
+        "p turns axes points tool_position tool_rotation masses centers inertias gravity friction"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +74,24 @@ class Chain(Structured):
 
     def _make_structure(self) -> _Chain:
         n = self.n
-        numbers = [
-            as_doubles(self.revolute, (n,)),
-            as_doubles(self.axes, (n, 3)),
-            as_doubles(self.points, (n, 3)),
-            as_doubles(self.tool_position, (3,)),
-            as_doubles(self.tool_rotation, (3, 3)),
-            _as_doubles_or_zero(self.masses, (n,)),
-            _as_doubles_or_zero(self.centers, (n, 3)),
-            _as_doubles_or_zero(self.inertias, (n, 6)),
-            _as_doubles_or_zero(self.gravity, (3,)),
-            _as_doubles_or_zero(self.friction, (n, 4)),
-        ]
+        shapes = {
+            "revolute": (n,),
+            "axes": (n, 3),
+            "points": (n, 3),
+            "tool_position": (3,),
+            "tool_rotation": (3, 3),
+            "masses": (n,),
+            "centers": (n, 3),
+            "inertias": (n, 6),
+            "gravity": (3,),
+            "friction": (n, 4),
+        }
+        numbers = []
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            numbers.append(
+                as_doubles(np.zeros(shape) if values is None else values, shape)
+            )
         structure = _Chain(n, *map(address, numbers))
         structure.kept = numbers
         return structure
@@ -157,22 +155,27 @@ class Chain(Structured):
         (K,) ndarray
             m/s, rad/s or m/s^2.
         """
-        sizes = np.empty(len(q))
-        before = (_QUANTITIES.index(quantity),)
-        found = (sizes, 0, 0, 0)  # nobody asks for slopes
-        self._call("brachis_tool_sizes", (q, qdot, qddot), *found, before=before)
-        return sizes
+        return self._find_sizes(quantity, (q, qdot, qddot), (0, 0, 0))
 
     def tool_size_slopes(
         self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Compute `tool_sizes`, (K,), and their slopes by q, qdot and qddot, (K, n) each: 0 where the size is 0."""
-        sizes = np.empty(len(q))
         by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n))
+        slopes = (by_q, by_qdot, by_qddot)
+        return self._find_sizes(quantity, (q, qdot, qddot), slopes), slopes
+
+    def _find_sizes(
+        self,
+        quantity: str,
+        states: tuple[np.ndarray, ...],
+        slopes: tuple[np.ndarray | int, ...],
+    ) -> np.ndarray:
+        """Return `tool_sizes`, and write `slopes` unless these are zeros."""
+        sizes = np.empty(len(states[0]))
         before = (_QUANTITIES.index(quantity),)
-        found = (sizes, by_q, by_qdot, by_qddot)
-        self._call("brachis_tool_sizes", (q, qdot, qddot), *found, before=before)
-        return sizes, (by_q, by_qdot, by_qddot)
+        self._call("brachis_tool_sizes", states, sizes, *slopes, before=before)
+        return sizes
 
     def _call(
         self,
@@ -192,9 +195,3 @@ class Chain(Structured):
             for own in (*kept, *others)
         ]
         getattr(load(), name)(self.address, count, *before, *given)
-
-
-def _as_doubles_or_zero(
-    values: np.ndarray | None, shape: tuple[int, ...]
-) -> np.ndarray:
-    return np.zeros(shape) if values is None else as_doubles(values, shape)

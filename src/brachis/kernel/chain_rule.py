@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import address, as_doubles, declare_fields, load
 from brachis.kernel.path_motion import PathMotion
 from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
 
@@ -41,13 +41,9 @@ class MotionSlopes:
 class _Variables(ctypes.Structure):
     """`variables` of chain_rule.c."""
 
-    _fields_ = [
-        ("orders", ctypes.c_long),
-        ("shared_count", ctypes.c_long),
-        ("shared", ctypes.c_void_p),
-        ("entries", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in ("points", "curves", "basis")),
-    ]
+    _fields_ = declare_fields(
+        "l orders shared_count; p shared; l entries; p points curves basis"
+    )
 
 
 class CurvePattern:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kernel.library import Structured, address, as_doubles, load
+from brachis.kernel.library import Structured, address, as_doubles, declare_fields, load
 
 _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
@@ -236,16 +236,9 @@ ceil: Callable[..., Any] = _make_recordable(np.ceil)
 class _Formula(ctypes.Structure):
     """`formula` of motion.h."""
 
-    _fields_ = [
-        ("counts", ctypes.c_long * 2),
-        ("constants", ctypes.c_long),
-        ("constant", ctypes.c_void_p),
-        ("steps", ctypes.c_long),
-        ("step_of", ctypes.c_void_p),
-        ("outputs", ctypes.c_long),
-        ("wanted", ctypes.c_void_p),
-        ("together", ctypes.c_long),
-    ]
+    _fields_ = declare_fields(
+        "l first_count second_count constants; p constant; l steps; p step_of; l outputs; p wanted; l together"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,7 +375,7 @@ class Formula(Structured):
         parts = (self.constants, self.steps, self.wanted)
         sized = [part for own in parts for part in (len(own), address(own))]
         together = self.shape[-1] if self.discards_incomplete else 0
-        return _Formula((ctypes.c_long * 2)(*counts), *sized, together)
+        return _Formula(*counts, *sized, together)
 
     @cached_property
     def room(self) -> int:

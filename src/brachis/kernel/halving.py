@@ -6,22 +6,15 @@ import ctypes
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import address, as_doubles, declare_fields, load
 
 
 class _Timing(ctypes.Structure):
     """`timing` of halving.c."""
 
-    _fields_ = [
-        ("times", ctypes.c_long),
-        ("joints", ctypes.c_long),
-        ("t", ctypes.c_void_p),
-        ("accelerations", ctypes.c_void_p),
-        ("rate", ctypes.c_void_p),
-        ("jumps", ctypes.c_void_p),
-        ("ramps", ctypes.c_void_p),
-        ("few", ctypes.c_long),
-    ]
+    _fields_ = declare_fields(
+        "l times joints; p t accelerations rate jumps ramps; l few"
+    )
 
 
 def halve_intervals(

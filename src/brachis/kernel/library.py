@@ -58,6 +58,17 @@ FUNCTIONS = {
 }
 """What functions return and take: pointer, long, double, int, or nothing."""
 _DOUBLE = np.dtype(np.float64)
+
+
+def declare_fields(declaration: str) -> list[tuple[str, Any]]:
+    """List the fields of a structure in C: ``"l count; p q qdot"``, with the letters of `FUNCTIONS` for the types."""
+    fields = []
+    for line in declaration.split(";"):
+        kind, *names = line.split()
+        fields += [(name, _KINDS[kind]) for name in names]
+    return fields
+
+
 _find_address = ctypes.addressof
 _find_buffer: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 

@@ -13,6 +13,7 @@ from brachis.kernel.library import (
     address,
     as_doubles,
     as_doubles_at_points,
+    declare_fields,
     load,
 )
 
@@ -27,16 +28,9 @@ LARGEST_STEP = 0.5
 class _Prescribed(ctypes.Structure):
     """`prescribed` of tool.h."""
 
-    _fields_ = [
-        ("in_tool_axes", ctypes.c_long),
-        ("rows", ctypes.c_long),
-        ("axes", ctypes.c_long * 3),
-        ("turns", ctypes.c_long),
-        ("tool_axis", ctypes.c_long),
-        ("first", ctypes.c_long),
-        ("second", ctypes.c_long),
-        ("sign", ctypes.c_double),
-    ]
+    _fields_ = declare_fields(
+        "l in_tool_axes rows first_axis second_axis third_axis turns tool_axis first second; d sign"
+    )
 
 
 @dataclass(frozen=True)
@@ -80,10 +74,10 @@ class Prescribed(Structured):
         return len(self.axes) + (9 if self.turns == 3 else self.turns)
 
     def _make_structure(self) -> _Prescribed:
-        axes = (ctypes.c_long * 3)(*self.axes)
+        axes = (*self.axes, 0, 0, 0)[:3]
         count = len(self.axes)
         return _Prescribed(
-            self.in_tool_axes, count, axes, self.turns, *self.heading, self.sign
+            self.in_tool_axes, count, *axes, self.turns, *self.heading, self.sign
         )
 
 

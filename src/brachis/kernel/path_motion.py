@@ -18,6 +18,7 @@ from brachis.kernel.library import (
     address,
     as_doubles,
     as_doubles_at_points,
+    declare_fields,
     load,
 )
 from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE, Prescribed
@@ -75,19 +76,10 @@ class Fault(IntEnum):
 class _PathMotion(ctypes.Structure):
     """`path_motion` of motion.h."""
 
-    _fields_ = [
-        ("arm", ctypes.c_void_p),
-        ("asked", ctypes.c_void_p),
-        ("by", ctypes.c_void_p),
-        ("count", ctypes.c_long),
-        ("rows_step", ctypes.c_long),
-        ("side", ctypes.c_double),
-        ("steps", ctypes.c_long),
-        ("tolerance", ctypes.c_double),
-        ("largest_step", ctypes.c_double),
-        *((name, ctypes.c_void_p) for name in (*_GIVEN, *_FOUND)),
-        ("is_differentiated", ctypes.c_long),
-    ]
+    _fields_ = declare_fields(
+        "p arm asked by; l count rows_step; d side; l steps; d tolerance largest_step;"
+        f"p {' '.join((*_GIVEN, *_FOUND))}; l is_differentiated"
+    )
 
 
 class _Block(NamedTuple):

@@ -8,20 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.kernel.formula import Formula
-from brachis.kernel.library import Structured, address, as_doubles
+from brachis.kernel.library import Structured, address, as_doubles, declare_fields
 
 
 class _Branch(ctypes.Structure):
     """`branch` of motion.h."""
 
-    _fields_ = [
-        ("answers_of", ctypes.c_void_p),
-        ("alternatives", ctypes.c_long),
-        *(
-            (name, ctypes.c_void_p)
-            for name in ("redundant", "others", "turns", "ranged", "start")
-        ),
-    ]
+    _fields_ = declare_fields(
+        "p answers_of; l alternatives; p redundant others turns ranged start"
+    )
 
 
 @dataclass(frozen=True, eq=False)
