@@ -146,6 +146,11 @@ def test_the_geometry_takes_numbers_of_formulas():
         points=np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.2]]),
         tool_position=np.array([1.0, 0.3, 0.0]),
         tool_rotation=np.eye(3),
+        masses=np.zeros(2),
+        centers=np.zeros((2, 3)),
+        inertias=np.zeros((2, 6)),
+        gravity=np.zeros(3),
+        friction=np.zeros((2, 4)),
         joint_names=("a", "b"),
     )
 

@@ -175,7 +175,7 @@ def begin(program, x):
 
     def run(monitor, x):
         begun.append(x)
-        return monitor.report("fake", SolveStatus.OPTIMAL, x, None, "")
+        return monitor.report("fake", SolveStatus.OPTIMAL, x, np.zeros_like(x), "")
 
     SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
     return begun[0]
@@ -191,7 +191,7 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
 
     def run(monitor, x):
         steps.append(monitor.options.first_step)
-        return monitor.report("fake", SolveStatus.OPTIMAL, x, None, "")
+        return monitor.report("fake", SolveStatus.OPTIMAL, x, np.zeros_like(x), "")
 
     def solve_some(problem, x, solve):
         return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)

@@ -11,8 +11,8 @@ from brachis.kernel.library import (
     Structured,
     address,
     as_doubles,
+    call,
     declare_fields,
-    load,
 )
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
@@ -43,15 +43,15 @@ class Chain(Structured):
     tool_position : (3,) ndarray
         m.
     tool_rotation : (3, 3) ndarray
-    masses : (n,) ndarray, optional
-        Of the body behind each joint, kg; bodies are of no use to placements.
-    centers : (n, 3) ndarray, optional
+    masses : (n,) ndarray
+        Of the body behind each joint, kg.
+    centers : (n, 3) ndarray
         Of mass, m.
-    inertias : (n, 6) ndarray, optional
+    inertias : (n, 6) ndarray
         About the centers of mass, kg m^2: xx, xy, xz, yy, yz, zz.
-    gravity : (3,) ndarray, optional
+    gravity : (3,) ndarray
         m/s^2.
-    friction : (n, 4) ndarray, optional
+    friction : (n, 4) ndarray
         Of each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; v_eps of ``tanh(qdot / v_eps)``,
         rad/s. Of a prismatic joint kg, N s/m, N, m/s.
     """
@@ -61,11 +61,11 @@ class Chain(Structured):
     points: np.ndarray
     tool_position: np.ndarray
     tool_rotation: np.ndarray
-    masses: np.ndarray | None = None
-    centers: np.ndarray | None = None
-    inertias: np.ndarray | None = None
-    gravity: np.ndarray | None = None
-    friction: np.ndarray | None = None
+    masses: np.ndarray
+    centers: np.ndarray
+    inertias: np.ndarray
+    gravity: np.ndarray
+    friction: np.ndarray
 
     @property
     def n(self) -> int:
@@ -86,12 +86,9 @@ class Chain(Structured):
             "gravity": (3,),
             "friction": (n, 4),
         }
-        numbers = []
-        for name, shape in shapes.items():
-            values = getattr(self, name)
-            numbers.append(
-                as_doubles(np.zeros(shape) if values is None else values, shape)
-            )
+        numbers = [
+            as_doubles(getattr(self, name), shape) for name, shape in shapes.items()
+        ]
         structure = _Chain(n, *map(address, numbers))
         structure.kept = numbers
         return structure
@@ -190,8 +187,4 @@ class Chain(Structured):
         """
         count = len(states[0])
         kept = [as_doubles(own, (count, self.n)) for own in states]
-        given = [
-            address(own) if isinstance(own, np.ndarray) else own
-            for own in (*kept, *others)
-        ]
-        getattr(load(), name)(self.address, count, *before, *given)
+        call(name, self.address, count, *before, *kept, *others)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, declare_fields, load
+from brachis.kernel.library import address, as_doubles, call, declare_fields
 from brachis.kernel.path_motion import PathMotion
 from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
 
@@ -119,14 +119,8 @@ class VariableSlopes:
         kept: list[np.ndarray] = []
         table = as_doubles(slopes, slopes.shape)
         found = np.empty((self.entries, columns))
-        load().brachis_entries(
-            count,
-            columns,
-            width,
-            address(table),
-            ctypes.byref(self.structure(orders, kept)),
-            address(found),
-        )
+        structure = ctypes.byref(self.structure(orders, kept))
+        call("brachis_entries", count, columns, width, table, structure, found)
         return found
 
 
@@ -188,7 +182,8 @@ def differentiate(
             raise ValueError("variables are of other points or curves")
         entries = np.empty((variables.entries, columns))
         by = ctypes.byref(variables.structure(orders, kept))
-    load().brachis_differentiate(
+    call(
+        "brachis_differentiate",
         count,
         n,
         width,
@@ -197,12 +192,12 @@ def differentiate(
         (ctypes.c_void_p * 3)(*of_states),
         (ctypes.c_void_p * 6)(*slopes),
         len(table),
-        address(table),
-        address(numbers),
+        table,
+        numbers,
         orders,
         columns,
-        address(found),
+        found,
         by,
-        address(entries),
+        entries,
     )
     return found, entries

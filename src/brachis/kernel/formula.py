@@ -19,7 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kernel.library import Structured, address, as_doubles, declare_fields, load
+from brachis.kernel.library import (
+    Structured,
+    address,
+    as_doubles,
+    call,
+    declare_fields,
+)
 
 _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
@@ -357,16 +363,18 @@ class Formula(Structured):
         given = [as_doubles(own, (count, size)) for own, size in pairs]
         found = np.empty((count, *self.shape))
         numbers = np.empty(self.room)
-        first, second = given[0], given[-1]
-        load().brachis_formula(
+        first = given[0]
+        second = given[-1]
+        call(
+            "brachis_formula",
             self.address,
             count,
-            address(first),
+            first,
             first.shape[1],
-            address(second),
+            second,
             second.shape[1],
-            address(numbers),
-            address(found),
+            numbers,
+            found,
         )
         return found
 
@@ -381,4 +389,4 @@ class Formula(Structured):
     def room(self) -> int:
         """Numbers of all inputs, constants and steps, as many as are computed side by side."""
         numbers = sum(self.counts) + len(self.constants) + len(self.steps)
-        return numbers * int(load().brachis_side_by_side())
+        return numbers * int(call("brachis_side_by_side"))

@@ -6,7 +6,7 @@ import ctypes
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, declare_fields, load
+from brachis.kernel.library import address, as_doubles, call, declare_fields
 
 
 class _Timing(ctypes.Structure):
@@ -71,13 +71,8 @@ def halve_intervals(
     room = max(most, pieces) + 2
     heap = np.empty((room, 3))
     begins = np.empty(room)
-    found = load().brachis_halve(
-        ctypes.addressof(own),
-        pieces,
-        tolerance,
-        shortest,
-        most,
-        address(heap),
-        address(begins),
+    place = ctypes.addressof(own)
+    found = call(
+        "brachis_halve", place, pieces, tolerance, shortest, most, heap, begins
     )
     return np.sort(begins[:found])

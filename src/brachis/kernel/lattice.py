@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import as_doubles, call
 
 
 def largest_parts(rows: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
@@ -18,5 +18,5 @@ def largest_parts(rows: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.
     given = (as_doubles(rows, rows.shape), np.ascontiguousarray(origin, dtype="l"))
     own = as_doubles(step, (steps, n))
     found = np.empty(steps)
-    load().brachis_largest_parts(steps, values, n, *map(address, (*given, own, found)))
+    call("brachis_largest_parts", steps, values, n, *given, own, found)
     return found

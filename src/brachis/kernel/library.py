@@ -120,6 +120,15 @@ def address(values: np.ndarray) -> int:
         return int(place)
 
 
+def call(name: str, *arguments: Any) -> Any:
+    """Call a function of the library; of contiguous arrays it gets the addresses."""
+    plain = [
+        address(value) if isinstance(value, np.ndarray) else value
+        for value in arguments
+    ]
+    return getattr(load(), name)(*plain)
+
+
 class Structured:
     """A dataclass that the library reads by a structure, which is made once and lives as long as the object."""
 

@@ -10,11 +10,10 @@ import numpy as np
 from brachis.kernel.chain import Chain
 from brachis.kernel.library import (
     Structured,
-    address,
     as_doubles,
     as_doubles_at_points,
+    call,
     declare_fields,
-    load,
 )
 
 STEPS = 15
@@ -100,30 +99,25 @@ def find_postures(
     rows, levels = conditions
     count = len(starts)
     free = chain.n - prescribed.count
-    given = [
-        as_doubles(targets, (count, prescribed.coordinates)),
-        as_doubles(starts, (count, chain.n)),
-        as_doubles(levels, (count, free)),
-    ]
-    targets_at, starts_at, levels_at = map(address, given)
     own_rows, step = as_doubles_at_points(rows, (count, free, chain.n))
     found = np.empty((count, chain.n))
-    load().brachis_newton(
+    call(
+        "brachis_newton",
         chain.address,
         prescribed.address,
         count,
         prescribed.coordinates,
-        targets_at,
-        starts_at,
+        as_doubles(targets, (count, prescribed.coordinates)),
+        as_doubles(starts, (count, chain.n)),
         free,
-        address(own_rows),
+        own_rows,
         step,
         chain.n,
-        levels_at,
+        as_doubles(levels, (count, free)),
         steps,
         tolerance,
         largest_step,
         beside,
-        address(found),
+        found,
     )
     return found

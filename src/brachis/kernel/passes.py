@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import as_doubles, call
 
 
 def bounds_of_pairs(
@@ -26,13 +26,7 @@ def bounds_of_pairs(
     """
     lines = [as_doubles(own, slope.shape) for own in (slope, lower, upper)]
     least, most = np.empty((2, len(slope)))
-    load().brachis_bounds_of_pairs(
-        *slope.shape,
-        *map(address, lines),
-        parallel,
-        address(least),
-        address(most),
-    )
+    call("brachis_bounds_of_pairs", *slope.shape, *lines, parallel, least, most)
     return least, most
 
 
@@ -68,16 +62,17 @@ def go_backwards(
     rows = [as_doubles(own, shape) for own in steps]
     ends = [as_doubles(own, shape[:1]) for own in levels]
     low, high = np.empty((2, shape[0] + 1))
-    reached = load().brachis_go_backwards(
+    reached = call(
+        "brachis_go_backwards",
         shape[0] + 1,
         shape[1],
-        *map(address, rows),
-        *map(address, ends),
+        *rows,
+        *ends,
         last,
         flat,
         rounding,
-        address(low),
-        address(high),
+        low,
+        high,
     )
     return (low, high) if reached else None
 
@@ -94,9 +89,5 @@ def go_forwards(
     ends = [as_doubles(own, (count,)) for own in within]
     x = np.empty(count)
     x[0] = first
-    load().brachis_go_forwards(
-        count,
-        factor.shape[1],
-        *map(address, (*rows, *ends, x)),
-    )
+    call("brachis_go_forwards", count, factor.shape[1], *rows, *ends, x)
     return x

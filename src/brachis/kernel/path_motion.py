@@ -18,8 +18,8 @@ from brachis.kernel.library import (
     address,
     as_doubles,
     as_doubles_at_points,
+    call,
     declare_fields,
-    load,
 )
 from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE, Prescribed
 from brachis.kernel.postures import Branch
@@ -262,7 +262,7 @@ class PathMotion(Structured):
 
     def find_postures(self) -> np.ndarray:
         """Find the postures alone, (K, n); NaN where they do not exist."""
-        load().brachis_postures(self.address)
+        call("brachis_postures", self.address)
         return self.q
 
     def evaluate(self) -> Fault | None:
@@ -270,7 +270,7 @@ class PathMotion(Structured):
         _need(self.given, _OF_MOTION)
         groups = self.groups
         own = (0, None, None) if groups is None else groups.pointers
-        fault = load().brachis_evaluate(self.address, *own)
+        fault = call("brachis_evaluate", self.address, *own)
         return Fault(fault) if fault else None
 
     @property
@@ -288,7 +288,7 @@ class PathMotion(Structured):
 
     def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each; once."""
-        load().brachis_path_derivatives(self.address)
+        call("brachis_path_derivatives", self.address)
         return self.slopes
 
     def singular_slopes(
@@ -298,8 +298,7 @@ class PathMotion(Structured):
         by_q = np.empty_like(self.qdot)
         by_s = np.empty(len(by_q))
         singular = as_doubles(values, by_s.shape), as_doubles(vectors, by_q.shape)
-        places = map(address, (*singular, by_q, by_s))
-        load().brachis_singular_slopes(self.address, *places)
+        call("brachis_singular_slopes", self.address, *singular, by_q, by_s)
         return by_q, by_s
 
 
@@ -316,5 +315,5 @@ def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     values = np.empty(count)
     vectors = np.empty((count, n))
     kept = as_doubles(inverses, (count, n, n))
-    load().brachis_least_singular(count, n, *map(address, (kept, values, vectors)))
+    call("brachis_least_singular", count, n, kept, values, vectors)
     return values, vectors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import as_doubles, call
 
 _MOST = 8
 """Derivatives that the library has room for, with the value itself."""
@@ -17,7 +17,7 @@ def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
     kept = as_doubles(quaternions, (orders, *places, 4))
     found = np.empty((orders, *places, 3, 3))
     count = kept[0].size // 4
-    load().brachis_rotations(orders, count, address(kept), address(found))
+    call("brachis_rotations", orders, count, kept, found)
     return found
 
 
@@ -39,7 +39,7 @@ def body_twists(poses: np.ndarray) -> np.ndarray:
     kept = as_doubles(poses, (orders, *places, 12))
     found = np.empty((orders - 1, *places, 6))
     count = kept[0].size // 12
-    load().brachis_body_twists(orders, count, address(kept), address(found))
+    call("brachis_body_twists", orders, count, kept, found)
     return found
 
 

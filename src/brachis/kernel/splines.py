@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import as_doubles, call
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +66,7 @@ class Spline:
         matrix[number, column - number + degree] = basis[number, every[column]]
         points = np.array(values, dtype=float, order="C")
         columns = points.size // len(points)
-        load().brachis_solve_band(
-            len(points), degree, columns, address(matrix), address(points)
-        )
+        call("brachis_solve_band", len(points), degree, columns, matrix, points)
         return cls(knots, points, degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
@@ -137,8 +135,8 @@ def blossom(
     own_knots = as_doubles(knots, knots.shape)
     work = np.empty((degree + 1, columns))
     found = np.empty((count, columns))
-    given = map(address, (own_knots, points, numbers, at, work, found))
-    load().brachis_blossoms(count, degree, columns, *given)
+    given = (own_knots, points, numbers, at, work, found)
+    call("brachis_blossoms", count, degree, columns, *given)
     return found
 
 
@@ -176,6 +174,6 @@ class Basis:
             raise ValueError(f"a control point does not exist; there are {many}")
         points = as_doubles(control_points, (curves, many))
         found = np.empty((orders, count, curves))
-        places = map(address, (self._values, self._first, points, found))
-        load().brachis_curves(orders, count, width, curves, many, *places)
+        given = (self._values, self._first, points, found)
+        call("brachis_curves", orders, count, width, curves, many, *given)
         return found

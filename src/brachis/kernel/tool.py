@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import as_doubles, call
 
 
 def tool_derivatives(
@@ -26,16 +26,20 @@ def tool_derivatives(
         dV/dq, da/dq and da/dqdot.
     """
     _, count, n = twists.shape
-    kept = [
+    velocity_q, acceleration_q, acceleration_qdot = np.empty((3, *twists.shape))
+    call(
+        "brachis_tool_derivatives",
+        count,
+        n,
         as_doubles(twists, twists.shape),
         as_doubles(qdot, (count, n)),
         as_doubles(qddot, (count, n)),
-    ]
-    found = np.empty((3, *twists.shape))
-    load().brachis_tool_derivatives(
-        count, n, *map(address, kept), in_tool_axes, *map(address, found)
+        in_tool_axes,
+        velocity_q,
+        acceleration_q,
+        acceleration_qdot,
     )
-    return found[0], found[1], found[2]
+    return velocity_q, acceleration_q, acceleration_qdot
 
 
 def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
@@ -43,5 +47,5 @@ def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
     count = len(rotations)
     kept = as_doubles(rotations, (count, 3, 3))
     found = np.empty((count, 3))
-    load().brachis_logarithms(count, address(kept), address(found))
+    call("brachis_logarithms", count, kept, found)
     return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.kernel.chain import Chain
 from brachis.kernel.formula import Formula
-from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
+from brachis.kernel.library import address, as_doubles, as_doubles_at_points, call
 
 QUANTITIES = ("q", "qdot", "qddot", "qdddot", "torque")
 """In the order of motion.h."""
@@ -223,15 +223,9 @@ class ValueGroups:
         addresses = [keep_address(own, (count, n), kept) for own in given]
         found = np.empty(count * self.size)
         numbers = np.empty(self.room)
-        load().brachis_values(
-            count,
-            n,
-            (ctypes.c_void_p * len(QUANTITIES))(*addresses),
-            len(self._table),
-            address(self._table),
-            address(numbers),
-            address(found),
-        )
+        of_states = (ctypes.c_void_p * len(QUANTITIES))(*addresses)
+        table = self._table
+        call("brachis_values", count, n, of_states, len(table), table, numbers, found)
         return self.split(found, count)
 
     def table_with(

@@ -21,7 +21,7 @@ def chain_of(
     tool_frame : int
         Index of the tool frame.
     friction : (n, 4) ndarray, optional
-        See `Chain`.
+        See `Chain`; zeros if left out.
     """
     data = model.createData()
     zero = np.zeros(model.nq)
@@ -46,5 +46,5 @@ def chain_of(
         centers=np.array([body.lever for body in bodies]),
         inertias=np.array([body.inertia[np.triu_indices(3)] for body in bodies]),
         gravity=np.array(model.gravity.linear),
-        friction=friction,
+        friction=np.zeros((model.nq, 4)) if friction is None else friction,
     )

@@ -212,7 +212,7 @@ class SolveMonitor:
         solver: str,
         status: SolveStatus,
         x: np.ndarray,
-        multipliers: np.ndarray | None,
+        multipliers: np.ndarray,
         message: str,
     ) -> SolverReport:
         """Judge the answer by its own residuals.
@@ -228,7 +228,7 @@ class SolveMonitor:
         if self.timed_out and violation > self._feasible_below and self.best:
             x = self.best[1]
             violation = residual(self.problem, x)
-            multipliers = None
+            multipliers = np.zeros_like(multipliers)
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED
         feasible = violation <= self._feasible_below
@@ -242,8 +242,6 @@ class SolveMonitor:
             status = SolveStatus.ITERATION_LIMIT
         elif violation == np.inf:
             status = SolveStatus.EVALUATION_ERROR
-        if multipliers is None:
-            multipliers = np.zeros(len(self.problem.lower))
         objective = objective_at(self.problem, x)
         known = (x, objective, violation, multipliers, self.iterations, self.elapsed)
         return SolverReport(solver, status, *known, message)
