@@ -194,7 +194,7 @@ def test_solids_are_taken_over(tmp_path):
         "cylinder {'radius': '0.1', 'length': '0.4'}",
         "capsule {'radius': '0.1', 'length': '0.4'}",
     ]
-    assert link.find("collision/origin").get("xyz") == "0.5 0.0 0.1"
+    assert link.find("collision/origin").get("xyz") == "0.5 0 0.1"
     solid = pin.GeometryObject(
         "mesh", 1, away, coal.Halfspace(), str(mesh), np.full(3, 0.001)
     )

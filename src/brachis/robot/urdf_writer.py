@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -85,20 +86,25 @@ def write_urdf(model: pin.Model, geometry: pin.GeometryModel | None = None) -> s
 _LINKS = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 
 
-def _write(*numbers: float) -> str:
-    """Write numbers so that the same are read again."""
-    return " ".join(str(float(number)) for number in numbers)
+def write_numbers(*numbers: float) -> str:
+    """Write numbers as the shortest text from which the same numbers are read again."""
+    return " ".join(repr(float(number) + 0.0).removesuffix(".0") for number in numbers)
 
 
-def _write_origin(placement: pin.SE3) -> str:
-    angles = pin.rpy.matrixToRpy(placement.rotation)
-    return f"<origin xyz='{_write(*placement.translation)}' rpy='{_write(*angles)}'/>"
+def write_origin(xyz: Sequence[float] | np.ndarray, rpy: Sequence[float]) -> str:
+    """Write an ``<origin>``, or nothing for the identity."""
+    turn = f' rpy="{write_numbers(*rpy)}"' if any(rpy) else ""
+    return f'<origin xyz="{write_numbers(*xyz)}"{turn}/>' if turn or any(xyz) else ""
+
+
+def _write_placement(placement: pin.SE3) -> str:
+    return write_origin(placement.translation, pin.rpy.matrixToRpy(placement.rotation))
 
 
 def _write_ends(parent: tuple[str, pin.SE3], child: str, placement: pin.SE3) -> str:
     """Hang a link from another one, which has a placement in the frame that the link's placement is in."""
     name, placed = parent
-    origin = _write_origin(placed.actInv(placement))
+    origin = _write_placement(placed.actInv(placement))
     return f"<parent link={quoteattr(name)}/><child link={quoteattr(child)}/>{origin}"
 
 
@@ -108,11 +114,11 @@ def _write_inertial(inertia: pin.Inertia) -> str:
     if not inertia.mass and not matrix.any():
         return ""
     moments = " ".join(
-        f"i{'xyz'[row]}{'xyz'[column]}='{_write(matrix[row, column])}'"
+        f"i{'xyz'[row]}{'xyz'[column]}='{write_numbers(matrix[row, column])}'"
         for row, column in zip(*np.triu_indices(3), strict=True)
     )
-    origin = _write_origin(pin.SE3(np.eye(3), inertia.lever))
-    mass = _write(inertia.mass)
+    origin = _write_placement(pin.SE3(np.eye(3), inertia.lever))
+    mass = write_numbers(inertia.mass)
     return f"<inertial>{origin}<mass value='{mass}'/><inertia {moments}/></inertial>"
 
 
@@ -131,12 +137,13 @@ def _write_joint(model: pin.Model, i: int, ends: str) -> str:
         figures["lower"] = model.lowerPositionLimit[joint.idx_q]
         figures["upper"] = model.upperPositionLimit[joint.idx_q]
     stated = [key for key, value in figures.items() if abs(value) < LARGEST]
-    limits = " ".join(f"{key}='{_write(figures[key])}'" for key in stated)
+    limits = " ".join(f"{key}='{write_numbers(figures[key])}'" for key in stated)
     kind = "revolute" if {"lower", "upper"} & set(stated) else "continuous"
     kind = "prismatic" if slide.any() else kind
-    axis = _write(*(slide + turn).ravel())
+    axis = write_numbers(*(slide + turn).ravel())
     damping, friction, armature = (
-        _write(values[v]) for values in (model.damping, model.friction, model.armature)
+        write_numbers(values[v])
+        for values in (model.damping, model.friction, model.armature)
     )
     return (
         f"<joint name={name} type='{kind}'>{ends}<axis xyz='{axis}'/><limit {limits}/>"
@@ -149,16 +156,16 @@ def _write_solid(solid: pin.GeometryObject) -> str:
     shape = solid.geometry
     kind = type(shape).__name__.lower()
     if kind == "box":
-        figures = f"size='{_write(*(2.0 * shape.halfSide))}'"
+        figures = f"size='{write_numbers(*(2.0 * shape.halfSide))}'"
     elif kind == "sphere":
-        figures = f"radius='{_write(shape.radius)}'"
+        figures = f"radius='{write_numbers(shape.radius)}'"
     elif kind in ("cylinder", "capsule"):
-        length = _write(2.0 * shape.halfLength)
-        figures = f"radius='{_write(shape.radius)}' length='{length}'"
+        length = write_numbers(2.0 * shape.halfLength)
+        figures = f"radius='{write_numbers(shape.radius)}' length='{length}'"
     elif is_file(solid.meshPath):
         kind = "mesh"
         file = quoteattr(solid.meshPath)
-        figures = f"filename={file} scale='{_write(*solid.meshScale)}'"
+        figures = f"filename={file} scale='{write_numbers(*solid.meshScale)}'"
     else:
         raise UrdfError(
             "this solid cannot be written into a URDF",
@@ -166,5 +173,5 @@ def _write_solid(solid: pin.GeometryObject) -> str:
             found=kind,
             allowed="a box, a ball, a cylinder, a capsule, or a mesh with its file",
         )
-    origin = _write_origin(solid.placement)
+    origin = _write_placement(solid.placement)
     return f"<collision>{origin}<geometry><{kind} {figures}/></geometry></collision>"

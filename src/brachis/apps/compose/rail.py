@@ -27,6 +27,7 @@ from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
 from brachis.robot.urdf_bodies import read_dynamics
 from brachis.robot.urdf_elements import Element, UrdfTree, read_tree
+from brachis.robot.urdf_writer import write_numbers, write_origin
 
 _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
@@ -208,58 +209,47 @@ class Rail:
         beam = middle + height * down + 0.5 * (low + high) * np.array(self.axis)
         beam_rpy = (0.0, -math.atan2(z, math.hypot(x, y)), math.atan2(y, x))
         beam_size = (high - low + max(width, depth), height, height)
-        centre = _origin(middle, self.mount_rpy)
-        xx, yy, zz = (side**2 for side in self.carriage_size)
-        ixx = self.mass * (yy + zz) / 12  # of a solid box
-        iyy = self.mass * (xx + zz) / 12
-        izz = self.mass * (xx + yy) / 12
+        centre = write_origin(middle, self.mount_rpy)
+        inertia = pin.Inertia.FromBox(self.mass, *self.carriage_size).inertia
+        ixx, iyy, izz = inertia.diagonal()
         # A name of its own: the arm may have another grey.
         grey = f'<material name="{self.name}_grey"><color rgba="0.35 0.38 0.42 1"/></material>'
         new = etree.fromstring(f"""
 <robot>
   <link name="{self.root}">
     <visual>
-      {_origin(beam.round(12), beam_rpy)}
-      <geometry><box size="{_write(*beam_size)}"/></geometry>
+      {write_origin(beam.round(12), beam_rpy)}
+      <geometry><box size="{write_numbers(*beam_size)}"/></geometry>
       {grey}
     </visual>
   </link>
   <joint name="{self.name}" type="prismatic">
     <parent link="{self.root}"/>
     <child link="{carriage}"/>
-    <axis xyz="{_write(*self.axis)}"/>
-    <limit lower="{_write(low)}" upper="{_write(high)}" velocity="{_write(speed)}" effort="{_write(self.force)}"/>
+    <axis xyz="{write_numbers(*self.axis)}"/>
+    <limit lower="{write_numbers(low)}" upper="{write_numbers(high)}"
+           velocity="{write_numbers(speed)}" effort="{write_numbers(self.force)}"/>
   </joint>
   <link name="{carriage}">
     <inertial>
       {centre}
-      <mass value="{_write(self.mass)}"/>
-      <inertia ixx="{_write(ixx)}" ixy="0" ixz="0" iyy="{_write(iyy)}" iyz="0" izz="{_write(izz)}"/>
+      <mass value="{write_numbers(self.mass)}"/>
+      <inertia ixx="{write_numbers(ixx)}" ixy="0" ixz="0" iyy="{write_numbers(iyy)}" iyz="0"
+               izz="{write_numbers(izz)}"/>
     </inertial>
     <visual>
       {centre}
-      <geometry><box size="{_write(*self.carriage_size)}"/></geometry>
+      <geometry><box size="{write_numbers(*self.carriage_size)}"/></geometry>
       {grey}
     </visual>
   </link>
   <joint name="{self.name}_mount" type="fixed">
     <parent link="{carriage}"/>
     <child link="{escape(arm_root)}"/>
-    {_origin(self.mount_xyz, self.mount_rpy)}
+    {write_origin(self.mount_xyz, self.mount_rpy)}
   </joint>
 </robot>""")
         return list(new)
-
-
-def _write(*numbers: float) -> str:
-    """Write numbers as the shortest text from which the same numbers are read again."""
-    return " ".join(repr(float(each) + 0.0).removesuffix(".0") for each in numbers)
-
-
-def _origin(xyz: Sequence[float] | np.ndarray, rpy: Sequence[float]) -> str:
-    """Write an ``<origin>``, or nothing for the identity."""
-    turn = f' rpy="{_write(*rpy)}"' if any(rpy) else ""
-    return f'<origin xyz="{_write(*xyz)}"{turn}/>' if turn or any(xyz) else ""
 
 
 def robot_text(robot: Element) -> str:
