@@ -1,4 +1,4 @@
-"""Random tasks with root-mean-square limits on the torques, planned with `solver: auto` and with Uno's interior points.
+"""Random tasks with root-mean-square limits on the torques, planned with `solver: auto`.
 
 Usage: python benchmarks/mean_torques.py [--seed 0] [--count 6] [--save]
 
@@ -24,7 +24,6 @@ from brachis.task.keywords import task_with
 from committed import processor_time, save
 
 ROBOTS = ("panda", "iiwa14", "tx90l_rail", "ur10_rail", "planar4", "scara3")
-SOLVERS = ("auto", "uno_interior")
 SETTINGS = {"search.least_motion": False, "search.jobs": 1}
 SHARE = 2.0 / 3.0
 LEAST_SHARE = 1e-3
@@ -48,17 +47,17 @@ def find_rms_limits(result: brachis.Result) -> dict[str, float]:
     return dict(zip(names.tolist(), allowed[is_loaded].tolist(), strict=True))
 
 
-def measure_plan(task: Task, solver: str) -> tuple[float, float, bool]:
+def measure_plan(task: Task) -> tuple[float, float, bool]:
     """Processor time, s, end time, s, and whether the plan is verified."""
     busy = processor_time()
     t_end = np.inf
     verified = False
     try:
-        result = brachis.plan(task, solver={"name": solver}, strict=False)
+        result = brachis.plan(task, strict=False)
         t_end = result.t_end
         verified = result.verified
     except BrachisError as error:
-        print(f"  {solver}: {error}")
+        print(f"  {error}")
     return processor_time() - busy, t_end, verified
 
 
@@ -70,7 +69,7 @@ def main() -> None:
     parser.add_argument("--save", action="store_true")
     arguments = parser.parse_args()
     rows: list[tuple[str, ...]] = []
-    ratios: list[tuple[float, float]] = []
+    count = 0
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", BrachisWarning)
         for number in range(arguments.count):
@@ -79,35 +78,20 @@ def main() -> None:
                 task = load_task(case.task, changes=SETTINGS)
                 free = brachis.plan(task, strict=False)
                 task = task_with(task, limits={"rms_torque": find_rms_limits(free)})
-                auto, other = (measure_plan(task, solver) for solver in SOLVERS)
-                if auto[2] and other[2]:
-                    ratios.append((other[0] / auto[0], auto[1] / other[1]))
+                time, t_end, verified = measure_plan(task)
+                count += verified
                 row = (
                     case.name,
-                    *(f"{t_end:.4f} s" for t_end in (free.t_end, auto[1], other[1])),
-                    *(f"{time:.1f} s" for time in (auto[0], other[0])),
-                    f"{'yes' if auto[2] else 'no'}, {'yes' if other[2] else 'no'}",
+                    f"{free.t_end:.4f} s",
+                    f"{t_end:.4f} s",
+                    f"{time:.1f} s",
+                    "yes" if verified else "no",
                 )
                 rows.append(row)
                 print(" | ".join(row), flush=True)
-    if not ratios:
-        print("no task is verified with both solvers")
-        return
-    faster, later = np.exp(np.log(ratios).mean(axis=0))
-    about = (
-        f"{len(ratios)} of {len(rows)} are verified with both. In the geometric mean uno_interior takes {faster:.2f} "
-        f"times the processor time of auto, and the end time of auto is {later:.5f} times that of uno_interior."
-    )
+    about = f"{count} of {len(rows)} are verified."
     print(about)
-    columns = (
-        "task",
-        "without",
-        "auto",
-        "uno_interior",
-        "processor time, auto",
-        "processor time, uno_interior",
-        "verified",
-    )
+    columns = ("task", "without", "auto", "processor time, auto", "verified")
     save("Root-mean-square torques", columns, rows, about)
 
 

@@ -93,8 +93,7 @@ def _measure_reach(robot: Robot, postures: np.ndarray) -> float:
 
 def _draw_postures(robot: Robot) -> np.ndarray:
     """Draw 400 postures in the inner part of all ranges, within 2 rad or m of zero if possible, with two digits."""
-    lower = robot.limits.position_lower
-    upper = robot.limits.position_upper
+    lower, upper = robot.limits.both_ways("position")
     # No motion begins in the outer parts of a range, 15 % at each end.
     inner = 0.15 * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
     ends = np.array([lower + inner, upper - inner])
@@ -160,7 +159,7 @@ def _follow(
     task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray
 ) -> np.ndarray | None:
     """Follow a line in 10 steps of least joint motion; None if a joint leaves its range or the line is lost."""
-    limits = task_map.robot.limits
+    lower, upper = task_map.robot.limits.both_ways("position")
     position, rotation = task_map.robot.tool_placements(posture[None])
     step = np.zeros(3)
     step[list(task_map.axes)] = displacement / 10
@@ -169,8 +168,7 @@ def _follow(
     for k in range(1, 11):
         target = task_map.of_placements(position + k * step, rotation)
         found = newton.nearest(target, postures[-1:])
-        is_within = (found > limits.position_lower) & (found < limits.position_upper)
-        if not is_within.all():  # NaN is not within
+        if not ((found > lower) & (found < upper)).all():  # NaN is not within
             return None
         postures = np.concatenate([postures, found])
     return postures
@@ -296,8 +294,7 @@ def _inline(value: object) -> str:
 
 def _joint(robot: Robot, i: int, position: float) -> str:
     """Write a joint's position, with its unit and range as a comment."""
-    low = robot.limits.position_lower[i]
-    high = robot.limits.position_upper[i]
+    low, high = robot.limits.both_ways("position")[:, i]
     unit = robot.position_units[i]
     allowed = f", {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else ""
     return f"    {_inline(robot.joint_names[i])}: {_inline(float(position))}    # {unit}{allowed}"

@@ -89,11 +89,6 @@ def _check_joints(
             )
 
 
-def _movable(tree: UrdfTree) -> list[str]:
-    """List the joints that are not fixed."""
-    return [name for name, joint in tree.joints.items() if joint.get("type") != "fixed"]
-
-
 def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
     """Refuse a negative mass, a mass without moments of inertia, and moments that no body can have."""
     for body in bodies:
@@ -201,7 +196,8 @@ def read_chain(
     tool = leaves[0] if tool_frame is None else tool_frame
     base = tree.root if base_frame is None else base_frame
     path = _joints_between(tree, base, tool, where)
-    movable = _movable(tree)
+    joints = tree.joints.items()
+    movable = [name for name, joint in joints if joint.get("type") != "fixed"]
     check_names("moving joint", given, movable, f"{where}: locked_joints")
     for name, position in given.items():
         _check_locked_position(tree.joints[name], name, position)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.arrays import cross
 from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.robot.urdf_elements import Element, UrdfTree, end_of, number_of, numbers_of
@@ -225,7 +226,7 @@ def origin_of(owner: Element, path: str) -> np.ndarray:
 def _place(xyz: Sequence[float], rpy: Sequence[float] | np.ndarray) -> np.ndarray:
     """Return the placement, (4, 4), with roll, pitch and yaw, rad, about the fixed x, then y, then z axis."""
     placed = np.eye(4)
-    roll, pitch, yaw = map(_turn_about, np.eye(3), rpy)
+    roll, pitch, yaw = map(turns_about, np.eye(3), rpy)
     placed[:3, :3] = yaw @ pitch @ roll
     placed[:3, 3] = xyz
     return placed
@@ -237,11 +238,14 @@ def _displacement(joint: Element, position: float) -> np.ndarray:
     if joint.get("type") == "prismatic":
         placed[:3, 3] = position * _axis(joint)
     elif joint.get("type") in ("revolute", "continuous"):
-        placed[:3, :3] = _turn_about(_axis(joint), position)
+        placed[:3, :3] = turns_about(_axis(joint), position)
     return placed
 
 
-def _turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Return the rotation, (3, 3), about a unit axis by an angle, rad (Rodrigues' formula)."""
-    across = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+def turns_about(axis: np.ndarray, angles: np.ndarray | float) -> np.ndarray:
+    """Return the rotation matrices, (..., 3, 3), about a unit vector by angles (...), rad (Rodrigues' formula)."""
+    identity = np.eye(3)
+    still = np.outer(axis, axis)
+    cosine = np.cos(angles)[..., None, None]
+    sine = np.sin(angles)[..., None, None]
+    return still + cosine * (identity - still) + sine * cross(axis[:, None], identity)

@@ -6,7 +6,7 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.kernel import Spline, blossom
-from brachis.robot import Robot, TaskMap
+from brachis.robot import TaskMap
 from brachis.robot.joints import TURN
 from brachis.trajectory import CONTINUOUS_TORQUE
 from brachis.verify.motion import Given, MotionStates, turns
@@ -139,12 +139,6 @@ def check_splines(given: Given) -> list[Check]:
     return [check_joints(given, name, misses, states.t, "position", allowed)]
 
 
-def _turns_freely(robot: Robot) -> np.ndarray:
-    """Joints, a mask (n,), that turn and have no range."""
-    ends = robot.limits.position_lower, robot.limits.position_upper
-    return robot.revolute & np.isinf(ends).all(axis=0)
-
-
 def check_continuity(given: Given) -> list[Check]:
     """Check jumps where polynomial pieces join, and where a periodic motion goes on from its end to its beginning.
 
@@ -160,6 +154,8 @@ def check_continuity(given: Given) -> list[Check]:
     at_stops = np.zeros(last, dtype=bool)
     if given.task.spline.vanishing == 1:
         at_stops = np.isin(pieces.times[1:-1], times_of_stops(given))
+    ranges = given.robot.limits.both_ways("position")
+    turns_freely = given.robot.revolute & np.isinf(ranges).all(axis=0)
     names = {"position": "q", "velocity": "qdot"}
     if given.trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
         names |= {"acceleration": "qddot"}
@@ -173,7 +169,7 @@ def check_continuity(given: Given) -> list[Check]:
             scale = 1.0 + np.abs(left).max(initial=0.0)
             gaps = getattr(after, part) - left
             if part == "q" and what == " over the seam":
-                gaps -= TURN * np.round(gaps / TURN) * _turns_freely(given.robot)
+                gaps -= TURN * np.round(gaps / TURN) * turns_freely
             jumps = np.abs(gaps).max(axis=1, initial=0.0)
             if part in ("qddot", "tau") and what == " jump":
                 jumps[at_stops] = 0.0

@@ -23,7 +23,12 @@ import numpy as np
 
 from brachis.common.arrays import cross, rates
 from brachis.robot import Robot
-from brachis.robot.urdf_bodies import Body, placement_matrix, symmetric_matrix
+from brachis.robot.urdf_bodies import (
+    Body,
+    placement_matrix,
+    symmetric_matrix,
+    turns_about,
+)
 
 _AXES = np.eye(3)
 
@@ -233,11 +238,3 @@ def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.nda
     cosine = np.cos(angles)
     parallel = along * (axis @ vectors) * (1.0 - cosine)
     return vectors * cosine + cross(along, vectors) * np.sin(angles) + parallel
-
-
-def turns_about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return the rotation matrices, (K, 3, 3), about a unit vector by angles (K,), rad."""
-    still = np.outer(axis, axis)
-    cosine = np.cos(angles)[:, None, None]
-    sine = np.sin(angles)[:, None, None]
-    return still + cosine * (_AXES - still) + sine * cross(axis[:, None], _AXES)

@@ -19,6 +19,7 @@ from brachis.path import path_of
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace, RowsAndAngle
+from brachis.robot.urdf_bodies import turns_about
 from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
     check_continuity,
@@ -28,7 +29,7 @@ from brachis.verify.checks import (
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
-from brachis.verify.mechanics import tool_placements, turns_about
+from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Given
 from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions

@@ -18,6 +18,7 @@ from brachis.apps.sweeps.plans import Outcome, Plan, run_plan
 from brachis.common import interrupts
 from brachis.common.arguments import check_executor, count
 from brachis.errors import BrachisError, ClusterError, InputError
+from brachis.search.processes import process_count
 
 Outcomes = Generator[tuple[Plan, Outcome], None, None]
 Pool = Callable[[Sequence[Plan]], Outcomes]
@@ -171,12 +172,9 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
     ------
     Plan, Outcome
     """
-    from joblib import cpu_count
     from joblib.externals.loky import ProcessPoolExecutor
 
-    processors = cpu_count()
-    width = min(jobs or processors, processors, max(len(plans), 1))
-
+    width = min(process_count(jobs or "auto"), max(len(plans), 1))
     executor = partial(
         ProcessPoolExecutor,
         width,

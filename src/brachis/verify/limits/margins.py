@@ -63,9 +63,8 @@ def _parts_of_ranges(
     given: Given, states: MotionStates
 ) -> tuple[np.ndarray, list[str]]:
     """Distances from the middle of joint ranges, (K, c), 1 at their ends, and the names of these joints."""
-    limits = given.robot.limits
     count = len(given.robot.urdf_joints)
-    ends = np.array([limits.position_lower, limits.position_upper])[:, :count]
+    ends = given.robot.limits.both_ways("position")[:, :count]
     joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
     lower, upper = ends[:, joints]
     away = np.abs(states.q[:, joints] - 0.5 * (lower + upper))
