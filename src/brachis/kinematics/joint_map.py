@@ -169,11 +169,7 @@ class JointMap(ABC):
     @abstractmethod
     def state(
         self,
-        y: np.ndarray,
-        ydot: np.ndarray,
-        yddot: np.ndarray,
-        ydddot: np.ndarray,
-        *,
+        *curves: np.ndarray,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
         groups: ValueGroups | None = None,
@@ -182,7 +178,8 @@ class JointMap(ABC):
 
         Parameters
         ----------
-        y, ydot, yddot, ydddot : (K, c) ndarray
+        *curves : (K, c) ndarray
+            y, ydot, yddot and ydddot.
         t : (K,) ndarray, optional
             The times, ascending from the start on, s; by them turns are counted.
         near : (K, n) ndarray, optional
@@ -261,20 +258,13 @@ class JointSpaceMap(JointMap):
         """Return the path's target."""
         return self.path.sample(y[:, 0]).target
 
-    def state(
-        self,
-        y: np.ndarray,
-        ydot: np.ndarray,
-        yddot: np.ndarray,
-        ydddot: np.ndarray,
-        **_others: object,
-    ) -> JointSpaceState:
+    def state(self, *curves: np.ndarray, **_others: object) -> JointSpaceState:
         """Return the motion along the path; in which turns joints are, it says itself."""
+        y, ydot, yddot, _ = curves
         path = self.path.sample(y[:, 0])
         qdot = path.xi * ydot
         qddot = path.xi * yddot + path.xi_ds * ydot**2
         gradient = path.xi[:, :, None]
-        curves = (y, ydot, yddot, ydddot)
         return JointSpaceState(self, *curves, path.target, qdot, qddot, gradient, path)
 
     def derivatives(self, state: JointSpaceState) -> JointDerivatives:
@@ -310,17 +300,10 @@ class DirectJointMap(JointMap):
         """Return the curves."""
         return y
 
-    def state(
-        self,
-        y: np.ndarray,
-        ydot: np.ndarray,
-        yddot: np.ndarray,
-        ydddot: np.ndarray,
-        **_others: object,
-    ) -> JointState:
+    def state(self, *curves: np.ndarray, **_others: object) -> JointState:
         """Return the curves as the motion; in which turns joints are, they say themselves."""
-        gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))
-        return JointState(self, y, ydot, yddot, ydddot, y, ydot, yddot, gradient)
+        gradient = np.broadcast_to(np.eye(self.r), (len(curves[0]), self.r, self.r))
+        return JointState(self, *curves, *curves[:3], gradient)
 
     def derivatives(self, state: JointState) -> JointDerivatives:
         """Return zeros: all derivatives but G vanish."""

@@ -182,11 +182,7 @@ class PathMap(JointMap):
 
     def state(
         self,
-        y: np.ndarray,
-        ydot: np.ndarray,
-        yddot: np.ndarray,
-        ydddot: np.ndarray,
-        *,
+        *curves: np.ndarray,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
         groups: ValueGroups | None = None,
@@ -195,6 +191,7 @@ class PathMap(JointMap):
 
         Without `t` and `near`, successive times must be so close that no joint turns by pi in between.
         """
+        y, ydot, yddot, _ = curves
         sample = self.sample_at(y[:, 0])
         given = {
             "y": y,
@@ -214,7 +211,7 @@ class PathMap(JointMap):
         if fault is not None:
             raise UnreachableError(self.faults[fault])
         found = (motion.q, motion.qdot, motion.qddot, motion.gradient)
-        return PathState(self, y, ydot, yddot, ydddot, *found, motion)
+        return PathState(self, *curves, *found, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

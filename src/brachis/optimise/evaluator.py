@@ -49,11 +49,7 @@ class Evaluator:
 
     def evaluate(
         self,
-        y: np.ndarray,
-        ydot: np.ndarray,
-        yddot: np.ndarray,
-        ydddot: np.ndarray,
-        *,
+        *curves: np.ndarray,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> Evaluation:
@@ -61,8 +57,8 @@ class Evaluator:
 
         Parameters
         ----------
-        y, ydot, yddot, ydddot : (K, 1 + r) ndarray
-            The curves and their time derivatives.
+        *curves : (K, 1 + r) ndarray
+            y, ydot, yddot and ydddot.
         t : (K,) ndarray, optional
             The times, ascending from the start on, s; by them turns are counted.
         near : (K, n) ndarray, optional
@@ -74,8 +70,7 @@ class Evaluator:
             The joint map has no posture at one of the times.
         """
         groups = None if self._groups.has_jerk else self._groups
-        turns = {"t": t, "near": near}
-        motion = self.joint_map.state(y, ydot, yddot, ydddot, **turns, groups=groups)
+        motion = self.joint_map.state(*curves, t=t, near=near, groups=groups)
         return Evaluation(self.limits, motion, self._groups)
 
 

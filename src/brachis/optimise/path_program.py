@@ -13,7 +13,6 @@ What it finds is a joint path: its timing is computed anew, on a finer grid.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -31,7 +30,7 @@ from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.program import Link, smallest_slack
+from brachis.optimise.program import Link, PhaseSequence
 from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
@@ -359,7 +358,7 @@ def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
     return added[np.append(True, np.diff(added) > _SHORTEST)]
 
 
-class PathProgram:
+class PathProgram(PhaseSequence[PathPhase]):
     """The NLP over the path of all phases; a `Problem` for the solvers.
 
     Parameters
@@ -370,13 +369,9 @@ class PathProgram:
     """
 
     def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
-        self.phases = tuple(phases)
-        sizes = [len(phase.start) for phase in self.phases]
-        first = np.cumsum([0, *sizes]).tolist()
-        self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
+        super().__init__(phases)
+        first = self.first_variables
         self.start = np.concatenate([phase.start for phase in self.phases])
-        self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
-        self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
         joins = [(link.before, link.after, link.curves) for link in links]
         if self.phases[0].phase.boundary.periodic:
             joins.append((0, 0, tuple(range(1, 1 + self.phases[0].curves_count))))
@@ -393,18 +388,13 @@ class PathProgram:
         row = 0
         rows = []
         columns = []
-        for own, column in zip(self.phases, first, strict=False):
+        for own, column in zip(self.phases, first, strict=True):
             rows.append(own.jacobian_rows + row)
             columns.append(own.jacobian_columns + column)
             row += len(own.lower)
         numbers = row + np.arange(len(self._pairs))
         self.jacobian_rows = np.concatenate([*rows, np.repeat(numbers, 2)])
         self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
-
-    def _split(self, x: np.ndarray) -> list[tuple[PathPhase, np.ndarray]]:
-        return [
-            (own, x[part]) for own, part in zip(self.phases, self._parts, strict=True)
-        ]
 
     @property
     def lower(self) -> np.ndarray:
@@ -420,18 +410,18 @@ class PathProgram:
 
     def narrow(self, x: np.ndarray) -> float:
         """Narrow limits on postures of all phases; see `PathPhase.narrow`."""
-        return max(own.narrow(part) for own, part in self._split(x))
+        return max(own.narrow(part) for own, part in self.split(x))
 
     def objective(self, x: np.ndarray) -> float:
         """Time of all phases, s."""
-        return sum(phase.time(part) for phase, part in self._split(x))
+        return sum(phase.time(part) for phase, part in self.split(x))
 
     end_time = objective
     free_time = objective
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the time, (v,)."""
-        return np.concatenate([own.gradient(part) for own, part in self._split(x)])
+        return np.concatenate([own.gradient(part) for own, part in self.split(x)])
 
     def curvature(self, _x: np.ndarray) -> None:
         """Nothing of the Hessian is known."""
@@ -439,27 +429,23 @@ class PathProgram:
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError where there are none."""
         before, after = x[self._pairs].T
-        rows = [own.rows(part) for own, part in self._split(x)]
+        rows = [own.rows(part) for own, part in self.split(x)]
         return np.concatenate([*rows, before - after])
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,); raises as `rows` does."""
-        entries = [own.jacobian(part) for own, part in self._split(x)]
+        entries = [own.jacobian(part) for own, part in self.split(x)]
         return np.concatenate([*entries, np.tile([1.0, -1.0], len(self._pairs))])
-
-    def safeguard_slack(self, x: np.ndarray) -> float:
-        """Smallest distance of a safeguard from its bound; infinite without safeguards."""
-        return smallest_slack(own.evaluate(part) for own, part in self._split(x))
 
     def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Take s and the redundant curves of all phases at many places, (S, c) each."""
-        return tuple(own.curves(part) for own, part in self._split(x))
+        return tuple(own.curves(part) for own, part in self.split(x))
 
     def timings(
         self, x: np.ndarray, places: int, *, is_rough: bool
     ) -> tuple[PhaseTiming, ...]:
         """Time the joint paths of all phases anew, as `PhaseTiming.along` does."""
-        courses = [partial(own.course, part) for own, part in self._split(x)]
+        courses = [partial(own.course, part) for own, part in self.split(x)]
         pairs = zip(self.phases, courses, strict=True)
         return tuple(
             PhaseTiming.along(own.phase, course, own.ends, places, is_rough=is_rough)

@@ -14,6 +14,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -104,7 +105,62 @@ def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
     return np.array([own[point] for own in phase.state(x).curves])
 
 
-class Program(Summary):
+class _HasVariables(Protocol):
+    """A phase of any program."""
+
+    x_lower: np.ndarray
+    x_upper: np.ndarray
+
+    def evaluate(self, x: np.ndarray) -> Evaluation:
+        """Evaluate joint motion and limits at the phase's variables, (v,)."""
+
+
+_Phase = TypeVar("_Phase", bound=_HasVariables)
+
+
+class PhaseSequence(Generic[_Phase]):
+    """Phases one after the other, and the variables of all of them.
+
+    Parameters
+    ----------
+    phases : iterable of Phase or PathPhase
+
+    Attributes
+    ----------
+    phases : tuple of Phase or PathPhase
+    x_lower, x_upper : (v,) ndarray
+        Bounds of the variables.
+    first_variables : list of int
+        Index of the first variable of every phase.
+    """
+
+    def __init__(self, phases: Iterable[_Phase]) -> None:
+        self.phases = tuple(phases)
+        first = np.cumsum([0, *(len(own.x_lower) for own in self.phases)]).tolist()
+        self.first_variables = first[:-1]
+        self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
+        self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
+        self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+
+    def split(self, x: np.ndarray) -> list[tuple[_Phase, np.ndarray]]:
+        """Every phase, and its part of x."""
+        pairs = zip(self.phases, self._parts, strict=True)
+        return [(phase, x[part]) for phase, part in pairs]
+
+    def safeguard_slack(self, x: np.ndarray) -> float:
+        """Smallest distance of a safeguard from its bound; infinite without safeguards.
+
+        Raises
+        ------
+        UnreachableError
+            A collocation point is out of the branch's reach.
+        """
+        states = [phase.evaluate(part) for phase, part in self.split(x)]
+        violations = [state.violation(is_safeguard) for state in states]
+        return -float(max(own.max(initial=-np.inf) for own in violations))
+
+
+class Program(PhaseSequence[Phase], Summary):
     """The NLP as functions of x; what a solver sees.
 
     Parameters
@@ -142,17 +198,12 @@ class Program(Summary):
         links: Sequence[Link] = (),
         objective: Objective | None = None,
     ) -> None:
-        self.phases = tuple(phases)
+        super().__init__(phases)
         self.links = tuple(links)
         self.minimised = objective or EndTime()
-        first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
-        self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
-        self._durations = first[:-1]
-        self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
-        self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+        durations = self.first_variables
         longest = np.broadcast_to(self.minimised.longest, len(self.phases))
-        given = self.x_upper[self._durations]
-        self.x_upper[self._durations] = np.minimum(given, longest)
+        self.x_upper[durations] = np.minimum(self.x_upper[durations], longest)
         self.means = Means(self.phases[0].limits)
         blocks: tuple[Phase | Means, ...] = (*self.phases, self.means)
         sizes = [link.size for link in self.links]
@@ -167,14 +218,13 @@ class Program(Summary):
     @cached_property
     def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of the entries of the Jacobian; of many programs nobody asks for them."""
-        count = self.variables
+        firsts = self.first_variables
         patterns = [
             (phase.jacobian_rows, phase.jacobian_columns + first)
-            for phase, first in zip(self.phases, self._durations, strict=True)
+            for phase, first in zip(self.phases, firsts, strict=True)
         ]
-        of_means = np.indices((len(self.means), count)).reshape(2, -1)
+        of_means = np.indices((len(self.means), self.variables)).reshape(2, -1)
         patterns.append((of_means[0], of_means[1]))
-        firsts = self._durations
         patterns += [link.pattern(self.phases, firsts) for link in self.links]
         pairs = zip(patterns, self._first_rows, strict=False)
         rows = [rows + first for (rows, _), first in pairs]
@@ -217,15 +267,10 @@ class Program(Summary):
         """Number of collocation points of all phases."""
         return sum(len(phase.t_norm) for phase in self.phases)
 
-    def split(self, x: np.ndarray) -> list[tuple[Phase, np.ndarray]]:
-        """Every phase, and its part of x."""
-        pairs = zip(self.phases, self._parts, strict=True)
-        return [(phase, x[part]) for phase, part in pairs]
-
     def end_time(self, x: np.ndarray) -> float:
         """End time t_E, s: the sum of the durations and the pauses."""
         pauses = sum(phase.pause for phase in self.phases)
-        return float(sum(x[first] for first in self._durations) + pauses)
+        return float(sum(x[first] for first in self.first_variables) + pauses)
 
     def free_time(self, x: np.ndarray) -> float:
         """Sum of the durations that are not given, s."""
@@ -397,20 +442,7 @@ class Program(Summary):
         own = filter(is_safeguard, self.limits)
         return tuple(float(bound) for limit in own for bound in limit.lower)
 
-    def safeguard_slack(self, x: np.ndarray) -> float:
-        """Smallest distance of a safeguard from its bound; infinite without safeguards.
-
-        Raises UnreachableError as `states` does.
-        """
-        return smallest_slack(phase.evaluate(part) for phase, part in self.split(x))
-
 
 def is_safeguard(limit: Limit) -> bool:
     """Tell whether a limit only keeps the solve on its branch."""
     return limit.role is Role.SAFEGUARD
-
-
-def smallest_slack(evaluations: Iterable[Evaluation]) -> float:
-    """Smallest distance of a safeguard from its bound; infinite without safeguards."""
-    violations = (own.violation(is_safeguard) for own in evaluations)
-    return -float(max(own.max(initial=-np.inf) for own in violations))
