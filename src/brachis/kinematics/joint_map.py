@@ -260,12 +260,13 @@ class JointSpaceMap(JointMap):
 
     def state(self, *curves: np.ndarray, **_others: object) -> JointSpaceState:
         """Return the motion along the path; in which turns joints are, it says itself."""
-        y, ydot, yddot, _ = curves
+        y, ydot, yddot, ydddot = curves
         path = self.path.sample(y[:, 0])
         qdot = path.xi * ydot
         qddot = path.xi * yddot + path.xi_ds * ydot**2
         gradient = path.xi[:, :, None]
-        return JointSpaceState(self, *curves, path.target, qdot, qddot, gradient, path)
+        found = (path.target, qdot, qddot, gradient)
+        return JointSpaceState(self, y, ydot, yddot, ydddot, *found, path)
 
     def derivatives(self, state: JointSpaceState) -> JointDerivatives:
         """Return the exact derivatives; see the formulas above."""
@@ -302,8 +303,9 @@ class DirectJointMap(JointMap):
 
     def state(self, *curves: np.ndarray, **_others: object) -> JointState:
         """Return the curves as the motion; in which turns joints are, they say themselves."""
-        gradient = np.broadcast_to(np.eye(self.r), (len(curves[0]), self.r, self.r))
-        return JointState(self, *curves, *curves[:3], gradient)
+        y, ydot, yddot, ydddot = curves
+        gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))
+        return JointState(self, y, ydot, yddot, ydddot, y, ydot, yddot, gradient)
 
     def derivatives(self, state: JointState) -> JointDerivatives:
         """Return zeros: all derivatives but G vanish."""

@@ -191,7 +191,7 @@ class PathMap(JointMap):
 
         Without `t` and `near`, successive times must be so close that no joint turns by pi in between.
         """
-        y, ydot, yddot, _ = curves
+        y, ydot, yddot, ydddot = curves
         sample = self.sample_at(y[:, 0])
         given = {
             "y": y,
@@ -211,7 +211,7 @@ class PathMap(JointMap):
         if fault is not None:
             raise UnreachableError(self.faults[fault])
         found = (motion.q, motion.qdot, motion.qddot, motion.gradient)
-        return PathState(self, *curves, *found, motion)
+        return PathState(self, y, ydot, yddot, ydddot, *found, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from brachis.common.arrays import cut
 from brachis.kinematics import ChartMap, Nodes, interpolate, join_nodes
-from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
@@ -98,14 +97,11 @@ class _Part:
 
     def wait(self) -> _Part:
         """Wait at rest where this part ends."""
-        degree = self.spline.degree
-        knots = clamped_knots(degree, np.array([0.0, 1.0]))
-        points = np.repeat(self.spline.control_points[:, -1:], degree + 1, axis=1)
         q = np.tile(self.nodes.q[-1], (2, 1))
         still = np.zeros_like(q)
         times = np.array([0.0, self.pause])
         nodes = Nodes(times, q, still, still, still)
-        return _Part(PhaseSpline(self.pause, knots, degree, points), nodes)
+        return _Part(self.spline.wait(self.pause), nodes)
 
 
 def _join(program: Program, x: np.ndarray) -> list[Motion]:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import bisect, drop_near, greville, spread
-from brachis.common.summary import Summary
+from brachis.common.arrays import drop_near, greville, spread
 from brachis.errors import UnreachableError
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import ORDERS, clamped_knots, insert_knots, local_basis
@@ -48,8 +47,8 @@ def follow_law(
 
 
 @dataclass(frozen=True, repr=False)
-class Motion(Summary):
-    """A point x of a phase as curves.
+class Motion(PhaseSpline):
+    """A point x of a phase as curves. Where a time law gives s(t), s has no spline.
 
     Attributes
     ----------
@@ -64,10 +63,6 @@ class Motion(Summary):
         s(t) where it is given.
     """
 
-    t_end: float
-    knots: np.ndarray
-    degree: int
-    control_points: np.ndarray
     time_law: TimeLaw | None = None
 
     @property
@@ -144,8 +139,3 @@ class Motion(Summary):
             middles = 0.5 * (breaks[:-1] + breaks[1:])
             breaks = np.union1d(breaks, middles[worst >= _S_MISS])
         raise UnreachableError("the given speed changes too sharply for splines")
-
-    def times_of(self, s: np.ndarray) -> np.ndarray:
-        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        end = np.full(len(s), self.t_end)
-        return bisect(lambda t: self.at(t)[0][:, 0] < s, end)

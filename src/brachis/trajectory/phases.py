@@ -62,6 +62,12 @@ class PhaseSpline(Summary):
         end = np.full(len(s), self.t_end)
         return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
+    def wait(self, duration: float) -> PhaseSpline:
+        """Return curves that stay where these end, for a duration, s."""
+        knots = np.repeat([0.0, 1.0], self.degree + 1)
+        points = np.repeat(self.control_points[:, -1:], self.degree + 1, axis=1)
+        return PhaseSpline(duration, knots, self.degree, points)
+
 
 @dataclass(frozen=True)
 class MotionPhase:

@@ -260,14 +260,11 @@ class Sensitivity:
         """What is limited, and the figure's unit."""
         return self.limit.labels[self.bound.column]
 
-    @property
-    def outwards(self) -> float:
-        """Sign of a change of the figure that leaves more room."""
-        return _outwards(self.bound)
-
     def change(self, fraction: float) -> float:
         """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
-        return self.outwards * self.derivative * self.bound.full_scale * fraction
+        return (
+            _outwards(self.bound) * self.derivative * self.bound.full_scale * fraction
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""

@@ -206,11 +206,8 @@ def _join_coordinate(
     """Return knots and control points of s over time, which stays where it is during the waits; see `join_splines`."""
     at_rest, _ = nodes.at_rest
     splines = [fit_coordinate(*followed.parts[0], at_rest=at_rest)]
-    clamped = np.repeat([0.0, 1.0], DEGREE + 1)
     for (first, end), (t, s) in zip(followed.rests, followed.parts[1:], strict=True):
-        duration = nodes.t[end] - nodes.t[first]
-        waiting = np.full((1, DEGREE + 1), s[0])
-        splines.append(PhaseSpline(duration, clamped, DEGREE, waiting))
+        splines.append(splines[-1].wait(nodes.t[end] - nodes.t[first]))
         splines.append(fit_coordinate(t, s, at_rest=at_rest))
     return join_splines(splines)
 
