@@ -27,12 +27,12 @@ from brachis.apps.bottleneck.sensitivities import (
     Sensitivities,
     Sensitivity,
     multipliers_of,
-    rows_and_jacobian,
     sensitivities,
 )
 from brachis.common.summary import Summary
 from brachis.errors import PlanningError, UnreachableError
 from brachis.optimise.backends import SolverOptions, residual, solvers_for
+from brachis.optimise.backends.active_set import jacobian_matrix
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 
@@ -244,7 +244,8 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     from scipy import sparse
     from scipy.optimize import linprog
 
-    rows, jacobian = rows_and_jacobian(program, x)
+    rows = program.rows(x)
+    jacobian = jacobian_matrix(program, program.jacobian(x))
     slopes = sparse.vstack([-jacobian, jacobian], format="csr")
     room = np.concatenate([rows - program.lower, program.upper - rows])
     # Directions that change nothing to first order are not followed without end.
