@@ -402,7 +402,9 @@ def refine(
         if is_same or options.deadline.passed:
             break
         report = solve(finer, answer)
-        if not report.status.usable and not _still_good(report, reports[-1]):
+        # A solve that ended early may have left a motion about as fast as the one before.
+        is_as_fast = report.objective <= reports[-1].objective * (1.0 + _LONGEST)
+        if not (report.status.usable or (report.feasible and is_as_fast)):
             break
         program = finer
         reports.append(report)
@@ -413,11 +415,6 @@ def refine(
     return SolvedProgram(
         program, tuple(reports), violation=remaining, time_scaled=factor
     )
-
-
-def _still_good(report: SolverReport, before: SolverReport) -> bool:
-    """Tell whether a solve that ended early left a feasible motion about as fast as the one before it."""
-    return report.feasible and report.objective <= before.objective * (1.0 + _LONGEST)
 
 
 def _lengthen(
