@@ -61,6 +61,27 @@ def test_a_given_end_moves_it(result):
     assert moved.trajectory.q[-1, 6] == pytest.approx(end[6])
 
 
+def test_it_stands_still_in_named_postures_too():
+    """On the way only the place of the tool counts, not the idle joint of the posture."""
+    named = {"home": START, "other": [0.3, 0.7, 0.2, -1.2, 0.4, 0.9, -0.7]}
+    path = [
+        brachis.Line(to_posture="other", stop=True),
+        brachis.Line(to_posture="home"),
+    ]
+    result = brachis.plan(
+        "iiwa14",
+        start="home",
+        postures=named,
+        task_space="position",
+        path=path,
+        intervals=10,
+        **QUICK,
+    )
+    assert result.verified
+    np.testing.assert_array_equal(result.trajectory.q[:, 6], START[6])
+    assert result.candidate.origin == HELD
+
+
 def test_limits_and_friction_by_joint_hold_for_the_others():
     """An axis of the gantry stands still; the other one needs 2 sqrt(L / a)."""
     lists = {"acceleration": [3.0, 2.0], "torque": None, "velocity": None}

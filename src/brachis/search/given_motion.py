@@ -34,7 +34,7 @@ from brachis.robot.task_map import JointSpace
 from brachis.search.candidates import SELECTABLE
 from brachis.search.schedule import has_charts
 from brachis.search.starts import FAMILY, bring_onto_path
-from brachis.task import Task, Tolerances
+from brachis.task import Posture, Task, Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
@@ -138,15 +138,21 @@ def lock_idle(
         return None
     positions = {robot.joint_names[i]: float(still[i]) for i in idle}
     robot = lock_joints(robot, positions)
-    changes: dict[str, object] = {"robot": robot.settings}
+
+    def narrow(posture: np.ndarray) -> tuple[float, ...]:
+        return tuple(np.delete(posture[:count], idle).tolist())
+
+    named = {
+        name: narrow(task_map.robot.posture(joints, f"postures.{name}"))
+        for name, joints in task.postures.items()
+    }
+    changes: dict[str, object] = {"robot": robot.settings, "postures": named}
     for key, posture in postures.items():
-        given = getattr(task, key)
-        if given != "free":
-            joints = tuple(np.delete(posture[:count], idle).tolist())
-            changes[key] = given.model_copy(update={"joints": joints})
+        if getattr(task, key) != "free":
+            changes[key] = Posture(joints=narrow(posture))
     if task.redundant_joints != "auto":
-        named = [name for name in task.redundant_joints if name not in positions]
-        changes["redundant_joints"] = tuple(named) or "auto"
+        moving = [name for name in task.redundant_joints if name not in positions]
+        changes["redundant_joints"] = tuple(moving) or "auto"
     return robot, task.model_copy(update=changes)
 
 
