@@ -133,6 +133,23 @@ def test_joints_with_several_coordinates_cannot_be_planned_for(tmp_path, joint):
 
 
 @pytest.mark.parametrize(
+    ("actuator", "torque", "text"),
+    [
+        ('<position joint="k" ctrlrange="0 1.5" forcerange="-80 80"/>', 80.0, "laws"),
+        ('<motor joint="k" ctrlrange="0 1" gear="50"/>', np.inf, "torque limits of 0"),
+        ('<motor joint="k" ctrlrange="-1 2" gear="50"/>', 50.0, ""),
+    ],
+)
+def test_ranges_of_actuators_that_begin_at_zero(tmp_path, actuator, torque, text):
+    arm = f"""<mujoco><worldbody><body name="b"><joint name="k" axis="1 0 0"/><geom size="0.1"/></body></worldbody>
+      <actuator>{actuator}</actuator></mujoco>"""
+    limits = {"velocity": 1.0, "acceleration": 1.0}
+    robot, warning = read(tmp_path, arm, limits=limits)
+    assert robot.limits.torque == pytest.approx([torque])
+    assert text in warning
+
+
+@pytest.mark.parametrize(
     ("text", "expected"),
     [
         ("<mujoco><worldbody><bdy/></worldbody></mujoco>", "unrecognized"),

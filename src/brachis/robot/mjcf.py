@@ -72,6 +72,7 @@ def _list_omitted(compiled: Any) -> list[str]:
         "gravity compensation of bodies": np.count_nonzero(compiled.body_gravcomp),
         "actuators that act on no joint": np.count_nonzero(~is_on_joint),
         "control laws of actuators": np.count_nonzero(compiled.actuator_biastype),
+        "torque limits of 0": np.count_nonzero(_effort_limits(compiled) == 0.0),
     }
     gravity = compiled.opt.gravity.tolist()
     if gravity != [0.0, 0.0, -9.81]:
@@ -158,9 +159,11 @@ def _effort_limits(compiled: Any) -> np.ndarray:
     """Return the largest force or torque of every joint, (njnt,), N or Nm; infinite where it is not limited."""
     forces = _smaller_side(compiled.actuator_forcerange, compiled.actuator_forcelimited)
     controls = _smaller_side(compiled.actuator_ctrlrange, compiled.actuator_ctrllimited)
+    gains = np.abs(compiled.actuator_gainprm[:, 0])
     is_motor = (compiled.actuator_gaintype == 0) & (compiled.actuator_biastype == 0)
-    controls *= np.where(is_motor, np.abs(compiled.actuator_gainprm[:, 0]), np.inf)
-    efforts = np.minimum(forces, controls) * np.abs(compiled.actuator_gear[:, 0])
+    is_motor &= gains > 0.0
+    forces[is_motor] = np.minimum(forces, controls * gains)[is_motor]
+    efforts = forces * np.abs(compiled.actuator_gear[:, 0])
     is_on_joint = compiled.actuator_trntype <= _ON_JOINT
     joints = compiled.actuator_trnid[is_on_joint, 0]
     summed = np.zeros(compiled.njnt)
