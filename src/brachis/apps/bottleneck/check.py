@@ -241,29 +241,18 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    from scipy import sparse
-    from scipy.optimize import linprog
+    from scipy.optimize import Bounds, LinearConstraint, milp
 
     rows = program.rows(x)
     jacobian = jacobian_matrix(program, program.jacobian(x))
-    slopes = sparse.vstack([-jacobian, jacobian], format="csr")
-    room = np.concatenate([rows - program.lower, program.upper - rows])
+    limits = LinearConstraint(jacobian, program.lower - rows, program.upper - rows)
     # Directions that change nothing to first order are not followed without end.
     lowest = np.clip(program.x_lower - x, -1.0, 0.0)
     highest = np.clip(program.x_upper - x, 0.0, 1.0)
-    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
-    gradient = program.gradient(x)
-    kept = room < 0.1  # rows farther from their bounds are left out at first
-    while True:
-        found = linprog(
-            gradient, A_ub=slopes[kept].toarray(), b_ub=room[kept], bounds=bounds
-        )
-        if not found.success:
-            return None
-        overrun = slopes @ found.x > room + 1e-9
-        if not (overrun & ~kept).any():
-            return float(gradient @ found.x)
-        kept |= overrun
+    bounds = Bounds(lowest, highest)
+    # SciPy's solver for sparse rows with two bounds; no variable is an integer.
+    step = milp(program.gradient(x), bounds=bounds, constraints=limits)
+    return float(step.fun) if step.success else None
 
 
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
