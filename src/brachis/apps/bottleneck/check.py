@@ -26,13 +26,13 @@ from threadpoolctl import ThreadpoolController
 from brachis.apps.bottleneck.sensitivities import (
     Sensitivities,
     Sensitivity,
+    jacobian_matrix,
     multipliers_of,
     sensitivities,
 )
 from brachis.common.summary import Summary
 from brachis.errors import PlanningError, UnreachableError
 from brachis.optimise.backends import SolverOptions, residual, solvers_for
-from brachis.optimise.backends.active_set import jacobian_matrix
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 
@@ -244,7 +244,7 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     from scipy.optimize import Bounds, LinearConstraint, milp
 
     rows = program.rows(x)
-    jacobian = jacobian_matrix(program, program.jacobian(x))
+    jacobian = jacobian_matrix(program, x)
     limits = LinearConstraint(jacobian, program.lower - rows, program.upper - rows)
     # Directions that change nothing to first order are not followed without end.
     lowest = np.clip(program.x_lower - x, -1.0, 0.0)
