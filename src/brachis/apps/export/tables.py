@@ -10,10 +10,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-from typing import Annotated, Any, BinaryIO, Final, Literal
+from typing import Any, BinaryIO, Final
 
 import numpy as np
-from pydantic import BaseModel, Field, PositiveFloat
 
 from brachis.apps.export.rows import JointRows, require_library
 
@@ -53,48 +52,114 @@ def write_parquet(rows: JointRows, stream: BinaryIO) -> None:
 SCHEMA_ID: Final = "urn:brachis:joint-trajectory:1"
 
 
-_Numbers = Annotated[list[float], Field(min_length=2)]
-_Rows = Annotated[
-    list[Annotated[list[float], Field(min_length=1)]], Field(min_length=2)
-]
-
-
-class _Samples(BaseModel, extra="forbid", title="samples"):
-    """Motion at the times of an exported file."""
-
-    t: _Numbers = Field(description="s")
-    s: _Numbers = Field(description="path coordinate, 0 to 1")
-    q: _Rows = Field(
-        description="positions, rad or m, a row for each t, a column for each joint"
-    )
-    qdot: _Rows = Field(description="velocities, rad/s or m/s")
-    qddot: _Rows = Field(description="accelerations, rad/s^2 or m/s^2")
-    tau: _Rows = Field(
-        default=[],
-        description="torques, Nm, or forces, N; absent if the URDF has no masses",
-    )
-
-
-class _JointTrajectory(BaseModel, extra="forbid", title="A joint trajectory"):
-    """A joint trajectory written by brachis."""
-
-    schema_id: Literal["urn:brachis:joint-trajectory:1"] = Field(alias="$schema")
-    joint_names: list[str] = Field(
-        min_length=1, description="Joints in the order of the columns."
-    )
-    position_units: list[Literal["rad", "m"]] = Field(
-        min_length=1, description="Unit of every joint's position."
-    )
-    t_end: PositiveFloat = Field(description="End time, s.")
-    dt: PositiveFloat = Field(description="Period of the samples, s.")
-    warnings: list[str] = Field(description="Joints that move and are left out.")
-    samples: _Samples
+_SCHEMA: Final = """\
+{
+  "$schema": "https://json-schema.org/draft/2020-12/schema",
+  "$id": "urn:brachis:joint-trajectory:1",
+  "$defs": {
+    "_Samples": {
+      "additionalProperties": false,
+      "description": "Motion at the times of an exported file.",
+      "properties": {
+        "t": {
+          "description": "s",
+          "items": {"type": "number"},
+          "minItems": 2,
+          "title": "T",
+          "type": "array"
+        },
+        "s": {
+          "description": "path coordinate, 0 to 1",
+          "items": {"type": "number"},
+          "minItems": 2,
+          "title": "S",
+          "type": "array"
+        },
+        "q": {
+          "description": "positions, rad or m, a row for each t, a column for each joint",
+          "items": {"items": {"type": "number"}, "minItems": 1, "type": "array"},
+          "minItems": 2,
+          "title": "Q",
+          "type": "array"
+        },
+        "qdot": {
+          "description": "velocities, rad/s or m/s",
+          "items": {"items": {"type": "number"}, "minItems": 1, "type": "array"},
+          "minItems": 2,
+          "title": "Qdot",
+          "type": "array"
+        },
+        "qddot": {
+          "description": "accelerations, rad/s^2 or m/s^2",
+          "items": {"items": {"type": "number"}, "minItems": 1, "type": "array"},
+          "minItems": 2,
+          "title": "Qddot",
+          "type": "array"
+        },
+        "tau": {
+          "default": [],
+          "description": "torques, Nm, or forces, N; absent if the URDF has no masses",
+          "items": {"items": {"type": "number"}, "minItems": 1, "type": "array"},
+          "minItems": 2,
+          "title": "Tau",
+          "type": "array"
+        }
+      },
+      "required": ["t", "s", "q", "qdot", "qddot"],
+      "title": "samples",
+      "type": "object"
+    }
+  },
+  "additionalProperties": false,
+  "description": "A joint trajectory written by brachis.",
+  "properties": {
+    "$schema": {"const": "urn:brachis:joint-trajectory:1", "title": "$Schema", "type": "string"},
+    "joint_names": {
+      "description": "Joints in the order of the columns.",
+      "items": {"type": "string"},
+      "minItems": 1,
+      "title": "Joint Names",
+      "type": "array"
+    },
+    "position_units": {
+      "description": "Unit of every joint's position.",
+      "items": {"enum": ["rad", "m"], "type": "string"},
+      "minItems": 1,
+      "title": "Position Units",
+      "type": "array"
+    },
+    "t_end": {
+      "description": "End time, s.",
+      "exclusiveMinimum": 0,
+      "title": "T End",
+      "type": "number"
+    },
+    "dt": {
+      "description": "Period of the samples, s.",
+      "exclusiveMinimum": 0,
+      "title": "Dt",
+      "type": "number"
+    },
+    "warnings": {
+      "description": "Joints that move and are left out.",
+      "items": {"type": "string"},
+      "title": "Warnings",
+      "type": "array"
+    },
+    "samples": {"$ref": "#/$defs/_Samples"}
+  },
+  "required": ["$schema", "joint_names", "position_units", "t_end", "dt", "warnings", "samples"],
+  "title": "A joint trajectory",
+  "type": "object"
+}
+"""
+"""The JSON schema of exported trajectories, draft 2020-12."""
 
 
 def samples_schema() -> dict[str, Any]:
     """Return the JSON schema of exported trajectories, draft 2020-12; also ``brachis schema --of trajectory``."""
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, "$id": SCHEMA_ID, **_JointTrajectory.model_json_schema()}
+    schema: dict[str, Any] = json.loads(_SCHEMA)
+    return schema
 
 
 def write_json(rows: JointRows, stream: BinaryIO) -> None:
