@@ -155,9 +155,11 @@ def test_speeds_of_segments_and_of_parts() -> None:
     given = problem([RIGHT, SEAM, RIGHT], part(0.3, 0.1, 0.2))
     assert [leg.speed for leg in given.legs] == [None, 0.3, None, 0.1, None]
     assert [part.segment for part in given.task.tool_limits.process_speed] == [None, 1]
-    with pytest.raises(TaskError, match="overlap, meet or are out of order"):
+    with pytest.raises(TaskError, match=r"a begin of path\[1\]\.speed above 0\.5"):
         problem([RIGHT, SEAM, RIGHT], part(0.3, 0.3, 0.5))
-    with pytest.raises(TaskError, match=r"largest speed is below the process speed"):
+    with pytest.raises(
+        TaskError, match=r"largest speed is below the process speed of path\[1\]\.speed"
+    ):
         problem([RIGHT, SEAM], limits={"speed": 0.05})
     (short,) = (leg for leg in problem([{**RIGHT, "speed": 2.0}]).legs if leg.speed)
     assert (short.begin, short.end) == pytest.approx((0.25, 0.75))

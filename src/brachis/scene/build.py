@@ -135,8 +135,10 @@ MANY_POSTURES = 2000
 
 def find_never_free(scene: Scene, robot: Robot, clearance: float) -> Scene:
     """Return the scene with the pairs that keep the clearance, m, in none of `MANY_POSTURES` random postures."""
-    few = scene.with_pairs(_always_closer(scene, robot, clearance, _POSTURES))
-    return few.with_pairs(_always_closer(few, robot, clearance, MANY_POSTURES))
+    suspects = scene.with_pairs(_always_closer(scene, robot, clearance, _POSTURES))
+    return suspects.with_pairs(
+        _always_closer(suspects, robot, clearance, MANY_POSTURES)
+    )
 
 
 def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:

@@ -74,7 +74,7 @@ def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
         first, last = np.interp([leg.begin, leg.end], s, steps)
         least = min(count, _LEAST_STATIONS)
         share = (last - first) / steps[-1]
-        own = max(least, math.ceil((count - 1) * share - 1e-6) + 1)
-        inner = np.interp(np.linspace(first, last, own)[1:-1], steps, s)
+        on_leg = max(least, math.ceil((count - 1) * share - 1e-6) + 1)
+        inner = np.interp(np.linspace(first, last, on_leg)[1:-1], steps, s)
         parts.append(np.append(inner, leg.end))
     return np.concatenate(parts)

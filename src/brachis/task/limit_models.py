@@ -291,6 +291,11 @@ class ProcessSpeed(Model):
     segment: Count | None = None
     """Index of the segment whose speed this is; written by brachis."""
 
+    @property
+    def origin(self) -> str:
+        """Words for messages: of which segment it is, if of any."""
+        return "" if self.segment is None else f" of path[{self.segment}].speed"
+
 
 class ToolLimits(CheckedModel):
     """Limits on the motion of the tool itself, also where tolerances let it leave its path."""
@@ -322,14 +327,15 @@ class ToolLimits(CheckedModel):
                 yield (
                     f"process_speed[{number}].s",
                     "the parts of the path overlap, meet or are out of order",
-                    f"a begin above {end:g}, the end of the part before; the speed changes in the gap",
+                    f"a begin{part.origin} above {end:g}, the end of the part before{before.origin}; the speed changes "
+                    "in the gap",
                 )
         for number, part in enumerate(self.process_speed):
             cap = _least_between(self.speed, part.s)
             if cap is not None and cap < part.speed:
                 yield (
                     f"process_speed[{number}].speed",
-                    "the tool's largest speed is below the process speed",
+                    f"the tool's largest speed is below the process speed{part.origin}",
                     f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )
 
