@@ -327,8 +327,7 @@ class ToolLimits(CheckedModel):
                 yield (
                     f"process_speed[{number}].s",
                     "the parts of the path overlap, meet or are out of order",
-                    f"a begin{part.origin} above {end:g}, the end of the part before{before.origin}; the speed changes "
-                    "in the gap",
+                    f"a begin{part.origin} above {end:g}, the end of the part{before.origin} before it, with a gap",
                 )
         for number, part in enumerate(self.process_speed):
             cap = _least_between(self.speed, part.s)
