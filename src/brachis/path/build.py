@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from brachis.common import tolerances
 from brachis.common.words import write_apart
@@ -14,6 +13,7 @@ from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoord
 from brachis.path.joins import find_joins, refuse_corners
 from brachis.path.pose import OrientedPath, PosePath, rotations
 from brachis.path.protocol import Array, Curve
+from brachis.path.rotations import rotation_of
 from brachis.path.sequence import Path, PathFrame, Piece
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import principal
@@ -117,7 +117,7 @@ def _line_to(
 ) -> Segment:
     """Return a line to a posture as the line from `start` to its `place`, (c,), the shorter way round."""
     if rows[-3:] == TURN_ROWS:
-        turn = Rotation.from_matrix(rotations(place))
+        turn = rotation_of(rotations(place))
         target = Target(quaternion_wxyz=tuple(quaternions_of(turn).tolist()))
         orientation = TurnTo(to=target)
         place = place[:-9]
