@@ -127,6 +127,8 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     step = 2.0 * np.diff(t)[0]
     is_held &= np.roll(is_held, 3) & np.roll(is_held, -3)
     np.testing.assert_allclose(speeds[is_held], speed, rtol=1e-6)
+    is_behind = (x > 0.021) & (x < 0.599)
+    assert speeds[is_behind].max() < speed * (1.0 + 1e-3), "faster in a lead"
     assert is_held.sum() * step > 0.5 * 0.5 / speed
     (check,) = (c for c in result.verification.checks if c.name == "process speed")
     assert check.passed

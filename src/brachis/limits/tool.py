@@ -183,7 +183,7 @@ def _label(quantity: str, unit: str) -> Label:
 
 
 def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one, or whose path has feed rates."""
+    """Build the limit of a task that has one, or whose path has feed rates or leads to process speeds."""
     speed = task.tool_limits.speed
     tables = []
     labels = []
@@ -194,10 +194,16 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
             else SpeedTable([0.0], [speed])
         )
         labels.append(_label("speed", "m/s"))
-    for part in task.tool_limits.feed:
-        tables.append(SpeedTable(part.s, part.speed, whole=False))
-        where = f"tool, s = {part.s[0]:g} to {part.s[-1]:g},"
-        labels.append(Label(where, "feed rate", "m/s", "tool_limits.feed"))
+    limits = task.tool_limits
+    leads = [lead for part in limits.process_speed for lead in part.leads]
+    for quantity, key, parts in (
+        ("feed rate", "feed", limits.feed),
+        ("speed of a lead", "process_speed", leads),
+    ):
+        for part in parts:
+            tables.append(SpeedTable(part.s, part.speed, whole=False))
+            where = f"tool, s = {part.s[0]:.4g} to {part.s[-1]:.4g},"
+            labels.append(Label(where, quantity, "m/s", f"tool_limits.{key}"))
     return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 
 

@@ -83,7 +83,8 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
 
     Segments of the same speed are one part, with the blends between them. Parts are cut at stops. They leave leads, in
     which the speed changes, at stops, at ends of the path that are not passed at their speed, and where they follow
-    another part at once. Leads take up no more than half of a part.
+    another part at once. Leads take up no more than half of a part, and in them the tool is no faster than in the part,
+    unless it comes from or goes on at a higher speed.
 
     Raises
     ------
@@ -118,7 +119,13 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
                 1.0, 0.5 * (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
             )
             s = (ends[0] + share * leads[0], ends[1] - share * leads[1])
-            held.append(part.model_copy(update={"s": s}))
+            changes: dict[str, object] = {"s": s}
+            if any(leads):
+                changes["within"] = (
+                    ends[0] if before.get(ends[0], 0.0) <= speed else s[0],
+                    ends[1] if after.get(ends[1], 0.0) <= speed else s[1],
+                )
+            held.append(part.model_copy(update=changes))
     held.sort(key=lambda part: part.s)
     changed = limits.model_copy(update={"process_speed": tuple(held)})
     checked = validate(ToolLimits, changed, "tool_limits")

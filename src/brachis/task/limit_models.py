@@ -287,9 +287,20 @@ class ProcessSpeed(Model):
     ]
     """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
     allow. At stops, and at ends of the path that are not passed at this speed, the part is shorter by what the tool
-    moves in 0.1 s at the higher speed."""
+    moves in 0.1 s at the higher speed; there it is no faster, unless it comes from or goes on at a higher speed."""
     segment: Count | None = None
     """Index of the segment whose speed this is; written by brachis."""
+    within: tuple[Number, Number] | None = None
+    """[begin, end]: path coordinates between which the tool is no faster; written by brachis."""
+
+    @property
+    def leads(self) -> list[SpeedTable]:
+        """Largest speeds before and behind the part, where the tool is no faster."""
+        if self.within is None:
+            return []
+        sides = ((self.within[0], self.s[0]), (self.s[1], self.within[1]))
+        speeds = (self.speed, self.speed)
+        return [SpeedTable(s=side, speed=speeds) for side in sides if side[0] < side[1]]
 
     @property
     def origin(self) -> str:

@@ -356,10 +356,11 @@ def _spread(given: Given) -> Places:
 
 
 def list_speed_tables(task: Task) -> list[SpeedTable]:
-    """List the tool's largest speeds, and the feed rates of the path's points, that depend on s."""
+    """List the tool's largest speeds that depend on s: the task's, feed rates of points, those of leads to speeds."""
     limits = task.tool_limits
-    given = [limits.speed] if isinstance(limits.speed, SpeedTable) else []
-    return [*given, *limits.feed]
+    tables = [limits.speed] if isinstance(limits.speed, SpeedTable) else []
+    leads = [lead for part in limits.process_speed for lead in part.leads]
+    return [*tables, *limits.feed, *leads]
 
 
 def _check_count(count: int) -> None:
