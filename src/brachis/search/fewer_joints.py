@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.errors import BrachisError
+from brachis.errors import BrachisError, UrdfError
 from brachis.optimise.candidate import Candidate
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
@@ -68,7 +68,10 @@ def _hold_idle_joints(
 ) -> Candidate | None:
     """Plan again, from the best motion, with idle joints at rest; None where there are none, or moving them pays."""
     postures = problem.given_postures
-    idle = lock_idle(robot, problem.task, problem.task_map, postures)
+    try:
+        idle = lock_idle(robot, problem.task, problem.task_map, postures)
+    except UrdfError:  # they are outside of the ranges of the URDF, which the task widens
+        return None
     if idle is None:
         return None
     held = _plan_simpler(problem, *idle, best.trajectory, open_search, deadline)
