@@ -197,9 +197,12 @@ def test_neither_torque_nor_acceleration():
     with pytest.raises(LimitError) as caught:
         limits_of(torque={"j2": None})
     assert caught.value.joint == "j2"
-    assert caught.value.key == "robot.limits.torque.j2 or robot.limits.acceleration.j2"
+    assert caught.value.key == "robot.limits.acceleration.j2 or robot.limits.torque.j2"
     assert "neither a torque nor an acceleration limit" in str(caught.value)
     assert limits_of(torque={"j2": None}, acceleration={"j2": 5.0}).torque[1] == INF
+    with pytest.raises(LimitError) as caught:
+        limits_of(torque=None)
+    assert caught.value.key == "robot.limits.acceleration or robot.limits.torque"
 
 
 @pytest.mark.parametrize("effort", [None, 0.0])

@@ -212,10 +212,11 @@ def resolve_limits(
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
     free = [names[i] for i in np.flatnonzero(is_free)]
     if free:
+        joint = "" if len(free) == len(names) else f".{free[0]}"
         raise LimitError(
             "there is neither a torque nor an acceleration limit, so the end time would go to zero",
             joint=free[0],
-            key=f"robot.limits.torque.{free[0]} or robot.limits.acceleration.{free[0]}",
+            key=f"robot.limits.acceleration{joint} or robot.limits.torque{joint}",
             found=f"none for {', '.join(free)}",
             allowed="one of them; an effort of 0 in the URDF is no limit, and torque limits need its masses",
         )

@@ -235,7 +235,8 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
     """Return what a stated position, (p,), looks like if the tool is elsewhere: mm, or rows that are swapped."""
     if not np.abs(here - stated).max(initial=0.0) > _ROUNDED:
         return None
-    if np.abs(here - stated / 1000.0).max() <= _ROUNDED:
+    is_at_origin = np.abs(here).max() <= _ROUNDED
+    if not is_at_origin and np.abs(here - stated / 1000.0).max() <= _ROUNDED:
         return "The path looks like mm: divided by 1000 it is where the tool is"
     if len(here) > len(AXES):
         return None
