@@ -67,10 +67,12 @@ def test_a_run_up_that_is_too_short_is_refused_with_what_would_do(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     reason = (
         r"the process speed is too high for the x_axis acceleration limit: the path from s = 0 to 0\.1 is too short to "
-        r"get from rest to 0\.5 m/s; found 0\.5 m/s"
+        r"get from rest to 0\.5 m/s: that takes about ([\d.]+) m, and it is 0\.05 m long; found 0\.5 m/s"
     )
     with pytest.raises(brachis.PlanningError, match=reason) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
+    needed = float(re.search(reason, str(caught.value))[1])
+    assert needed == pytest.approx(0.125, rel=0.01)
     possible = np.sqrt(2.0 * 0.1 * LENGTH)
     most = allowed(caught.value)
     assert 0.9 * possible < most <= possible

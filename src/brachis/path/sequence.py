@@ -274,6 +274,16 @@ def tool_derivatives(task_map: TaskMap, path: Path, s: Array) -> Array:
     return np.stack([velocity, v_ds, v_dds])
 
 
+def tool_distance(task_map: TaskMap, path: Path) -> float:
+    """Return how far the tool moves along a path, m."""
+
+    def speeds(s: Array) -> Array:
+        """Return how far it moves per unit s, (K,), m."""
+        return np.linalg.norm(tool_derivatives(task_map, path, s)[0], axis=1)
+
+    return float(integrate(speeds, path.knots).sum())
+
+
 def check_closed(task_map: TaskMap, path: Path) -> None:
     """Refuse a path that does not end where, and as, it begins, to the second derivative.
 

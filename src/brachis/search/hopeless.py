@@ -20,10 +20,12 @@ from functools import cache, cached_property
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PlanningError, Remedy
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.motion import follow_law
 from brachis.path.legs import key_of_speed
+from brachis.path.sequence import tool_distance
 from brachis.problem.problem import Problem
 from brachis.search.holding import explain_holding
 from brachis.search.phase_plane import (
@@ -50,8 +52,6 @@ def refuse_hopeless(starts: Sequence[InitialGuess]) -> None:
     ------
     PlanningError
     """
-    if not starts:
-        return
     problem = starts[0].problem
     # Friction may help to hold the arm, and a motion between different speeds may be a fall: these are tried.
     if not _has_friction(problem).any() and not any(problem.end_rates):
@@ -277,15 +277,17 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         alone = ((each, check.lower_one(each, 0.9 * share)) for each in shares)
         lower = {each: _REACHED * own for each, own in alone if own is not None}
         shares = lower or dict.fromkeys(shares, _REACHED * share)
-        leg = min(
-            short,
-            key=lambda leg: _largest_share(
+
+        def reach(leg: int) -> float:
+            """Return the share of the speeds between which a leg leads."""
+            return _largest_share(
                 lambda own: check.pass_leg(leg, own * every) is not None, share, 1.0
-            ),
-        )
+            )
+
+        leg = min(short, key=reach)
         ends = [check.speed_at(leg, side) for side in (0, -1)]
         number = max(shares, key=lambda number: (number in ends, shares[number]))
-        why = _explain_short_leg(check, leg, share)
+        why = _explain_short_leg(check, leg, reach(leg))
     possible = {
         each: round_to_three_digits(own * check.speeds[each].figure, down=True)
         for each, own in shares.items()
@@ -310,16 +312,23 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
 
 
 def _explain_short_leg(check: _SpeedCheck, leg: int, share: float) -> str:
-    """Say between which speeds a leg is too short, and for which limit, if this share of all speeds is possible."""
+    """Say between which speeds a leg is too short, for which limit, and how long it has to be.
+
+    It leads between this share of the speeds: under a constant acceleration the length grows with their square.
+    """
     ends = [check.speed_at(leg, side) for side in (0, -1)]
     first, last = ("rest" if end is None else str(check.speeds[end]) for end in ends)
     timing = check.pass_leg(leg, np.full(len(check.speeds), share))
     assert timing is not None
     active = check.planes[leg].active_limit(timing.rate)
     part = check.problem.legs[leg]
+    length = tool_distance(check.problem.task_map, check.problem.leg_paths[leg])
+    needed = ""
+    if length > tolerances.LENGTH:
+        needed = f": that takes about {length / share**2:.3g} m, and it is {length:.3g} m long"
     return (
         f"for the {active} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
-        f"is too short to get from {first} to {last}"
+        f"is too short to get from {first} to {last}{needed}"
     )
 
 
