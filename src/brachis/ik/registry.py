@@ -299,7 +299,9 @@ class _Matcher:
             found = self._find(redundant)
             if len(_KNOWN) >= _MOST_KNOWN:
                 _KNOWN.clear()
-            if _lasts(found):
+            reasons = found.reasons.values()
+            # Not where a library is missing, or code of another package failed: that may change.
+            if not any(own.startswith((NOT_INSTALLED, _FAILED)) for own in reasons):
                 _KNOWN[key] = (self._families, found)
         return replace(found, reasons=dict(found.reasons))
 
@@ -368,12 +370,6 @@ _MOST_KNOWN = 256
 """Choices of redundant joints whose closed forms are kept."""
 _KNOWN: dict[tuple[object, ...], tuple[tuple[Family, ...], TriedDecomposition]] = {}
 """Closed forms, for their formulas have to be recorded once only; and families, whose ids are in the keys."""
-
-
-def _lasts(found: TriedDecomposition) -> bool:
-    """Tell whether an answer stays: no library was missing, and no code of another package failed."""
-    reasons = found.reasons.values()
-    return not any(own.startswith((NOT_INSTALLED, _FAILED)) for own in reasons)
 
 
 def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:

@@ -116,16 +116,15 @@ def _line_to(
     segment: Segment, place: Array, start: Array, rows: tuple[str, ...]
 ) -> Segment:
     """Return a line to a posture as the line from `start` to its `place`, (c,), the shorter way round."""
+    orientation = None
     if rows[-3:] == TURN_ROWS:
         turn = rotation_of(rotations(place))
         target = Target(quaternion_wxyz=tuple(quaternions_of(turn).tolist()))
         orientation = TurnTo(to=target)
         place = place[:-9]
-    else:
-        orientation = None
-        if rows[-1] in ANGLES:
-            angle = start[-1] + principal(place[-1] - start[-1])
-            place = np.append(place[:-1], angle)
+    elif rows[-1] in ANGLES:
+        angle = start[-1] + principal(place[-1] - start[-1])
+        place = np.append(place[:-1], angle)
     line = LineTo(to=tuple(place.tolist()))
     return segment.model_copy(update={"line": line, "orientation": orientation})
 
@@ -196,13 +195,13 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
         for name, joints in task.postures.items()
     }
     given_joints = task.joints_at("start")
-    if given_joints is None:
-        assert given is not None
-        return build_path(task.path, given, task_map.rows, frame, postures)
-    start = task_map.robot.posture(*given_joints)
-    if given is not None:
-        check_on_path(task_map, start, given, "start")
-    return build_path(task.path, task_map.value(start), task_map.rows, frame, postures)
+    if given_joints is not None:
+        start = task_map.robot.posture(*given_joints)
+        if given is not None:
+            check_on_path(task_map, start, given, "start")
+        given = task_map.value(start)
+    assert given is not None
+    return build_path(task.path, given, task_map.rows, frame, postures)
 
 
 def check_on_path(

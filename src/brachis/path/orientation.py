@@ -187,10 +187,6 @@ def orientation_along(
         up = np.array(given) / np.linalg.norm(given)
     elif isinstance(curve, ArcCurve):
         up = curve.normal
-    return _with_tangent(curve, up, start, key)
-
-
-def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> Orientation:
     sigma, speed = smallest(
         lambda sigma: np.linalg.norm(curve.derivatives(sigma, 1)[1], axis=1),
         curve.knots,

@@ -148,7 +148,7 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
         ("end.joints", problem.end),
     ):
         if given is not None:
-            issues += _positions(task_map.robot, key, given)
+            issues += of_postures(task_map.robot, key, given)
     if task_map.angles and task_map.angles[0] in ANGLES:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
@@ -157,7 +157,7 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
     return tuple(issues)
 
 
-def _positions(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
+def of_postures(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
     """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
@@ -171,11 +171,6 @@ def _positions(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
         of_posture = key in {"start.joints", "end.joints"}
         more = f"; in a task file: !degrees {value:.6g}" if of_posture else ""
         yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
-
-
-def of_posture(robot: Robot, key: str, q: np.ndarray) -> tuple[Issue, ...]:
-    """Look at a posture, (n,)."""
-    return tuple(_positions(robot, key, q))
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:

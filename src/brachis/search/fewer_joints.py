@@ -76,8 +76,9 @@ def _hold_idle_joints(
         return None
     held = _plan_simpler(problem, *idle, best.trajectory, open_search, deadline)
     worth = 1.0 - _WORTH_MOVING * problem.task.spline.tolerance
-    is_fast = held is not None and worth * held.t_end <= best.t_end
-    return held if held is not None and held.verified and is_fast else None
+    if held is None or not held.verified or worth * held.t_end > best.t_end:
+        return None
+    return held
 
 
 def _plan_simpler(

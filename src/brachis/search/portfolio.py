@@ -295,7 +295,13 @@ class Search:
         failure = failure or explain_speeds(starts, are_tried=True)
         if failure is not None:
             return failure
-        self.interrupted |= self._is_cut_short()
+        # The time for the search may have ended every solve, of which each has a time limit of its own.
+        last = [each.reports[-1] for each in self.candidates if each.reports]
+        self.interrupted |= bool(last) and all(
+            report.status is SolveStatus.TIME_LIMIT
+            and report.wall_time < self._problem.task.solver.time_limit
+            for report in last
+        )
         return explain_no_motion(
             self._problem,
             self._decompositions,
@@ -435,15 +441,6 @@ class Search:
             self._gain = min(self._gain, gain)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self._keep(candidate)
-
-    def _is_cut_short(self) -> bool:
-        """Tell whether the time for the search ended every solve, of which each has a time limit of its own."""
-        last = [each.reports[-1] for each in self.candidates if each.reports]
-        return bool(last) and all(
-            report.status is SolveStatus.TIME_LIMIT
-            and report.wall_time < self._problem.task.solver.time_limit
-            for report in last
-        )
 
     def _describe_best(self) -> str:
         """Say how far the best motion is from a plan; empty without one."""

@@ -26,7 +26,6 @@ from brachis.task.points.gcode import SUFFIXES, read_gcode
 from brachis.task.points.points import Points, Rows, points_from
 from brachis.task.points.tables import read_points, read_table
 from brachis.task.segments import (
-    BSplineCurve,
     BSplineSegment,
     CsvSegment,
     Segment,
@@ -92,8 +91,15 @@ def segments_along(
             spline = _spline_through(part, fit, settings)
             segments.append(SplineSegment(spline=spline, **keys))
         else:
-            curve = _curve_of(part, fit, settings)
-            segments.append(BSplineSegment(bspline=curve, **keys))
+            keys["bspline"] = {
+                "degree": part.spline.k,
+                "knots": part.spline.t.tolist(),
+                "control_points": part.spline.c.tolist(),
+                "relative": settings.relative or fit is None,
+                "speeds": part.speeds,
+                "fit": fit,
+            }
+            segments.append(BSplineSegment(**keys))
         fit = None  # only the first one has it
     return segments
 
@@ -102,21 +108,6 @@ def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
     """Return the keys that the last curve along a file takes from the file's segment."""
     shared = ("orientation", "speed", "blend", "stop", "dwell")
     return {key: getattr(segment, key) for key in shared}
-
-
-def _curve_of(
-    part: FittedCurve, fit: FitReport | None, settings: PointFile
-) -> BSplineCurve:
-    """Return the curve along a part of a file, of which only the first one has the report, `fit`."""
-    curve = {
-        "degree": part.spline.k,
-        "knots": part.spline.t.tolist(),
-        "control_points": part.spline.c.tolist(),
-        "relative": settings.relative or fit is None,
-        "speeds": part.speeds,
-        "fit": fit,
-    }
-    return BSplineCurve.model_validate(curve)
 
 
 def _spline_through(

@@ -40,18 +40,8 @@ from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import StartPlace, ToolPose
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
-from brachis.task.scene import (
-    CollisionSettings,
-    SceneBody,
-    list_bodies,
-    name_bodies,
-)
-from brachis.task.segments import (
-    CsvSegment,
-    Segment,
-    SegmentModel,
-    are_matrices,
-)
+from brachis.task.scene import CollisionSettings, SceneBody, name_bodies
+from brachis.task.segments import CsvSegment, Segment, SegmentModel, are_matrices
 from brachis.task.settings import (
     BoundarySettings,
     FramePlacement,
@@ -181,7 +171,9 @@ class Task(CheckedModel):
     """Limits on the motion of the tool."""
     scene: Annotated[
         tuple[SceneBody, ...],
-        BeforeValidator(list_bodies),
+        BeforeValidator(
+            lambda scene: (scene,) if isinstance(scene, SceneBody) else scene
+        ),
         AfterValidator(name_bodies),
     ] = Field(default=(), json_schema_extra=or_form(_SCENE_FILE))
     """Bodies around the robot and on it, which it keeps clear of; or {file: cell.yaml} (see docs/my_cell.md)."""

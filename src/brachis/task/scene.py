@@ -148,11 +148,6 @@ class CollisionSettings(Model):
     """auto: a robot without collision geometry gets capsules along its links."""
 
 
-def list_bodies(scene: object) -> object:
-    """Take one body for a list of it."""
-    return (scene,) if isinstance(scene, SceneBody) else scene
-
-
 def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     """Name bodies without a name by their shape and their number, and refuse two bodies of one name."""
     named = tuple(

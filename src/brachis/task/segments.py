@@ -140,12 +140,11 @@ Centre = Annotated[
 ]
 
 
-def _as_list(value: object) -> object:
-    """Take a number for the one coordinate that it is."""
-    return [value] if isinstance(value, int | float) else value
-
-
-Coordinates = Annotated[Vector, BeforeValidator(_as_list)]
+Coordinates = Annotated[
+    Vector,
+    BeforeValidator(lambda value: [value] if isinstance(value, int | float) else value),
+]
+"""A number is the one coordinate that it is."""
 
 
 Turns = Annotated[

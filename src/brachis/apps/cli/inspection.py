@@ -232,7 +232,7 @@ def _place_tool(
 
     from brachis.common.arguments import numbers
     from brachis.common.arrays import clear_rounding
-    from brachis.problem.plausibility import of_posture
+    from brachis.problem.plausibility import of_postures
     from brachis.robot.plausibility import refuse_issues
     from brachis.task.points.units import CONVENTIONS, values_of
     from brachis.task.settings import place_frame
@@ -245,7 +245,7 @@ def _place_tool(
         words = posture.replace(",", " ").split()
         joints = numbers(words, "--posture", "rad or m")
     q = robot.posture(joints, "--posture")
-    issues = refuse_issues(of_posture(robot, "--posture", q), strict=False)
+    issues = refuse_issues(tuple(of_postures(robot, "--posture", q)), strict=False)
     remarks += [f"warning: {issue}" for issue in issues]
     placement = robot.tool_placement(q)
     if task is not None and frame is not None:

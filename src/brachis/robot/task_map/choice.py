@@ -29,12 +29,7 @@ from brachis.robot.task_map.protocol import (
     joint_rows,
     position_rows,
 )
-from brachis.robot.task_map.tool import (
-    Pose,
-    RowsAndAngle,
-    RowsAndOrientation,
-    WorldRows,
-)
+from brachis.robot.task_map.tool import Pose, RowsAndAngle, RowsAndOrientation
 from brachis.robot.tool_joints import (
     AXIS,
     FREE_ROLL,
@@ -121,7 +116,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
         )
     if AXIS in names:
         return RowsAndOrientation(robot, (*positions, *TURN_ROWS))
-    return _rows_and_angle(robot, names) if turning else WorldRows(robot, names)
+    return _rows_and_angle(robot, names) if turning else TaskMap(robot, names)
 
 
 def _rows_and_angle(robot: Robot, names: tuple[str, ...]) -> RowsAndAngle:

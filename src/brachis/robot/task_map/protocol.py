@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -63,7 +62,7 @@ class TaskDerivatives:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TaskMap(Summary, ABC):
+class TaskMap(Summary):
     """Map from the joint positions of a robot to the c task coordinates of its tool, whose velocity has m rows.
 
     Attributes

@@ -59,12 +59,7 @@ class Pose(RowsAndOrientation):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WorldRows(TaskMap):
-    """Rows of the tool frame's position in the world frame; task coordinates are the rows themselves."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RowsAndAngle(WorldRows):
+class RowsAndAngle(TaskMap):
     """Rows of the tool frame's position in the world frame and, last, the angle about a world axis (rad).
 
     The tool turns about this axis alone. The angle is that of the tool-frame axis `tool_axis` to the world's x axis, or
