@@ -48,13 +48,7 @@ from brachis.search.fewer_joints import search_motion
 from brachis.search.given_motion import widen_plan
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
-from brachis.task import (
-    Source,
-    Task,
-    TaskKeywords,
-    check_keywords,
-    task_with,
-)
+from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.timing import SlowTimingWarning
 from brachis.trajectory import Motion, motion_of
 

@@ -26,11 +26,7 @@ from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar, prismatic
 from brachis.ik.point_recipes import positioning
-from brachis.ik.protocol import (
-    Family,
-    IKSolver,
-    NotApplicableError,
-)
+from brachis.ik.protocol import Family, IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
 from brachis.ik.solver_checks import check_answers, ranges_to_check

@@ -12,12 +12,7 @@ from brachis.common.arrays import with_like_signs
 from brachis.path.context import stands_still
 from brachis.path.curves import SplineCurve
 from brachis.path.joins import Join
-from brachis.path.pose import (
-    LEAST_QUALITY,
-    least_quality,
-    quaternion_curve,
-    rotations,
-)
+from brachis.path.pose import LEAST_QUALITY, least_quality, quaternion_curve, rotations
 from brachis.path.protocol import Array, Curve
 from brachis.path.rotations import quaternion_derivatives, rotation_of
 from brachis.robot.plausibility import position_hint

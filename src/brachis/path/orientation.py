@@ -16,13 +16,7 @@ from brachis.path.context import place
 from brachis.path.curves import ArcCurve, LineCurve
 from brachis.path.pose import smallest
 from brachis.path.protocol import Array, Curve, Orientation
-from brachis.path.rotations import (
-    hat,
-    product,
-    rotation_of,
-    sine_cosine,
-    unit,
-)
+from brachis.path.rotations import hat, product, rotation_of, sine_cosine, unit
 from brachis.task import AlongTangent, Rotate, TurnTo
 
 if TYPE_CHECKING:

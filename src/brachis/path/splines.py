@@ -12,17 +12,9 @@ from brachis.errors import PathError
 from brachis.path.context import SegmentContext, place
 from brachis.path.curves import LineCurve, SplineCurve
 from brachis.path.orientation import AMBIGUOUS, half_turn, turn_between
-from brachis.path.pose import (
-    LEAST_QUALITY,
-    least_quality,
-    pose_curve,
-    quaternion_curve,
-)
+from brachis.path.pose import LEAST_QUALITY, least_quality, pose_curve, quaternion_curve
 from brachis.path.protocol import Array, MappedCurve
-from brachis.path.rotations import (
-    quaternion_product,
-    rotation_of,
-)
+from brachis.path.rotations import quaternion_product, rotation_of
 from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
 from brachis.task.points.points import is_repeated, steps_of, sum_up

@@ -18,13 +18,7 @@ from brachis.common.arguments import check_most
 from brachis.common.files import mesh_file, read_text
 from brachis.errors import InputError, TaskError, UrdfError
 from brachis.robot.urdf_bodies import origin_of, placement_matrix
-from brachis.robot.urdf_elements import (
-    Element,
-    UrdfTree,
-    end_of,
-    numbers_of,
-    read_tree,
-)
+from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of, read_tree
 from brachis.task.scene import Round, SceneBody
 
 _LARGEST = 1e4

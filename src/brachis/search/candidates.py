@@ -21,13 +21,7 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
-from brachis.kinematics import (
-    ChartMap,
-    ChartRows,
-    Newton,
-    chart_around,
-    transversality,
-)
+from brachis.kinematics import ChartMap, ChartRows, Newton, chart_around, transversality
 from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends import SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify

@@ -28,10 +28,7 @@ from brachis.path.legs import key_of_speed
 from brachis.path.sequence import tool_distance
 from brachis.problem.problem import Problem
 from brachis.search.holding import explain_holding
-from brachis.search.phase_plane import (
-    phase_plane_on,
-    postures_along,
-)
+from brachis.search.phase_plane import phase_plane_on, postures_along
 from brachis.search.stations import spread_stations
 from brachis.timing import Timing
 

@@ -17,10 +17,7 @@ from dataclasses import dataclass, field, fields, make_dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Unpack
 
 import numpy as np
-from pydantic import (
-    BeforeValidator,
-    Field,
-)
+from pydantic import BeforeValidator, Field
 
 from brachis.common.words import write_count
 from brachis.errors import InputError, check_names

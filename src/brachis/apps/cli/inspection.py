@@ -23,12 +23,7 @@ from brachis.apps.cli.app import (
     task_space_of,
     urdf_of,
 )
-from brachis.apps.cli.output import (
-    print_json,
-    print_lines,
-    print_table,
-    write_posture,
-)
+from brachis.apps.cli.output import print_json, print_lines, print_table, write_posture
 from brachis.common.files import is_task_file
 from brachis.common.words import write_count
 from brachis.errors import InputError, check_names
