@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.common.arrays import greville
+from brachis.common.arrays import cut, greville
 from brachis.errors import InputError
 from brachis.path.protocol import Array
 from brachis.path.sequence import Path
@@ -100,8 +100,8 @@ def _of_pieces(
 ) -> BSpline:
     """Write piecewise polynomials, C3, as a clamped B-spline over the same breaks."""
     first, last = _check_interval(interval or (breaks[0], breaks[-1]))
-    inner = np.unique(breaks[(breaks > first) & (breaks < last)])
-    after = np.append(inner, last)  # one place at least, also without breaks
+    grid = cut(np.unique(breaks), first, last)
+    after = grid[1:]
     before = np.nextafter(after, first)
     for order in range(SMOOTHNESS + 1):
         values = _rows(pieces(after, nu=order))
@@ -116,7 +116,6 @@ def _of_pieces(
                 hint="Interpolate with scipy.interpolate.make_interp_spline(x, y, k=5), or give the waypoints "
                 "themselves (spline: {through: ...})",
             )
-    grid = np.concatenate([[first], inner, [last]])
     return _interpolate(lambda u: _rows(pieces(u)), grid, max(degree, SMOOTHNESS + 1))
 
 

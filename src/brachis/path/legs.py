@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import cut
 from brachis.errors import PathError
 from brachis.path.protocol import Array
 from brachis.path.sequence import Path, path_speed, tool_derivatives
@@ -107,8 +108,7 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
     for part in parts:
         speed = part.speed
         first, last = (_snap(s, path.stops) for s in part.s)
-        stops = path.stops[(path.stops > first) & (path.stops < last)]
-        for ends in pairwise([first, *stops.tolist(), last]):
+        for ends in pairwise(cut(path.stops, first, last).tolist()):
             between = path.between(*ends)
             leads = [
                 _lead(speed, others.get(s, speed)) / _tool_slope(task_map, between, s)

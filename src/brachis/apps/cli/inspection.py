@@ -174,6 +174,7 @@ def _describe(
     """Describe robot and task as plain data for JSON; free ends, and the length without positions, are None."""
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
+    from brachis.task.fields import plain
 
     limits = joint_limits_of(robot) if problem is None else problem.limits
     data = {
@@ -187,13 +188,11 @@ def _describe(
     }
     if problem is None:
         return data
-    start = problem.start
-    end = problem.end
     return data | {
         "joint_names": list(problem.robot.joint_names),
         "position_units": list(problem.robot.position_units),
-        "start_posture": None if start is None else start.tolist(),
-        "end_posture": None if end is None else end.tolist(),
+        "start_posture": plain(problem.start),
+        "end_posture": plain(problem.end),
         "path": {
             "segments": [segment.kind for segment in problem.task.path],
             "length": problem.path.length if problem.task_map.axes else None,
