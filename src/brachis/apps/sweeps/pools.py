@@ -148,7 +148,9 @@ def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
         Its workers ended, cannot be reached, or cannot run brachis.
     """
     try:
-        yield from as_completed(plans, partial(executor.submit, run_plan), len(plans))
+        yield from as_completed(
+            plans, lambda plan: executor.submit(run_plan, plan), len(plans)
+        )
     except BrokenExecutor as error:
         raise ClusterError(
             "the executor's workers ended", found=str(error), hint=_CONTINUES

@@ -102,11 +102,13 @@ class Distribution(_OneKey):
         ((key, values),) = self.given.items()
         if key == "choice":
             return [values[i] for i in generator.integers(len(values), size=count)]
+        first, second = values
         if key == "normal":
-            return generator.normal(*values, count).tolist()
+            return generator.normal(first, second, count).tolist()
         if key == "uniform":
-            return generator.uniform(*values, count).tolist()
-        return np.exp(generator.uniform(*map(math.log, values), count)).tolist()
+            return generator.uniform(first, second, count).tolist()
+        logarithms = generator.uniform(math.log(first), math.log(second), count)
+        return np.exp(logarithms).tolist()
 
 
 class RandomSettings(Model):
