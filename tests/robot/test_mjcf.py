@@ -11,6 +11,7 @@ import pytest
 
 import brachis
 from brachis.errors import NotInstalledError, UrdfError
+from brachis.robot.mjcf import is_mjcf
 from support.mjcf_files import mjcf_of
 
 mujoco = pytest.importorskip("mujoco")
@@ -234,3 +235,9 @@ def test_task_files_and_sweeps_take_them(tmp_path):
     assert found.table.column("status").to_pylist() == ["verified"]
     rail = brachis.compose.Rail(range=(-1.0, 1.0), velocity=1.0, force=100.0, mass=5.0)
     assert 'name="rail"' in brachis.compose.on_rail(mjcf, rail)
+
+
+def test_many_comments_before_the_root_are_passed_at_once():
+    """Generated files have dozens; a pattern that looks back took minutes."""
+    assert not is_mjcf("<!-- generated -->\n" * 60 + "<robot name='arm'/>")
+    assert is_mjcf("<!-- generated -->\n" * 60 + "<mujoco/>")

@@ -9,10 +9,7 @@
 rotation. One is an angle about an axis of the world: that of an axis of the tool in the plane of two axes of the world, of which
 the second counts with a sign. All six may be in the axes of the tool, for a pose. */
 typedef struct {
-    long in_tool_axes;
-    long rows;
-    long axes[3];
-    long turns;
+    long in_tool_axes, rows, axes[3], turns;
     long tool_axis, first, second;
     double sign;
 } prescribed;

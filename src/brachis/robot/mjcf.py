@@ -18,12 +18,13 @@ import pinocchio as pin
 from brachis.errors import BrachisWarning, NotInstalledError, UrdfError
 from brachis.robot.urdf_writer import write_urdf
 
-_ROOT = re.compile(r"[\ufeff\s]*((<\?.*?\?>|<!--.*?-->)\s*)*<mujoco\b", re.DOTALL)
+_REMARK = re.compile(r"<\?.*?\?>|<!--.*?-->", re.DOTALL)
+_ROOT = re.compile(r"[\ufeff\s]*<mujoco\b")
 
 
 def is_mjcf(text: str) -> bool:
     """Return whether a text is XML whose root is ``<mujoco>``."""
-    return _ROOT.match(text) is not None
+    return _ROOT.match(_REMARK.sub("", text)) is not None
 
 
 def urdf_of_mjcf(path: Path) -> str:

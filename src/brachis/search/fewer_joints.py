@@ -70,7 +70,9 @@ def _hold_idle_joints(
     postures = problem.given_postures
     try:
         idle = lock_idle(robot, problem.task, problem.task_map, postures)
-    except UrdfError:  # they are outside of the ranges of the URDF, which the task widens
+    except (
+        UrdfError
+    ):  # they are outside of the ranges of the URDF, which the task widens
         return None
     if idle is None:
         return None
