@@ -84,7 +84,7 @@ WRONG_TASKS = {
     "no limit at all": (
         "robot.limits.torque",
         None,
-        ["'j1'", "robot.limits.torque.j1"],
+        ["'j1'", "robot.limits.acceleration or robot.limits.torque"],
     ),
     "torque limit not positive": (
         "robot.limits.torque",
