@@ -351,7 +351,7 @@ def plan_many(
     jobs : int, optional
         Processes; no more than there are processors are used.
     executor : Executor, optional
-        Plans in place of them: a Dask client, or any `concurrent.futures.Executor`, such as those of mpi4py and parsl.
+        Plans in place of them: a Dask client, or any ``concurrent.futures.Executor``, such as those of mpi4py and parsl.
         Tasks are read by its workers: files that they name must be there.
     progress : bool or callable, optional
         True: how many are done, as `plan` shows its progress; left out: in notebooks. A function: called after every

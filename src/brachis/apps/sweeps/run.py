@@ -52,7 +52,7 @@ def sweep(
     jobs : int, optional
         Processes on this machine, no more than it has processors, which is also the default.
     executor : Executor, optional
-        Makes the plans in place of processes of this machine: a Dask client, or any `concurrent.futures.Executor`, such
+        Makes the plans in place of processes of this machine: a Dask client, or any ``concurrent.futures.Executor``, such
         as those of mpi4py and parsl. Its workers need brachis, and no files.
     part : str, optional
         ``"i/n"``: of n parts of the sweep only the i-th, from 1 on, for jobs of a cluster's scheduler that share the
