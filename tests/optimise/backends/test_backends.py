@@ -151,6 +151,15 @@ def test_time_limit(name):
     assert report.status.value == "time limit reached"
 
 
+@pytest.mark.usefixtures("wall_clock")
+@pytest.mark.parametrize("time_limit", [0.005, 0.015, 0.025, 0.035])
+def test_the_time_may_end_in_any_of_the_first_evaluations(name, time_limit):
+    """IPOPT ended the whole process if a Jacobian had no value at its first point."""
+    problem = disc(pause=0.01)
+    report = solve(name, problem, [40.0, -30.0], SolverOptions(time_limit=time_limit))
+    assert report.status is SolveStatus.TIME_LIMIT
+
+
 def test_without_time_no_solve_begins(name):
     report = solve(name, disc(), [40.0, -30.0], SolverOptions(time_limit=0.0))
     assert report.status is SolveStatus.TIME_LIMIT

@@ -33,15 +33,18 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     problem = monitor.problem
     options = monitor.options
 
-    def or_nan(function: Function) -> Callable[[np.ndarray, np.ndarray], None]:
-        """Write what a function gives, or NaN where it has no value."""
+    def or_nan(
+        function: Function, at_stop: float = np.nan
+    ) -> Callable[[np.ndarray, np.ndarray], None]:
+        """Write what a function gives, NaN where it has no value, or `at_stop` once the solve has to stop."""
 
         def write(point: np.ndarray, out: np.ndarray) -> None:
             """Write the values at a point."""
             try:
                 out[:] = function(point)
             except UnreachableError:
-                out[:] = np.nan  # IPOPT shortens the step
+                # After NaN IPOPT shortens the step.
+                out[:] = at_stop if monitor.must_stop() else np.nan
 
         return write
 
@@ -74,7 +77,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         lambda point: objective_at(problem, point, np.nan),
         or_nan(monitor.gradient),
         or_nan(monitor.rows),
-        or_nan(monitor.jacobian),
+        or_nan(monitor.jacobian, 0.0),  # NaN at the first point ends the process
         intermediate_callback=intermediate,
         ipopt_options={
             "print_level": 0,
