@@ -351,8 +351,8 @@ def plan_many(
     jobs : int, optional
         Processes; no more than there are processors are used.
     executor : Executor, optional
-        Plans in place of them: a Dask client, or any ``concurrent.futures.Executor``, such as those of mpi4py and parsl.
-        Tasks are read by its workers: files that they name must be there.
+        Plans in place of them: a Dask client, or any ``concurrent.futures.Executor``, such as those of mpi4py and
+        parsl. Tasks are read by its workers: files that they name must be there.
     progress : bool or callable, optional
         True: how many are done, as `plan` shows its progress; left out: in notebooks. A function: called after every
         plan, in the order of the tasks, with the number of those done, the number of all, and the outcome.

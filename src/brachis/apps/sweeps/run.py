@@ -52,8 +52,8 @@ def sweep(
     jobs : int, optional
         Processes on this machine, no more than it has processors, which is also the default.
     executor : Executor, optional
-        Makes the plans in place of processes of this machine: a Dask client, or any ``concurrent.futures.Executor``, such
-        as those of mpi4py and parsl. Its workers need brachis, and no files.
+        Makes the plans in place of processes of this machine: a Dask client, or any ``concurrent.futures.Executor``,
+        such as those of mpi4py and parsl. Its workers need brachis, and no files.
     part : str, optional
         ``"i/n"``: of n parts of the sweep only the i-th, from 1 on, for jobs of a cluster's scheduler that share the
         folder. It has a table of its own, such as ``table-2-of-8.csv``.
