@@ -201,6 +201,12 @@ def _check_limit(
     predicted = entry.change(step)
     raised = program.relax(entry.limit, entry.bound, step * entry.bound.full_scale)
     linearised = linearised_change(raised, base)
+    # What the base still lacks to an optimum is no gain of the raised limit.
+    lacking = linearised_change(program, base)
+    if linearised is None or lacking is None:
+        linearised = predicted
+    else:
+        linearised -= lacking
     answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
     same = 1e-6 * t_end(base)  # end times of one optimum differ by less
@@ -214,7 +220,7 @@ def _check_limit(
     return CheckedSensitivity(
         sensitivity=entry,
         predicted=predicted,
-        linearised=predicted if linearised is None else linearised,
+        linearised=linearised,
         re_solved=t_end(answer) - t_end(before),
         other_optimum=t_end(before) - t_end(base),
         optimal=optimal,
