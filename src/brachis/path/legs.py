@@ -84,7 +84,7 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
 
     Segments of the same speed are one part, with the blends between them. Parts are cut at stops. They leave leads, in
     which the speed changes, at stops, at ends of the path that are not passed at their speed, and where they follow
-    another part at once. Leads take up no more than half of a part, and in them the tool is no faster than in the part,
+    another part at once. Leads take up no more than half of a part, and in them the tool does not exceed its speed,
     unless it comes from or goes on at a higher speed.
 
     Raises
@@ -152,7 +152,7 @@ def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
 
 
 def _snap(s: float, stops: Array) -> float:
-    """Return the stop that a path coordinate means but for its last digits; itself where there is none."""
+    """Return the stop at a path coordinate, to the digits of a file; the coordinate itself if there is no stop."""
     near = stops[np.abs(stops - s) <= tolerances.WRITTEN]
     return float(near[0]) if len(near) else s
 
@@ -165,7 +165,7 @@ def _lead(speed: float, other: float) -> float:
 
 
 def _tool_slope(task_map: TaskMap, path: Path, s: float) -> float:
-    """How far the tool moves per unit s, m; where it stands still, hardly."""
+    """How far the tool moves per unit s, m; at least the length that counts as zero."""
     velocity = tool_derivatives(task_map, path, np.array([s]))[0, 0]
     return max(float(np.linalg.norm(velocity)), tolerances.LENGTH)
 

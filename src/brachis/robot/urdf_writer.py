@@ -109,7 +109,7 @@ def _write_ends(parent: tuple[str, pin.SE3], child: str, placement: pin.SE3) -> 
 
 
 def _write_inertial(inertia: pin.Inertia) -> str:
-    """Write a mass and its distribution about its centre; nothing where there is none."""
+    """Write a mass and its inertia about its centre, if the body has a mass."""
     matrix = inertia.inertia
     if not inertia.mass and not matrix.any():
         return ""

@@ -66,7 +66,7 @@ def _hold_idle_joints(
     open_search: Opening,
     deadline: Deadline,
 ) -> Candidate | None:
-    """Plan again, from the best motion, with idle joints at rest; None where there are none, or moving them pays."""
+    """Plan again, from the best motion, with idle joints at rest; None without idle joints, or if moving them pays."""
     postures = problem.given_postures
     try:
         idle = lock_idle(robot, problem.task, problem.task_map, postures)

@@ -313,7 +313,7 @@ def refuse(
 
 
 def check_defined(kind: str, uses: Mapping[str, Any], known: Collection[str]) -> None:
-    """Refuse names of a kind, by the keys that use them, that are not among the known ones; what is no name passes."""
+    """Refuse names of a kind, by the keys that use them, that are not among the known ones; other values pass."""
     for key, name in uses.items():
         if isinstance(name, str) and name not in known:
             raise refuse(

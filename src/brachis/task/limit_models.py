@@ -284,15 +284,15 @@ class ProcessSpeed(Model):
     ]
     """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
     allow. At stops, and at ends of the path that are not passed at this speed, the part is shorter by what the tool
-    moves in 0.1 s at the higher speed; there it is no faster, unless it comes from or goes on at a higher speed."""
+    moves in 0.1 s at the higher speed; there the tool stays below this speed, unless it comes from or goes on at a higher one."""
     segment: Count | None = None
     """Index of the segment whose speed this is; written by brachis."""
     within: tuple[Number, Number] | None = None
-    """[begin, end]: path coordinates between which the tool is no faster; written by brachis."""
+    """[begin, end]: path coordinates between which the tool does not exceed the speed; written by brachis."""
 
     @property
     def leads(self) -> list[SpeedTable]:
-        """Largest speeds before and behind the part, where the tool is no faster."""
+        """Largest speeds in the leads before and behind the part."""
         if self.within is None:
             return []
         sides = ((self.within[0], self.s[0]), (self.s[1], self.within[1]))

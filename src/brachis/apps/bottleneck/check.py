@@ -201,7 +201,7 @@ def _check_limit(
     predicted = entry.change(step)
     raised = program.relax(entry.limit, entry.bound, step * entry.bound.full_scale)
     linearised = linearised_change(raised, base)
-    # What the base still lacks to an optimum is no gain of the raised limit.
+    # The base is an optimum to a tolerance only; the rest of its way does not count.
     lacking = linearised_change(program, base)
     if linearised is None or lacking is None:
         linearised = predicted

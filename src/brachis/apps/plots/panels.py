@@ -390,7 +390,7 @@ def torque_panels(
 ) -> list[Panel]:
     """Show torques and forces over their limits in one panel; by units in one or two if no joint has a limit.
 
-    There is no panel if the robot has no masses.
+    Without masses the list is empty.
     """
     parts = panels_of(trajectory, samples, "torque")
     titles = titles_of(ratios)
