@@ -70,9 +70,8 @@ def _hold_idle_joints(
     postures = problem.given_postures
     try:
         idle = lock_idle(robot, problem.task, problem.task_map, postures)
-    except (
-        UrdfError
-    ):  # they are outside of the ranges of the URDF, which the task widens
+    except UrdfError:
+        # The task lets them stand outside of the URDF's ranges, where they cannot be locked.
         return None
     if idle is None:
         return None

@@ -284,7 +284,8 @@ class ProcessSpeed(Model):
     ]
     """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
     allow. At stops, and at ends of the path that are not passed at this speed, the part is shorter by what the tool
-    moves in 0.1 s at the higher speed; there the tool stays below this speed, unless it comes from or goes on at a higher one."""
+    moves in 0.1 s at the higher speed. There the tool does not exceed this speed, unless it comes from or goes on at a
+    higher one."""
     segment: Count | None = None
     """Index of the segment whose speed this is; written by brachis."""
     within: tuple[Number, Number] | None = None
