@@ -218,7 +218,7 @@ def resolve_limits(
             joint=free[0],
             key=f"robot.limits.acceleration{joint} or robot.limits.torque{joint}",
             found=f"none for {', '.join(free)}",
-            allowed="one of them; an effort of 0 in the URDF does not count, and torque limits need its masses",
+            allowed="one of them; an effort of 0 in the URDF is no limit, and torque limits need its masses",
         )
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(
