@@ -40,7 +40,7 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
     times = {}
     for decomposition in decompositions_of(problem):
         joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
-        program = program_of(problem, [joint_map], [np.linspace(0.0, 1.0, 21)])
+        program = program_of(problem, [joint_map])
         found = []
         for _ in range(4000):
             begin = problem.start[decomposition.redundant[0]]

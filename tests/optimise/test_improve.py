@@ -169,18 +169,6 @@ def test_the_answer_is_lengthened_by_the_factor():
     assert lengthened.report.x[0] == 5.0
 
 
-def begin(program, x):
-    """Start of the solve that a session makes of a program from x."""
-    begun = []
-
-    def run(monitor, x):
-        begun.append(x)
-        return monitor.report("fake", SolveStatus.OPTIMAL, x, np.zeros_like(x), "")
-
-    SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
-    return begun[0]
-
-
 @pytest.mark.parametrize("rows", [[0, 1], None])
 def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
     program, _ = brachis.transcribe(
@@ -199,24 +187,6 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
     monkeypatch.setattr(module, "solve_near_rows", solve_some)
     SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
     assert steps == [1.0 if rows is None else 0.1]
-
-
-def worst(program, x):
-    """Largest ratio to a limit that holds at single points."""
-    (phase,) = program.phases
-    return float(np.abs(phase.time_scaling_ratios(x)).max())
-
-
-def test_a_solve_begins_within_the_limits():
-    program = Program([phase_of("r1")])
-    held = shortest_time(program, next(starting_points(program)))
-    np.testing.assert_array_equal(begin(program, held), held)
-    fast = held
-    while worst(program, fast) <= 1.0:
-        fast = program.with_time_scaled(fast, 0.99)
-    begun = begin(program, fast)
-    assert begun[0] > fast[0]
-    assert worst(program, begun) <= 1.0 + 1e-6
 
 
 def test_if_the_time_is_up_a_feasible_start_is_the_answer():
@@ -240,12 +210,3 @@ def test_if_the_time_is_up_a_feasible_start_is_the_answer():
     assert kept.t_end == program.end_time(begun)
     none = keep_feasible(SolvedProgram(program, (late,)), far)
     assert none.report is late
-
-
-def test_a_start_is_not_made_longer_than_it_may_be():
-    program = Program([phase_of("r1")])
-    x = shortest_time(program, next(starting_points(program)))
-    while worst(program, x) <= 1.0:
-        x = program.with_time_scaled(x, 0.99)
-    program.x_upper[0] = x[0]
-    np.testing.assert_array_equal(begin(program, x), x)

@@ -11,7 +11,7 @@ import brachis
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
-from brachis.search.phase_plane import grade_breaks, initial_breaks, initial_guess
+from brachis.search.phase_plane import initial_guess
 from brachis.search.starts import FAMILY, joint_space_start
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
@@ -41,7 +41,7 @@ def guess(content: dict, *, is_timed: bool) -> tuple[Problem, Program, np.ndarra
     if not is_timed:
         even = np.linspace(0.0, 1.0, 101)[:, None]
         start = type(start)(problem, start.joint_map, even, np.inf, "", FAMILY)
-    program = program_of(problem, start.maps_by_leg(), initial_breaks(start))
+    program = program_of(problem, start.maps_by_leg())
     x = initial_guess(program, start)
     assert x is not None
     return problem, program, x
@@ -75,15 +75,3 @@ def test_a_leg_with_a_given_speed_has_its_duration(is_timed):
         if law is not None
     )
     assert given.t_end == pytest.approx(0.2 * 0.5 / 0.2, rel=1e-9)
-
-
-@pytest.mark.parametrize("steps", [(0.01, 0.01), (0.03, 0.01), (1.0, 1.0)])
-def test_graded_intervals_begin_as_long_as_asked(steps):
-    breaks = grade_breaks(20, *steps)
-    lengths = np.diff(breaks)
-    assert len(lengths) == 20
-    assert (breaks[0], breaks[-1]) == (0.0, pytest.approx(1.0))
-    expected = np.minimum(steps, 0.05)
-    np.testing.assert_allclose(lengths[[0, -1]], expected, rtol=1e-6)
-    growth = lengths[1:10] / lengths[:9]
-    np.testing.assert_allclose(growth, growth[0], rtol=1e-6)

@@ -12,6 +12,7 @@ from brachis.limits.joint import AccelerationLimit, TorqueLimit, VelocityLimit
 from brachis.problem.problem import Problem
 from brachis.robot import dynamics
 from brachis.search import phase_plane
+from brachis.search.stations import spread_stations
 from brachis.timing import JointPath, PhasePlane
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
@@ -146,7 +147,7 @@ def slide(content: dict, **limits: object) -> tuple[Problem, np.ndarray, np.ndar
         }
     )
     problem = Problem.of(gantry(**limits), task)
-    s = phase_plane.spread_stations(problem)
+    s = spread_stations(problem)
     return problem, s, np.column_stack([LENGTH * s, np.zeros_like(s)])
 
 

@@ -30,7 +30,6 @@ from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.starts import SEARCH_LEVELS
 from brachis.task import load_task
-from support.solvers import INTERIOR
 
 ROOT = Path(__file__).parents[2]
 START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
@@ -522,7 +521,7 @@ def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
     not sys.platform.startswith("linux"),
     reason="what is patched here is only forked there",
 )
-def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
+def test_a_solver_that_does_not_come_back_leaves_the_motion_it_began_with(monkeypatch):
     honest = uno.call_uno
 
     def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
@@ -543,10 +542,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
         ),
     )
     assert result.verified
-    assert (
-        "the motion has 25 intervals, and was not solved with all 100"
-        in result.not_completed
-    )
+    assert any("a solve ran out of time" in text for text in result.not_completed)
 
 
 def test_within_other_workers_no_processes_are_made(robot):
@@ -642,13 +638,3 @@ def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):
     assert len(calls) == 1
     first, last = refused.value.s_interval
     assert first < 0.5 < last
-
-
-def test_a_motion_far_from_its_timing_gets_a_second_opinion(monkeypatch):
-    line = {"redundant_joints": ["j1"], "intervals": 8, "least_motion": False}
-    plain = brachis.plan(brachis.examples.scara_line, **line)
-    assert {one.solver for one in plain.candidates} == {"uno"}
-    monkeypatch.setattr(portfolio, "_FAR", 0.01)
-    again = brachis.plan(brachis.examples.scara_line, **line)
-    assert {one.solver for one in again.candidates} == {"uno", INTERIOR}
-    assert again.t_end <= plain.t_end

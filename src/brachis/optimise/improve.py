@@ -16,7 +16,6 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
-from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.backends import (
     Problem,
@@ -32,7 +31,6 @@ from brachis.optimise.backends import (
 from brachis.optimise.near_rows import NearRows, solve_near_rows
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
-from brachis.optimise.pull import Pulled
 from brachis.task import SolverSettings
 
 
@@ -235,50 +233,6 @@ def with_last(
     return (*(report for report in reports if report is not last), last)
 
 
-_START_TOLERANCE = 1e-7
-"""Part of a limit by which a solve may exceed it at its start."""
-_LARGEST_START_RATIO = 1.01
-"""Ratio to a limit above which a start is not made to hold it."""
-_SLOWED = 4
-"""Number of times that a start is slowed down: gravity and friction do not get less."""
-
-
-def _slow_down(program: Program, x: np.ndarray) -> np.ndarray:
-    """Slow a motion, (v,), down until it is within the limits, if it exceeds them by less than 1 %.
-
-    The first subproblem of a solver then has a feasible point. Without one a trust region shrinks to nothing, and needs
-    tens of iterations to grow again.
-    """
-    best = x
-    try:
-        least = _worst_ratio(program, x)
-        power = 2.0  # of the time with which the ratio falls, by the last step
-        for _ in range(_SLOWED):
-            if not 1.0 + _START_TOLERANCE < least < _LARGEST_START_RATIO:
-                break
-            factor = least ** (1.0 / power) * (1.0 + _START_TOLERANCE)
-            slower = program.with_time_scaled(best, factor)
-            ratio = _worst_ratio(program, slower)
-            if ratio >= least or np.any(slower > program.x_upper):
-                break
-            power = max(np.log(least / ratio) / np.log(factor), 0.1)
-            best = slower
-            least = ratio
-    except UnreachableError:
-        return x
-    return best
-
-
-def _worst_ratio(program: Program, x: np.ndarray) -> float:
-    """Largest ratio to a limit that a longer time relieves at single points, where the time is not given."""
-    ratios = (
-        phase.worst_time_scaling_ratio(part)
-        for phase, part in program.split(x)
-        if phase.time_law is None
-    )
-    return max(ratios, default=0.0)
-
-
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
@@ -309,8 +263,6 @@ class SolverSession:
         An answer with no larger violation is usable, however the solve ended.
     for_large : Solver, optional
         What is tried first on large programs over the path, which are sparse; see `solver_for_large`.
-    pull : float, optional
-        Part of the end time that half the squared distance from the first point costs; see `Pulled`.
     """
 
     backend: Solver
@@ -319,7 +271,6 @@ class SolverSession:
     progress: Progress | None = None
     acceptable: float = -np.inf
     for_large: Solver | None = None
-    pull: float = 0.0
     _last: list[SolverReport] = field(default_factory=list, repr=False)
 
     @classmethod
@@ -368,15 +319,13 @@ class SolverSession:
         return replace(self, options=own, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
-        """Solve a program from the point x, (v,), or from a slightly slower motion that is within the limits.
+        """Solve a program from the point x, (v,).
 
         Where the last solve ended at x, this one goes on with the Hessian that it has learnt.
         """
         learnt = None
         if self._last and np.array_equal(self._last[0].x, x):
             learnt = self._last[0].learnt
-        if isinstance(program, Program):
-            x = _slow_down(program, x)
         # Only the time that is not given can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress
@@ -407,16 +356,9 @@ class SolverSession:
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)
-        problem: Problem = program
-        if self.pull > 0.0:
-            problem = Pulled(program, x, self.pull * program.end_time(x))
-        is_interior = self.backend.is_interior
-        report = (
-            solve(problem, x) if is_interior else solve_near_rows(problem, x, solve)
-        )
-        if self.pull > 0.0:
-            report = replace(report, objective=objective_at(program, report.x))
-        return self._accept(report)
+        if self.backend.is_interior:
+            return self._accept(solve(program, x))
+        return self._accept(solve_near_rows(program, x, solve))
 
     def _accept(self, report: SolverReport) -> SolverReport:
         """Take an answer that violates rows by little, however the solve ended."""

@@ -95,8 +95,6 @@ _SAME_TIME = 1e-9
 """Normalised times that differ by less are the same knot or grid point, seen from its two sides."""
 _EVERYWHERE = slice(5, None, 10)
 """Of the dense grid's times: one more between neighbouring collocation points."""
-_IN_A_GAP = 4
-"""Steps into which a gap between collocation points is cut where the motion leaves the branch, or the chart."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
 """Points around an abrupt change, in steps of the dense grid."""
 
@@ -223,41 +221,6 @@ def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
         # Reachable, but singular or too far apart to count turns: more points everywhere.
         return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
-
-
-def add_points_where_lost(program: Program, x: np.ndarray) -> Program | None:
-    """Add collocation points in every gap in which the motion leaves the branch, or the chart.
-
-    Returns
-    -------
-    Program or None
-        None if it does so nowhere.
-    """
-    points = []
-    for phase, part in program.split(x):
-        t_norm = spread(phase.t_norm, _IN_A_GAP)
-        gaps = _find_gaps(phase, part, t_norm)
-        inside = gaps[:, None] * _IN_A_GAP + np.arange(1, _IN_A_GAP)
-        points.append(np.union1d(phase.t_norm, t_norm[inside]))
-    if sum(map(len, points)) == program.collocation_points:
-        return None
-    return program.with_points(points)
-
-
-def _find_gaps(phase: Phase, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """List the gaps, cut by `t_norm`, in which the motion leaves the branch, or the chart."""
-    motion = phase.motion(x)
-    times = t_norm * motion.t_end
-    count = len(phase.t_norm) - 1
-    try:
-        phase.joint_map.state(*motion.at(times), t=times)
-    except UnreachableError:
-        lost = np.flatnonzero(_find_lost(phase, x, t_norm))
-        if not len(lost):  # reachable, but singular or too far apart to count turns
-            return np.arange(count)
-        gaps = np.union1d((lost - 1) // _IN_A_GAP, lost // _IN_A_GAP)
-        return gaps[(gaps >= 0) & (gaps < count)]
-    return np.empty(0, dtype=int)
 
 
 def _suspects(

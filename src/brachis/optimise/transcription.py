@@ -23,30 +23,25 @@ from brachis.optimise.program import Link, Program
 from brachis.problem.problem import Problem
 
 
-def program_of(
-    problem: Problem, joint_maps: Sequence[JointMap], breaks: Sequence[np.ndarray]
-) -> Program:
-    """Write the NLP of a decomposition down.
+def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:
+    """Write the NLP of a decomposition down, over even knot intervals.
 
     Parameters
     ----------
     problem : Problem
     joint_maps : sequence of JointMap
         One for each leg, beginning at, or near, the posture there.
-    breaks : sequence of (N + 1,) ndarray
-        Ends of the knot intervals of every phase, in normalised time.
 
     Returns
     -------
     Program
     """
     spline = problem.task.spline
-    grids = []
-    for own in breaks:
-        knots = clamped_knots(spline.degree, own)
-        t_norm = spread(own, spline.points_per_interval)
-        grids.append(FixedGrid(knots, spline.degree, t_norm))
-    return program_over(problem, joint_maps, grids)
+    breaks = _breaks_of(problem)
+    knots = clamped_knots(spline.degree, breaks)
+    t_norm = spread(breaks, spline.points_per_interval)
+    grid = FixedGrid(knots, spline.degree, t_norm)
+    return program_over(problem, joint_maps, [grid] * len(joint_maps))
 
 
 def program_over(
@@ -154,7 +149,7 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
         yield Link(last, 0, (0,), in_motion[1:])
 
 
-def breaks_of(problem: Problem) -> np.ndarray:
+def _breaks_of(problem: Problem) -> np.ndarray:
     """Return the ends of a phase's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
     intervals = problem.task.spline.intervals
     count = COARSE_INTERVALS if intervals == "auto" else intervals

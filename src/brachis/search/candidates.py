@@ -34,7 +34,7 @@ from brachis.optimise.improve import (
     improve,
     keep_feasible,
 )
-from brachis.optimise.mesh import adapt_mesh, coarsest
+from brachis.optimise.mesh import adapt_mesh
 from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
@@ -42,25 +42,16 @@ from brachis.optimise.retiming import (
     FINE,
     begin_with_timing,
     improve_joint_paths,
-    is_timing_all,
     least_time,
 )
 from brachis.optimise.transcription import maps_by_leg, program_of, program_over
 from brachis.problem.problem import Problem
-from brachis.search.continuation import (
-    solve_by_margin_continuation,
-    solve_within_branch,
-    solve_without_third_order_limits,
-)
+from brachis.search.continuation import solve_by_margin_continuation
 from brachis.search.over_path import plan_timing, solve_over_path
-from brachis.search.phase_plane import FEW_VARIABLES, initial_breaks, initial_guess
+from brachis.search.phase_plane import initial_guess
 
-_LIGHT = 3_000_000
-"""Variables times rows up to which a solve over all knots takes a second or two from the timing of a joint path."""
 _FOR_KNOTS = 0.5
 """Part of the time left after which the knots are not refined further."""
-_PULL = 0.001
-"""Weight of the pull towards the motion that is refined, with several redundant joints; see `Pulled`."""
 NOT_TRIED = "not tried: the search ended"
 """Status of a candidate for which there was no time."""
 SLOW = "not refined: no faster than another over all knots"
@@ -88,7 +79,7 @@ def solve_candidate(
         return Candidate.of(start, NOT_TRIED)
     problem = start.problem
     try:
-        target = program_of(problem, start.maps_by_leg(), initial_breaks(start))
+        target = program_of(problem, start.maps_by_leg())
     except UnreachableError as error:
         return Candidate.of(start, str(error))
     session = _open_session(start, deadline, listener)
@@ -99,7 +90,7 @@ def solve_candidate(
 def _solve_over_time(
     start: InitialGuess, target: Program, session: SolverSession
 ) -> Candidate:
-    """Solve over time, with knots that the fastest timing needs, all that are given, or the coarsest of them."""
+    """Solve over time, with knots that the fastest timing needs, or those that are given."""
     target = target.with_phases(
         phase.restrict_to(curves)
         for phase, curves in zip(target.phases, start.legs, strict=True)
@@ -115,11 +106,7 @@ def _solve_over_time(
         program, x = begun
         target = program
     else:
-        # From the timing of a joint path a solve takes few iterations over any number of knots; else many take seconds.
-        is_light = target.variables * len(target.lower) <= _LIGHT
-        is_near = is_light and start.joint_map.r <= 1 and is_timing_all(target)
-        is_small = target.variables <= FEW_VARIABLES
-        program = target if is_near or is_small else coarsest(target)
+        program = target
         first = initial_guess(program, start)
         if first is None:
             return Candidate.of(
@@ -127,8 +114,7 @@ def _solve_over_time(
                 "the splines through the joint path leave the branch, or the chart",
             )
         x = first
-    x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-    solved = solve_within_branch(program, x, session)
+    solved = solve_by_margin_continuation(program, x, session, MARGINS)
     solved = keep_feasible(solved, x)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
@@ -141,8 +127,7 @@ def _solve_over_time(
         start,
         words,
         program=solved.program,
-        target=target,
-        reports=(*before, *solved.reports),
+        reports=solved.reports,
         coarse=coarse,
         not_completed=solved.not_completed,
     )
@@ -220,15 +205,13 @@ def _finish_over_time(
     program = candidate.program
     assert start is not None and program is not None
     solved = SolvedProgram(program, candidate.reports)
-    target = candidate.target
     # The chart around a given motion is kept.
     is_free = start.in_chart and start.durations is None
     if candidate.keeps_knots and is_free and not session.deadline.passed:
         solved = best_of_joints(start.problem, solved, session)
-        target = solved.program
     spline = start.problem.task.spline
     soon = replace(options, deadline=session.deadline)
-    adapted = adapt_mesh(solved, session, spline, soon, target=target)
+    adapted = adapt_mesh(solved, session, spline, soon)
     undone = filter(None, (candidate.not_completed, adapted.not_completed))
     named = replace(candidate, not_completed="; ".join(undone))
     return _refine_if_fast(named, adapted, session, options)
@@ -249,9 +232,7 @@ def _refine_if_fast(
         candidate = replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= candidate.to_beat:
             return replace(candidate, status=SLOW)
-    has_several = adapted.program.phases[0].joint_map.r > 1
-    pull = _PULL if has_several else 0.0
-    session = replace(session, deadline=options.deadline, pull=pull)
+    session = replace(session, deadline=options.deadline)
     assert candidate.start is not None
     first = solvers_for(candidate.start.problem.task.solver.name)[0]
     done = None

@@ -6,54 +6,24 @@ creeps along it. Far from it the solve is easy, and its answer is a good start f
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import UnreachableError
-from brachis.limits.safeguards import HELD_BACK, MARGINS
-from brachis.optimise.backends import SolverReport, SolveStatus
-from brachis.optimise.guess import shortest_time
+from brachis.limits.safeguards import HELD_BACK
+from brachis.optimise.backends import SolveStatus
 from brachis.optimise.improve import (
     Solve,
     SolvedProgram,
-    SolverSession,
     attempt_once,
     improve,
 )
 from brachis.optimise.program import Program
-from brachis.optimise.refine import add_points_where_lost
 
 _FAR = 0.5
 """Violation, as a part of a limit, that a smaller branch margin does not mend."""
-_MOST_ADDED = 2
-"""How often points are added."""
-
-
-def solve_within_branch(
-    program: Program, x: np.ndarray, session: SolverSession
-) -> SolvedProgram:
-    """Solve; while the motion leaves the branch, or the chart, between collocation points, add points there.
-
-    Each solve begins at `x`: the last answer cannot be evaluated at the new points. Refinement, which begins with a
-    motion, cannot add them.
-    """
-    solved = solve_by_margin_continuation(program, x, session, MARGINS)
-    reports = solved.reports
-    for _ in range(_MOST_ADDED):
-        if not solved.usable or session.deadline.passed:
-            break
-        finer = add_points_where_lost(program, solved.x)
-        if finer is None:
-            break
-        program = finer
-        solved = solve_by_margin_continuation(program, x, session, MARGINS)
-        reports = (*reports, *solved.reports)
-    return replace(solved, reports=reports)
 
 
 def solve_by_margin_continuation(
@@ -103,37 +73,3 @@ def solve_by_margin_continuation(
         least_gain=tolerances.GAIN,
         go_on_above=tolerances.GAIN,
     )
-
-
-def solve_without_third_order_limits(
-    program: Program, x: np.ndarray, solve: Solve, margin: float
-) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
-    """Find a better starting point for limits on the third derivative: the answer without them, time-scaled.
-
-    Where the motion must slow down, such limits have local optima in which it all but stops. The fastest motion without
-    them has slowed down where it must; its shape over time, slowed down as a whole, leads past them.
-
-    Parameters
-    ----------
-    program : Program
-    x : (v,) ndarray
-        Starting point.
-    solve : callable
-    margin : float
-        Least branch margin.
-
-    Returns
-    -------
-    x : (v,) ndarray
-        The given point without such limits, or if that solve failed.
-    reports : tuple of SolverReport
-        Of the solve without them.
-    """
-    if all(limit.order <= 2 for limit in program.limits):
-        return x, ()
-    easier = program.without_orders_above(2)
-    report = solve(easier.with_margin(margin), x)
-    if report.status.usable:
-        with contextlib.suppress(UnreachableError):
-            x = shortest_time(program, report.x)
-    return x, (report,)

@@ -15,7 +15,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from brachis.common.arrays import bisect, interpolate_columns
+from brachis.common.arrays import interpolate_columns
 from brachis.errors import UnreachableError
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point, worst_time_scaling_ratio
@@ -23,10 +23,8 @@ from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
-from brachis.optimise.transcription import breaks_of
 from brachis.path.legs import Leg
 from brachis.problem.problem import Problem
-from brachis.search.stations import spread_stations
 from brachis.timing import JointPath, PhasePlane
 
 _STATIONS = 401
@@ -140,56 +138,6 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
             found.append((beyond, program.end_time(x), x))
     # The fastest one within the limits.
     return min(found, key=itemgetter(0, 1))[-1] if found else None
-
-
-def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
-    """Choose the ends of the knot intervals of every phase, (N + 1,), in normalised time.
-
-    They are even. Only where the speed is given, and redundant joints go on from other phases in motion, intervals
-    begin as short as those next to them, and grow towards the middle.
-    """
-    problem = start.problem
-    even = breaks_of(problem)
-    breaks = [even] * len(problem.legs)
-    if not start.joint_map.r or not any(problem.time_laws):
-        return breaks
-    s = spread_stations(problem)
-    q = postures_along(start, s)
-    if q is None:
-        return breaks
-    found = fastest_times(problem, s, q)
-    times = [np.inf if part is None else float(part[1][-1]) for part in found]
-    times = [np.inf, *times, np.inf]
-    for number, law in enumerate(problem.time_laws):
-        if law is None:
-            continue
-        beside = (times[number], times[number + 2])
-        first, last = (0.5 * even[1] * time / law.duration for time in beside)
-        breaks[number] = grade_breaks(2 * (len(even) // 2), first, last)
-    return breaks
-
-
-def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
-    """Find ends, (count + 1,), of intervals over [0, 1] that grow by the same factor from either end to the middle.
-
-    Parameters
-    ----------
-    count : int
-        Even.
-    first, last : float
-        Lengths of the first and the last interval; if they are too long the intervals are even.
-    """
-    half = count // 2
-    ratios = np.minimum(count * np.array([first, last]), 1.0)
-
-    def ends(growth: np.ndarray, k: np.ndarray | float) -> np.ndarray:
-        """Return where the first k intervals of a half end, which are e^(g k) long."""
-        return np.expm1(growth * k) / np.expm1(growth * half)
-
-    # Growths such that the first interval has its share of the half.
-    growth = bisect(lambda trial: half * ends(trial, 1.0) > ratios, np.full(2, 20.0))
-    before, behind = ends(growth[:, None], np.arange(half + 1.0))
-    return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
 
 
 def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:

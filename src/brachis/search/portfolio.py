@@ -43,8 +43,6 @@ _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more by better knots than those so far."""
 _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
-_FAR = 0.2
-"""Timing gap of the best motion from which on another solver is tried: few knots alone cost up to 0.15."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -160,7 +158,6 @@ class Search:
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:
-                yield from self._second_opinion(batch)
                 return
             if self._deadline.passed:
                 self.interrupted = True
@@ -179,12 +176,6 @@ class Search:
             found = find_timing_gap(self.best.trajectory, self._problem.limits)
             self._gap = (self.best, found)
         return self._gap[1]
-
-    def _second_opinion(self, batch: Batch) -> Iterator[Batch]:
-        """Yield a fallback if the best motion is far slower than the fastest timing of its own joint path."""
-        found = self.find_gap_of_best()
-        if found is not None and not found.left_out and found.gap > _FAR:
-            yield batch
 
     def _start_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:
         """Yield the guess from a known motion, if it can be used; put down why a given one led to nothing."""

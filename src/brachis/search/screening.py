@@ -21,7 +21,7 @@ from brachis.optimise.backends import SolverOptions, solver_for_large, solvers_f
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import ROUGH, PathEffort, coarse_for
-from brachis.optimise.transcription import breaks_of, program_of
+from brachis.optimise.transcription import program_of
 from brachis.search.lattice import farthest
 from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import run_in_processes
@@ -160,8 +160,7 @@ def _improve(
     for_large = solver_for_large(problem.task.solver.name)
     session = SolverSession(backend, options, deadline, for_large=for_large)
     try:
-        maps = start.maps_by_leg()
-        program = program_of(problem, maps, [breaks_of(problem)] * len(maps))
+        program = program_of(problem, start.maps_by_leg())
         better = improve_guess(start, program, session, effort, charts)
     except UnreachableError:
         return start

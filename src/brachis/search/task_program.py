@@ -12,7 +12,7 @@ from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.extraction import extract_trajectory
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
-from brachis.search.phase_plane import initial_breaks, initial_guess
+from brachis.search.phase_plane import initial_guess
 from brachis.trajectory import Trajectory
 
 
@@ -31,8 +31,7 @@ class TaskProgram(Program):
     """
 
     def __init__(self, start: InitialGuess) -> None:
-        breaks = initial_breaks(start)
-        program = program_of(start.problem, start.maps_by_leg(), breaks)
+        program = program_of(start.problem, start.maps_by_leg())
         super().__init__(program.phases, program.links)
         self._start = start
 
