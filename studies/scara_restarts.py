@@ -16,7 +16,6 @@ from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.guess import starting_point
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search.candidates import MARGINS, solve_by_margin_continuation
 
 ROOT = Path(__file__).parents[1]
 spec = importlib.util.spec_from_file_location(
@@ -47,8 +46,8 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
             x = starting_point(program, [random_joint_path(rng, begin)], [None])
             if x is None:
                 continue
-            solved = solve_by_margin_continuation(program, x, solve, MARGINS)
-            found.append(solved.report.objective if solved.usable else np.inf)
+            report = solve(program, x)
+            found.append(report.objective if report.status.usable else np.inf)
             if len(found) == count:
                 break
         times[decomposition.name] = np.array(found)

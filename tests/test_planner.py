@@ -16,7 +16,6 @@ from brachis.common.deadline import Deadline
 from brachis.errors import NotInstalledError, StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.continuation import MARGINS, solve_by_margin_continuation
 from support.effort import QUICK
 from support.solvers import INSTALLED
 from support.starts import starting_points
@@ -110,26 +109,6 @@ def test_without_refinement_the_answer_is_left_as_it_is():
     assert result.verification.worst_ratio > 1.01
     assert result.candidate.time_scaled == 1.0
     assert sum(np.isfinite(candidate.t_end) for candidate in result.candidates) == 1
-
-
-def test_margins_that_change_nothing_are_not_solved_again():
-    gantry = brachis.Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf")
-    line = {
-        "path": [{"line": {"by": [0.5, 0.2]}}],
-        "start": {"joints": [0.0, 0.0]},
-        "redundant_joints": [],
-    }
-    program, _ = brachis.transcribe(gantry, brachis.load_task(task(**line)))
-    solves = []
-
-    def fail(tried, x):
-        solves.append(tried)
-        return solvers_for("uno")[0].solve(
-            tried, x, SolverOptions(max_iterations=1), None
-        )
-
-    solve_by_margin_continuation(program, next(starting_points(program)), fail, MARGINS)
-    assert len(solves) == 1
 
 
 def test_every_solve_is_reported():

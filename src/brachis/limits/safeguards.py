@@ -18,8 +18,6 @@ from brachis.limits.protocol import (
 MARGIN = 5e-3
 """Least branch margin, dimensionless. Nearer to the boundary, non-redundant joints are too fast for any collocation
 grid."""
-MARGINS = (0.1, 0.02, MARGIN)
-"""Branch margins that are tried in turn."""
 HELD_BACK = 1e-4
 """Distance of a branch margin from its bound from which on it holds the motion back."""
 

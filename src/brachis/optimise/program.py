@@ -436,12 +436,6 @@ class Program(PhaseSequence[Phase], Summary):
             for phase in self.phases
         )
 
-    @property
-    def safeguard_bounds(self) -> tuple[float, ...]:
-        """Least values of the safeguards in force: branch margins."""
-        own = filter(is_safeguard, self.limits)
-        return tuple(float(bound) for limit in own for bound in limit.lower)
-
 
 def is_safeguard(limit: Limit) -> bool:
     """Tell whether a limit only keeps the solve on its branch."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
-from brachis.limits.safeguards import HELD_BACK, MARGIN, MARGINS
+from brachis.limits.safeguards import HELD_BACK, MARGIN
 from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
@@ -47,6 +47,8 @@ _COARSE_INTERVALS = (8, 12)
 """Least and largest number of intervals of a redundant curve in a coarse search."""
 _COARSE_CURVES = 32
 """Intervals of all curves together in a coarse search, if these bounds allow it."""
+_CLEAR = 0.02
+"""Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -89,7 +91,7 @@ COARSE = PathEffort(
     places=200,
     is_rough_before=True,
     is_rough_after=True,
-    margin=MARGINS[1],
+    margin=_CLEAR,
     options=SolverOptions(
         tolerance=1e-3,
         max_iterations=25,
@@ -106,7 +108,7 @@ ROUGH = PathEffort(
     intervals=(16,),
     places=800,
     is_rough_before=True,
-    margin=MARGINS[1],
+    margin=_CLEAR,
     options=SolverOptions(
         tolerance=3e-4,
         max_iterations=40,

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -22,7 +23,6 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, ChartRows, Newton, chart_around, transversality
-from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends import SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
@@ -31,6 +31,7 @@ from brachis.optimise.improve import (
     Solve,
     SolvedProgram,
     SolverSession,
+    attempt_once,
     improve,
     keep_feasible,
 )
@@ -46,7 +47,6 @@ from brachis.optimise.retiming import (
 )
 from brachis.optimise.transcription import maps_by_leg, program_of, program_over
 from brachis.problem.problem import Problem
-from brachis.search.continuation import solve_by_margin_continuation
 from brachis.search.over_path import plan_timing, solve_over_path
 from brachis.search.phase_plane import initial_guess
 
@@ -114,8 +114,7 @@ def _solve_over_time(
                 "the splines through the joint path leave the branch, or the chart",
             )
         x = first
-    solved = solve_by_margin_continuation(program, x, session, MARGINS)
-    solved = keep_feasible(solved, x)
+    solved = keep_feasible(attempt_once(session, program, x), x)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
     if status is SolveStatus.OPTIMAL:
@@ -281,16 +280,12 @@ def best_of_joints(
     -------
     SolvedProgram
     """
-
-    def solve_again(program: Program, x: np.ndarray) -> SolvedProgram:
-        return solve_by_margin_continuation(program, x, solve, MARGINS)
-
     choices = [None, *_select_joints(solved)]
     points = [move_to_chart(problem, solved, rows) for rows in choices]
     return improve(
         solved,
         [_go_to(point) for point in points if point is not None],
-        solve_again,
+        partial(attempt_once, solve),
         least_gain=0.0,
         go_on_above=None,
     )

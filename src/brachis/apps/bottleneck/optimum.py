@@ -24,7 +24,6 @@ from brachis.errors import (
 )
 from brachis.ik import Family
 from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
-from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends import solvers_for
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
@@ -186,13 +185,7 @@ def _problem(
         points = spline.control_points[0 if law is None else 1 :]
         motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
     program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
-    x = program.variables_from(motions)
-    for margin in MARGINS:
-        program = program.with_margin(margin)
-        # Solvers and interpolation are not exact.
-        if program.safeguard_slack(x) >= -1e-4:
-            break
-    return program, x
+    return program, program.variables_from(motions)
 
 
 def _find_decomposition(problem: Problem, families: Sequence[Family]) -> Decomposition:
