@@ -225,7 +225,7 @@ def _open_search(
     task_map = problem.task_map
     if has_charts(problem, decompositions):
         check_independent(task_map)
-        check_regular(task_map, problem.given_postures)
+        check_regular(problem)
     else:
         # Faulty decompositions are reported before the path is checked.
         decompositions.find()

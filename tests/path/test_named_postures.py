@@ -9,8 +9,9 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import InputError, PathError, TaskError
-from brachis.problem.problem import Problem
+from brachis.errors import InputError, PathError, StartError, TaskError
+from brachis.problem.feasibility import check_regular
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.task import load_task, task_with
 from brachis.task.units import unit_of
@@ -119,6 +120,44 @@ def test_a_change_of_a_posture_moves_start_and_path() -> None:
 def test_wrong_names(keys: dict[str, Any], message: str) -> None:
     with pytest.raises(TaskError, match=message):
         problem("pose", **keys)
+
+
+FAR = [*AWAY[:6], 20.0]
+STRETCHED = [0.0] * 7
+ELSEWHERE = brachis.Line(by=[0.1, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("keys", "key", "message"),
+    [
+        ({"away": FAR}, "postures.away", "out of its range"),
+        ({"end": "home", "home": FAR, "path": [ELSEWHERE]}, "postures.home", "out of its range"),
+        ({"end": "home", "path": [ELSEWHERE]}, "postures.home", "the end posture is off"),
+        ({"path_start": [0.1, 0.1, 0.1]}, "postures.away", "the start posture is off"),
+        ({"start": {"joints": FAR}, "path": [ELSEWHERE]}, "start.joints", "out of its range"),
+        ({"robot": brachis.robots.iiwa14.with_limits(torque=1.0)}, "postures.away", "gravity"),
+        ({"away": STRETCHED}, "postures.away", "the start posture is singular"),
+        ({"end": {"joints": HOME}, "path": [ELSEWHERE]}, "end.joints", "the end posture is off"),
+    ],
+)  # fmt: skip
+def test_errors_name_the_key_of_a_posture(
+    keys: dict[str, Any], key: str, message: str
+) -> None:
+    home = keys.pop("home", HOME)
+    with pytest.raises(StartError, match=message) as caught:
+        check_regular(problem("position", home=home, **keys))
+    assert caught.value.where == key
+
+
+def test_the_branch_of_a_posture_is_refused_by_its_key() -> None:
+    path = [brachis.Line(to_posture="home")]
+    ends = {"start": "away", "end": "home", "path": path}
+    robot = brachis.robots.scara3
+    ends["redundant_joints"] = ["j1"]
+    given = problem(["x", "y"], robot, [0.5, 2.1, 2.1], [0.5, -2.1, -2.1], **ends)
+    with pytest.raises(StartError, match=r"set postures\.home to") as caught:
+        decompositions_of(given)
+    assert caught.value.where == "postures.home"
 
 
 def test_postures_that_do_not_fit() -> None:

@@ -343,6 +343,56 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
         assert places == ["start.joints", "spline.intervals"]
 
 
+def test_a_posture_in_degrees_is_named_by_its_key():
+    home = {"postures": {"home": [30.0, -120.0, 120.0]}, "start": "home"}
+    with pytest.raises(PlausibilityError) as caught:
+        brachis.plan(task(**home))
+    (remark,) = caught.value.remarks
+    assert remark.startswith("postures.home: the position looks like degrees; found j1")
+    assert "in a task file: !degrees 30" in remark
+
+
+WAVE = np.linspace(0.0, 1.5, 50)[:, None]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "remark"),
+    [
+        (
+            0.1,
+            "path: points: tolerance.position: the tolerance looks like mm; found 0.1 m; "
+            + "usual: below 0.005 m; 0.1 m are 100 mm; write '0.1 mm' for mm",
+        ),
+        ("0.1 mm", None),
+        (0.004, None),
+    ],
+)
+def test_the_tolerance_of_a_fit_in_mm(tolerance: float | str, remark: str | None):
+    """The unit of bare numbers is m, whatever that of the points is."""
+    circle = 200.0 * np.hstack([np.cos(WAVE), np.sin(WAVE)])
+    path = brachis.fit_path(
+        circle, tolerance={"position": tolerance}, units={"length": "mm"}
+    )
+    issues = of_task(brachis.load_task(task(path=path)))
+    assert [str(issue) for issue in issues] == ([remark] if remark else [])
+
+
+@pytest.mark.parametrize(
+    ("position", "where"),
+    [
+        ({"sphere": 2.0}, ["tolerances.position.sphere"]),
+        ({"x": [-0.5, 0.001], "y": 0.1}, ["tolerances.position.x"]),
+        ({"sphere": 0.05, "z": 0.002}, []),
+    ],
+)
+def test_tolerances_of_the_position_in_mm(position, where):
+    asked = task(task_space="position", tolerances={"position": position})
+    asked["path"] = [{"line": {"by": [0.1, 0.0, 0.0]}}]
+    issues = of_task(brachis.load_task(asked))
+    assert [issue.where for issue in issues] == where
+    assert all("looks like mm" in issue.message for issue in issues)
+
+
 def test_only_the_start_posture_is_refused_where_nothing_is_said():
     content = task(
         task_space="joints",

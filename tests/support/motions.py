@@ -37,7 +37,7 @@ def joint_map(
     )
     curve = build_path(task.path, space.value(start), space.rows)
     candidate = find(robot, space, redundant)
-    branch = branch_of(space, candidate, start, "start")
+    branch = branch_of(space, candidate, start, "start.joints")
     indices = tuple(
         robot.joint_names.index(name) for name in candidate.redundant_joints
     )

@@ -198,16 +198,16 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     if given_joints is not None:
         start = task_map.robot.posture(*given_joints)
         if given is not None:
-            check_on_path(task_map, start, given, "start")
+            check_on_path(task_map, start, given, "start", given_joints[1])
         given = task_map.value(start)
     assert given is not None
     return build_path(task.path, given, task_map.rows, frame, postures)
 
 
 def check_on_path(
-    task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str
+    task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str, where: str
 ) -> None:
-    """Refuse a posture, (n,), whose tool is not at the path's beginning or end, `target`, (c,).
+    """Refuse a posture, (n,), stated at `where`, whose tool is not at the path's start or end, `target`, (c,).
 
     Raises
     ------
@@ -222,7 +222,7 @@ def check_on_path(
         found, allowed = write_apart(miss[worst], largest, digits=3)
         raise StartError(
             f"the {name} posture is off the path",
-            where=f"{name}.joints",
+            where=where,
             found=f"{found} {unit} off in {task_map.rows[worst]}",
             allowed=f"at most {allowed} {unit}",
             hint=_place_hint(task_map, place, target)

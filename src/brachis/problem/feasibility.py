@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +21,10 @@ from brachis.robot.joints import complement, difference
 from brachis.robot.plausibility import position_hint
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import TURN_ROWS
-from brachis.task import SplineSettings
+from brachis.task import SplineSettings, Task
+
+if TYPE_CHECKING:
+    from brachis.problem.problem import Problem
 
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
@@ -37,7 +41,7 @@ def check_postures(
     limits: Sequence[Limit],
     postures: Mapping[str, np.ndarray],
     path: Path,
-    tolerance: float,
+    task: Task,
 ) -> tuple[Limit, ...]:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
 
@@ -48,8 +52,8 @@ def check_postures(
     postures : mapping of str to (n,) ndarray
         Those of ``start`` and ``end`` that are given.
     path : Path
-    tolerance : float
-        By which limits may be exceeded anywhere: ``refinement.tolerance``.
+    task : Task
+        Its ``refinement.tolerance`` is by how much limits may be exceeded anywhere.
 
     Returns
     -------
@@ -61,13 +65,16 @@ def check_postures(
     StartError
     """
     robot = task_map.robot
-    for name, posture in postures.items():
-        _check_range(robot, posture[None], f"{name}.joints", tolerance)
-        _check_at_rest(robot, limits, posture, name, tolerance)
+    tolerance = task.refinement.tolerance
+    for end, posture in postures.items():
+        key = task.posture_key(end)
+        _check_range(robot, posture[None], key, tolerance)
+        _check_at_rest(robot, limits, posture, key, tolerance)
         limits = [_widen(limit, posture[None], tolerance) for limit in limits]
     if "end" in postures:
         (last,) = path.sample([1.0]).target
-        check_on_path(task_map, postures["end"], last, "end")
+        end_key = task.posture_key("end")
+        check_on_path(task_map, postures["end"], last, "end", end_key)
     if isinstance(task_map, JointSpace):
         along = path.sample(np.linspace(0.0, 1.0, 401)).target
         _check_range(robot, along, "path", tolerance)
@@ -144,7 +151,7 @@ def _check_at_rest(
     robot: Robot,
     limits: Sequence[Limit],
     posture: np.ndarray,
-    name: str,
+    where: str,
     tolerance: float,
 ) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
@@ -174,7 +181,7 @@ def _check_at_rest(
             hint = _MOVE_BODIES
         raise StartError(
             f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
-            where=f"{name}.joints",
+            where=where,
             found=f"{found}{label.after} at rest{more}",
             allowed=f"{allowed}{label.after}",
             hint=hint,
@@ -246,19 +253,20 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     return found, f"{word} {figures[0]}"
 
 
-def check_regular(task_map: TaskMap, postures: Mapping[str, np.ndarray]) -> None:
-    """Refuse a posture, start or end, that is a singularity of the arm: no coordinates describe motions from there.
+def check_regular(problem: Problem) -> None:
+    """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
 
     Raises
     ------
     StartError
     """
-    for name, posture in postures.items():
+    task_map = problem.task_map
+    for end, posture in problem.given_postures.items():
         jacobian = task_map.jacobian(task_map.twists(posture[None]))
         if _least_singular_values(jacobian)[0] < _REGULAR:
             raise StartError(
-                f"the {name} posture is singular",
-                where=f"{name}.joints",
+                f"the {end} posture is singular",
+                where=problem.task.posture_key(end),
                 found="a posture in which the tool cannot move in all directions of the task space",
                 allowed="a posture in which it can",
                 hint="Bend the arm a little",
@@ -318,8 +326,8 @@ def _least_singular_values(jacobians: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, -1])
 
 
-def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
-    """Index of the closed form's branch on which the posture at the path's start or end, called `name`, lies.
+def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, key: str) -> int:
+    """Index of the closed form's branch on which the posture at the path's start or end, stated at `key`, lies.
 
     Raises
     ------
@@ -339,8 +347,8 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -
     margins = solver.branch_margins(posture[None], branch)[0]
     if gaps[branch] > tolerances.POSTURE or np.any(margins <= tolerances.ANGLE):
         raise StartError(
-            f"the {name} posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
-            where=f"{name}.joints",
+            f"the posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
+            where=key,
             found="a posture where branches of the closed form meet",
             allowed="a posture inside a branch",
             hint="Bend the arm a little, or choose other redundant joints",

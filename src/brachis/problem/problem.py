@@ -108,8 +108,7 @@ class Problem(Summary):
         time_laws = tuple(time_law_of(leg, task_map, path) for leg in legs)
         limits = limits_of(robot, task, user_limits)
         check_smoothness(limits, task.spline)
-        tolerance = task.refinement.tolerance
-        limits = check_postures(task_map, limits, postures, path, tolerance)
+        limits = check_postures(task_map, limits, postures, path, task)
         if "end" in postures and not task.boundary.periodic:
             postures["end"] = _on_path(task_map, postures["end"], path)
         return cls(
@@ -344,7 +343,7 @@ def decompositions_of(
     if refusals and not allowed and (asked or robot.n == task_map.m):
         raise refusals[0]
     if not allowed:
-        check_regular(task_map, problem.given_postures)
+        check_regular(problem)
     return sorted(allowed, key=lambda decomposition: -decomposition.clearance)
 
 
@@ -367,16 +366,17 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
         check_names("branch", [wanted], labels, "branch")
     branches = tuple(i for i, label in enumerate(labels) if wanted in ("auto", label))
     for name, posture in problem.given_postures.items():
-        branch = branch_of(task_map, match, posture, name)
+        key = problem.task.posture_key(name)
+        branch = branch_of(task_map, match, posture, key)
         if branch not in branches:
             other = "start posture" if wanted == "auto" else "task's branch"
             leave_out = "end" if wanted == "auto" else "branch"
             raise StartError(
                 f"the {name} posture is on another branch than the {other}",
-                where=f"{name}.joints",
+                where=key,
                 found=labels[branch],
                 allowed=labels[branches[0]],
-                hint=f"Leave out {leave_out}, or set {name}.joints to a posture of that branch",
+                hint=f"Leave out {leave_out}, or set {key} to a posture of that branch",
             )
         branches = (branch,)
     return Decomposition(problem, match, redundant, branches)

@@ -101,7 +101,7 @@ def refuse_issues(
     ----------
     issues : tuple of Issue
     strict : bool or None
-        Whether they are errors; None: those of the start posture are.
+        Whether they are errors; None: those of the start posture, and of postures by name, are.
 
     Raises
     ------
@@ -115,7 +115,8 @@ def refuse_issues(
     refused = [
         str(issue)
         for issue in joined
-        if strict or (strict is None and issue.where.startswith("start.joints"))
+        if strict
+        or (strict is None and issue.where.startswith(("start.joints", "postures.")))
     ]
     if refused:
         raise PlausibilityError(refused)

@@ -203,8 +203,8 @@ class Task(CheckedModel):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: all implausible figures are errors. false: all are warnings. null: only a start posture that looks like
-    degrees is an error."""
+    """true: all implausible figures are errors. false: all are warnings. null: only a start posture, or one by
+    name, that looks like degrees is an error."""
 
     @model_validator(mode="before")
     @classmethod
@@ -274,6 +274,11 @@ class Task(CheckedModel):
         if posture == "free":
             return None
         return self.postures[posture], f"postures.{posture}"
+
+    def posture_key(self, end: Literal["start", "end"]) -> str:
+        """Return the key of the joint positions at an end; of a periodic motion that of its start."""
+        stated = self.joints_at(end) or self.joints_at("start")
+        return stated[1] if stated else f"{end}.joints"
 
     @property
     def _start_forms(self) -> str:
