@@ -258,13 +258,34 @@ def test_a_corner_names_place_angle_and_key() -> None:
     error = refused([RIGHT, UP], XY)
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0: the path must be smooth to the third derivative; found a corner "
-        "of 90 degrees; allowed: segments that continue each other, or a blend or a stop. Set path[0].blend (m) to "
+        "of 90 degrees; allowed: segments that continue each other. Set path[0].blend (m) to "
         "round it, or path[0].stop: true to stop there"
     )
     assert error.s_interval == pytest.approx((0.5, 0.5))
 
 
+@pytest.mark.parametrize(
+    ("angle", "advice"),
+    [
+        (180.0, "each other. Set path[0].stop: true to stop there"),
+        (172.5, "each other. Set path[0].stop: true to stop there"),
+        (171.5, "each other. Set path[0].blend (m) to round it, or path[0]"),
+    ],
+)
+def test_a_way_back_is_offered_no_blend(angle: float, advice: str) -> None:
+    back = {"line": {"length": 0.5, "angle_deg": angle}}
+    assert advice in str(refused([RIGHT, back], XY))
+    blended = [RIGHT | {"blend": 0.01}, back]
+    if "blend" in advice:
+        build(blended, XY)
+    else:
+        assert "too sharp for a blend" in str(refused(blended, XY))
+
+
 def test_all_corners_are_named() -> None:
+    assert "likewise path[1].stop, path[2].blend" in str(
+        refused([RIGHT, UP, {"line": {"by": [0, -1]}}, RIGHT], XY)
+    )
     assert "likewise path[1].blend, path[3].blend" in str(
         refused([RIGHT, UP, RIGHT, RIGHT, UP], XY)
     )
@@ -347,8 +368,25 @@ def test_the_longest_blend_is_accepted_as_the_message_writes_it() -> None:
     longest = float(str(refused(segments, XY)).split("at most ")[1].removesuffix(" m"))
     segments[0]["blend"] = longest
     build(segments, XY)
-    segments[0]["blend"] = longest * (1.0 + 1e-4)
+    segments[0]["blend"] = longest * (1.0 + 1e-3)
     assert "longer than half" in str(refused(segments, XY))
+
+
+@pytest.mark.parametrize(
+    ("length", "written"),
+    [
+        (0.3 - 0.27, "0.015 m"),  # which is 2.7e-17 m less than 0.03
+        (2.0 / 3.0, "0.3333 m"),
+        (24.0, "12 m"),
+        (1e-5 / 3.0, "1.666e-06 m"),
+    ],
+)
+def test_lengths_of_blends_are_written_with_few_digits(
+    length: float, written: str
+) -> None:
+    segments = [RIGHT | {"line": {"by": [50, 0]}, "blend": 20.0}]
+    segments.append({"line": {"by": [0, length]}})
+    assert str(refused(segments, XY)).split("at most ")[1].startswith(written)
 
 
 def test_neighbouring_blends_do_not_overlap() -> None:

@@ -187,8 +187,8 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
     error = refused([RIGHT | {"orientation": TURN}, RIGHT])
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0, z = 0: the path must be smooth to the third derivative; found "
-        "the tool's turning rate jumps by 1.571 rad/m; allowed: segments that continue each other, or "
-        "a blend or a stop. Set profile: smooth where the tool turns, or path[0].blend (m) to round it, or "
+        "the tool's turning rate jumps by 1.571 rad/m; allowed: segments that continue each other. "
+        "Set profile: smooth where the tool turns, or path[0].blend (m) to round it, or "
         "path[0].stop: true to stop there"
     )
     assert error.s_interval == (0.5, 0.5)

@@ -360,8 +360,10 @@ WAVE = np.linspace(0.0, 1.5, 50)[:, None]
     [
         (
             0.1,
-            "path: points: tolerance.position: the tolerance looks like mm; found 0.1 m; "
-            + "usual: below 0.005 m; 0.1 m are 100 mm; write '0.1 mm' for mm",
+            (
+                "path: points: tolerance.position: the tolerance looks like mm; found 0.1 m; "
+                "usual: below 0.005 m; 0.1 m are 100 mm; write '0.1 mm' for mm"
+            ),
         ),
         ("0.1 mm", None),
         (0.004, None),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from decimal import ROUND_DOWN, Context
 from itertools import combinations
-from math import floor
 
 import numpy as np
 
@@ -97,13 +97,14 @@ def _check_neighbours(join: Join, size: float) -> None:
             "no blend here",
             "Turn the tool along a line, or stop there, with stop: true instead of the blend",
         )
-    longest = join.shorter / 2
-    if size > longest * (1.0 + tolerances.ROUNDING):
+    longest = join.shorter / 2 * (1.0 + tolerances.ROUNDING)
+    if size > longest:
+        # So that the blend that the message names is accepted.
+        written = Context(prec=4, rounding=ROUND_DOWN).create_decimal(longest)
         raise join.wrong_blend(
             "the blend is longer than half of a neighbouring segment",
             found,
-            # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
-            f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}",
+            f"at most {float(written):g} {join.unit}",
             position_hint(size, 0.0, longest, join.unit),
         )
 

@@ -16,6 +16,9 @@ from brachis.path.protocol import Array, Curve
 from brachis.path.rotations import angular_rates
 from brachis.robot.task_map.protocol import joints_of, position_rows
 
+_SHARPEST = np.radians(172.0)
+"""Largest corner, rad, that a blend rounds: beyond 172.1 degrees that of two lines falls below its least speed."""
+
 
 @dataclass(frozen=True, eq=False)
 class Join:
@@ -71,8 +74,17 @@ class Join:
         return f"path[{self.index}].blend"
 
     @property
+    def key(self) -> str:
+        """The key that rounds the corner, or stops at it where the path turns back too far for a blend."""
+        before, after = (side[1, : self.positions] for side in self.sides())
+        is_sharp = angle_between(before, after) > _SHARPEST
+        return f"path[{self.index}].stop" if is_sharp else self.blend_key
+
+    @property
     def rounding(self) -> str:
-        """What to set to round the corner, or to stop at it."""
+        """What to set to round the corner, if a blend can, or to stop at it."""
+        if self.key != self.blend_key:
+            return self.stopping
         return f"{self.blend_key} ({self.unit}) to round it, or {self.stopping}"
 
     @property
@@ -153,12 +165,12 @@ def refuse_corners(corners: Sequence[Corner | None]) -> None:
     if not refused:
         return
     join, found, advice = refused[0]
-    others = ", ".join(other.blend_key for other, *_ in refused[1:])
+    others = ", ".join(other.key for other, *_ in refused[1:])
     raise PathError(
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
         found=found,
-        allowed="segments that continue each other, or a blend or a stop",
+        allowed="segments that continue each other",
         where=join.where,
         hint=advice + (f"; likewise {others}" if others else ""),
     )
