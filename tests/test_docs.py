@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,22 @@ def test_every_public_name_is_in_the_reference():
         named |= set(importlib.import_module(module).__dict__)
         named.add(module.rpartition(".")[2])
     assert set(brachis.__all__) - named == set()
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a clone")
+def test_what_commands_of_the_pages_write_is_ignored_by_git():
+    pattern = r"""(?:--out |\.save\("|[ .](?:write|report)\((?:\S+, )?")([\w./]+)"""
+    pages = [ROOT / "README.md", *DOCS.glob("*.md"), *(ROOT / "robots").rglob("*.md")]
+    written = {name for page in pages for name in re.findall(pattern, page.read_text())}
+    assert written > {"out", "motion.html", "motion.mcap", "lines", "cell.urdf"}
+    names = sorted((written - {"FILE"}) | {"out13/result.npz"})
+    command = ["git", "-C", ROOT, "check-ignore", "--no-index", "--", *names]
+    # Folders need not exist.
+    folders = [name if "." in name else f"{name}/x" for name in names]
+    ignored = subprocess.run(
+        [*command[: -len(names)], *folders], capture_output=True, text=True, check=False
+    )
+    assert ignored.stdout.split() == folders
 
 
 def test_links_to_files_lead_somewhere():

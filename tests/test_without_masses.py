@@ -142,7 +142,10 @@ def test_bottlenecks_and_report(result):
 @pytest.mark.parametrize(
     ("settings", "key"),
     [
-        ({"limits": {"acceleration": 8.0, kind: {"a2": 5.0}}}, f"robot.limits.{kind}")
+        (
+            {"limits": {"acceleration": 8.0, kind: {"a2": 5.0}}},
+            f"robot.limits.{kind}.a2",
+        )
         for kind in ("torque", "power", "rms_torque", "torque_rate")
     ]
     + [
@@ -183,8 +186,11 @@ def test_what_changes_a_robot_is_refused_too():
 
 
 def test_an_effort_of_the_urdf_asks_for_masses():
-    with pytest.raises(UrdfError, match=r"robot\.limits\.torque.*effort in the URDF"):
-        robot_of(six_axes(effort=50.0))
+    some = six_axes(effort=50.0).replace("upper='2.6' effort='50.0'", "upper='2.6'")
+    with pytest.raises(UrdfError, match=r"effort in the URDF is a limit") as caught:
+        robot_of(some)
+    keys = ", ".join(f"robot.limits.torque.a{number}" for number in (1, 3, 4, 5, 6))
+    assert f"which are needed for {keys};" in str(caught.value)
     free = {"torque": None, "acceleration": 8.0}
     assert robot_of(six_axes(effort=50.0), limits=free).n == 6
 
@@ -266,7 +272,9 @@ def test_an_arm_without_masses_on_a_rail(tmp_path):
     (tmp_path / "arm.urdf").write_text(six_axes())
     rail = Rail(range=(-2.0, 2.0), velocity=2.0, force=1500.0, mass=50.0)
     text = on_rail(tmp_path / "arm.urdf", rail)
-    with pytest.raises(UrdfError, match=r"robot\.limits\.torque; found .* moved by a1"):
+    with pytest.raises(
+        UrdfError, match=r"robot\.limits\.torque\.rail; found .* moved by a1"
+    ):
         robot_of(text)
     robot = robot_of(text, limits={"torque": None, "acceleration": 8.0})
     assert robot.n == 7

@@ -166,9 +166,8 @@ def plan(
             best = search.best
             assert best is not None
             searched = time.perf_counter()
-            known_after = searched - began
             report(
-                f"{best.status}: t_E = {best.t_end:.4f} s, after {known_after:.2f} s"
+                f"{best.status}: t_E = {best.t_end:.4f} s, after {searched - began:.2f} s"
             )
 
             left = Deadline(0.0) if search.interrupted else deadline
@@ -222,14 +221,13 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
-    task_map = problem.task_map
     if has_charts(problem, decompositions):
-        check_independent(task_map)
+        check_independent(problem.task_map)
         check_regular(problem)
     else:
         # Faulty decompositions are reported before the path is checked.
         decompositions.find()
-    check_within_reach(task_map, problem.path)
+    check_within_reach(problem)
     return Search(problem, decompositions, deadline, report)
 
 
@@ -303,7 +301,8 @@ def transcribe(
     program : TaskProgram
         ``program.guess`` is a point x to begin with, ``program.names`` says what stands where in x, and
         ``program.trajectory(x)`` is its motion, for `verify_trajectory`. There are as many knot intervals a phase as
-        the task says; with ``intervals: auto`` 10, the first mesh, which `plan` refines.
+        the task says; with ``intervals: auto`` 10, the first mesh, which `plan` refines. With ``knots: free`` their
+        lengths are variables.
     family : str
         Family of the closed form.
 

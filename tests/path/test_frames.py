@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from brachis.errors import PathError, StartError, TaskError
 from brachis.path import PathFrame, build_path
 from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import Placement, load_task
+from brachis.task.settings import place_frame
 from brachis.trajectory import Trajectory
 
 PLACE = {"xyz": [0.6, -0.2, 0.4], "rpy_deg": [20.0, -35.0, 110.0]}
@@ -245,6 +247,24 @@ def test_a_path_says_its_frame() -> None:
         | {"path": {"frame": "workpiece", "segments": SEGMENTS}}
     )
     assert together == apart
+
+
+def test_frames_may_be_nested_as_deep_as_one_likes() -> None:
+    count = 1500
+    place = pin.SE3(pin.rpy.rpyToMatrix(0.1, -0.2, 0.3), np.array([0.1, 0.2, 0.3]))
+    inner = {"xyz": [0.1, 0.2, 0.3], "rpy_deg": np.degrees([0.1, -0.2, 0.3]).tolist()}
+    names = [f"f{number}" for number in range(count)]
+    frames = {names[0]: inner}
+    frames |= {
+        name: {**inner, "frame": outer} for outer, name in itertools.pairwise(names)
+    }
+    task = written(SEGMENTS, frames=frames, path_frame=names[-1])
+    whole = pin.SE3(pin.exp6(count * pin.log6(place)))
+    np.testing.assert_allclose(
+        place_frame(task.frames, names[-1]).transform.homogeneous,
+        whole.homogeneous,
+        atol=1e-9,
+    )
 
 
 def test_frames_that_do_not_fit() -> None:

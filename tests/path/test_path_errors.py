@@ -283,10 +283,10 @@ def test_a_way_back_is_offered_no_blend(angle: float, advice: str) -> None:
 
 
 def test_all_corners_are_named() -> None:
-    assert "likewise path[1].stop, path[2].blend" in str(
+    assert "likewise path[1], path[2]" in str(
         refused([RIGHT, UP, {"line": {"by": [0, -1]}}, RIGHT], XY)
     )
-    assert "likewise path[1].blend, path[3].blend" in str(
+    assert "likewise path[1], path[3]" in str(
         refused([RIGHT, UP, RIGHT, RIGHT, UP], XY)
     )
 

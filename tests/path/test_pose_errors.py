@@ -226,7 +226,7 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
         ([RIGHT, {"turn": TURN}], ["a stop: ", "or set path[0].stop: true"]),
         (
             [RIGHT, UP, RIGHT, RIGHT | {"orientation": TURN}],
-            ["likewise path[1].blend, path[2].blend"],
+            ["likewise path[1], path[2]"],
         ),
         (
             [

@@ -379,22 +379,6 @@ def test_the_tolerance_of_a_fit_in_mm(tolerance: float | str, remark: str | None
     assert [str(issue) for issue in issues] == ([remark] if remark else [])
 
 
-@pytest.mark.parametrize(
-    ("position", "where"),
-    [
-        ({"sphere": 2.0}, ["tolerances.position.sphere"]),
-        ({"x": [-0.5, 0.001], "y": 0.1}, ["tolerances.position.x"]),
-        ({"sphere": 0.05, "z": 0.002}, []),
-    ],
-)
-def test_tolerances_of_the_position_in_mm(position, where):
-    asked = task(task_space="position", tolerances={"position": position})
-    asked["path"] = [{"line": {"by": [0.1, 0.0, 0.0]}}]
-    issues = of_task(brachis.load_task(asked))
-    assert [issue.where for issue in issues] == where
-    assert all("looks like mm" in issue.message for issue in issues)
-
-
 def test_only_the_start_posture_is_refused_where_nothing_is_said():
     content = task(
         task_space="joints",

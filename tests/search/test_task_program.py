@@ -35,7 +35,7 @@ def without_closed_form():
 PROGRAMS = {
     "closed form": (line, ["t_end", "s[3]", "s[4]"], "j3[16]"),
     "rest in velocity": (lambda: line(rest="velocity"), ["t_end", "s[2]"], "j3[17]"),
-    "free knots": (lambda: line(intervals=4).with_free_knots(0.1), ["t_end"], "h[3]"),
+    "free knots": (lambda: line(intervals=4, knots="free"), ["t_end"], "h[3]"),
     "path of joints": (
         lambda: brachis.transcribe(brachis.examples.from_toppra, intervals=8)[0],
         ["t_end", "s[2]", "s[3]"],
@@ -76,7 +76,8 @@ def test_a_name_says_what_its_variable_moves(case):
 
 
 @pytest.mark.parametrize(
-    "case", ["closed form", "path of joints", "chart", "obstacle", "stop"]
+    "case",
+    ["closed form", "free knots", "path of joints", "chart", "obstacle", "stop"],
 )
 def test_the_guess_is_a_motion_on_the_path(case):
     program = PROGRAMS[case][0]()
@@ -132,6 +133,19 @@ def test_solvers_agree_on_the_line_of_the_paper_and_more_points_make_it_verified
     trajectory = dense.trajectory(report.x)
     assert brachis.verify_trajectory(trajectory).passed
     assert answer.fun < trajectory.t_end < 1.01 * answer.fun
+
+
+def test_free_knots_are_variables():
+    """They move within what the task allows, and the motion is faster than with even ones."""
+    even, free = (
+        solvers_for("uno")[0].solve(program, program.guess, SolverOptions(), None)
+        for program in (line(intervals=6), line(intervals=6, knots="free"))
+    )
+    lengths = free.x[-6:]
+    assert lengths.sum() == pytest.approx(1.0, abs=1e-9)
+    assert lengths.min() >= 0.1 / 6 - 1e-9
+    assert np.ptp(lengths) > 0.05
+    assert free.objective < 0.99 * even.objective
 
 
 def test_a_point_that_is_none_is_refused():

@@ -233,7 +233,7 @@ def check_on_path(
 
 def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
     """Say what implausible positions in a posture, (n,), look like, such as degrees; None if all are plausible."""
-    ends = robot.limits.position_lower, robot.limits.position_upper
+    ends = robot.limits.both_ways("position")
     joints = zip(posture.tolist(), *ends, robot.position_units, strict=True)
     hints = (position_hint(*joint) for joint in joints)
     return next(filter(None, hints), None)

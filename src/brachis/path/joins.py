@@ -74,16 +74,10 @@ class Join:
         return f"path[{self.index}].blend"
 
     @property
-    def key(self) -> str:
-        """The key that rounds the corner, or stops at it where the path turns back too far for a blend."""
-        before, after = (side[1, : self.positions] for side in self.sides())
-        is_sharp = angle_between(before, after) > _SHARPEST
-        return f"path[{self.index}].stop" if is_sharp else self.blend_key
-
-    @property
     def rounding(self) -> str:
         """What to set to round the corner, if a blend can, or to stop at it."""
-        if self.key != self.blend_key:
+        before, after = (side[1, : self.positions] for side in self.sides())
+        if angle_between(before, after) > _SHARPEST:
             return self.stopping
         return f"{self.blend_key} ({self.unit}) to round it, or {self.stopping}"
 
@@ -165,7 +159,7 @@ def refuse_corners(corners: Sequence[Corner | None]) -> None:
     if not refused:
         return
     join, found, advice = refused[0]
-    others = ", ".join(other.key for other, *_ in refused[1:])
+    others = ", ".join(f"path[{other.index}]" for other, *_ in refused[1:])
     raise PathError(
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -15,13 +15,13 @@ from brachis.errors import InputError, PathError, Remedy, StartError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments, Role
 from brachis.limits.joint import PositionLimit, position_measure
-from brachis.path import Path, check_on_path
+from brachis.path import check_on_path
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import complement, difference
 from brachis.robot.plausibility import position_hint
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import TURN_ROWS
-from brachis.task import SplineSettings, Task
+from brachis.task import SplineSettings
 
 if TYPE_CHECKING:
     from brachis.problem.problem import Problem
@@ -36,55 +36,40 @@ _MOVE_BODIES = (
 )
 
 
-def check_postures(
-    task_map: TaskMap,
-    limits: Sequence[Limit],
-    postures: Mapping[str, np.ndarray],
-    path: Path,
-    task: Task,
-) -> tuple[Limit, ...]:
+def check_postures(problem: Problem) -> tuple[Limit, ...]:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
-
-    Parameters
-    ----------
-    task_map : TaskMap
-    limits : sequence of Limit
-    postures : mapping of str to (n,) ndarray
-        Those of ``start`` and ``end`` that are given.
-    path : Path
-    task : Task
-        Its ``refinement.tolerance`` is by how much limits may be exceeded anywhere.
 
     Returns
     -------
     tuple of Limit
-        Widened where such a posture, or a path of joints, exceeds them within the tolerance.
+        Widened where such a posture, or a path of joints, exceeds them within ``refinement.tolerance``.
 
     Raises
     ------
     StartError
     """
-    robot = task_map.robot
+    task = problem.task
+    robot = problem.robot
+    limits = problem.limits
     tolerance = task.refinement.tolerance
-    for end, posture in postures.items():
+    for end, posture in problem.given_postures.items():
         key = task.posture_key(end)
         _check_range(robot, posture[None], key, tolerance)
         _check_at_rest(robot, limits, posture, key, tolerance)
-        limits = [_widen(limit, posture[None], tolerance) for limit in limits]
-    if "end" in postures:
-        (last,) = path.sample([1.0]).target
-        end_key = task.posture_key("end")
-        check_on_path(task_map, postures["end"], last, "end", end_key)
-    if isinstance(task_map, JointSpace):
-        along = path.sample(np.linspace(0.0, 1.0, 401)).target
+        limits = tuple(_widen(limit, posture[None], tolerance) for limit in limits)
+    along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
+    if problem.end is not None:
+        key = task.posture_key("end")
+        check_on_path(problem.task_map, problem.end, along[-1], "end", key)
+    if isinstance(problem.task_map, JointSpace):
         _check_range(robot, along, "path", tolerance)
-        limits = [
+        limits = tuple(
             _widen(limit, along, tolerance)
             if isinstance(limit, PositionLimit)
             else limit
             for limit in limits
-        ]
-    return tuple(limits)
+        )
+    return limits
 
 
 def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
@@ -222,14 +207,18 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
         jumping = {2: "velocity", 3: "acceleration"}[limit.order]
         asked = f"the {limit.name} limit needs a continuous {jumping}"
         if spline.degree < limit.order:
-            found = f"{spline.degree}, with which it jumps at knots"
             raise InputError(
-                asked, where="spline.degree", found=found, allowed=f">= {limit.order}"
+                asked,
+                where="spline.degree",
+                found=f"{spline.degree}, with which it jumps at knots",
+                allowed=f">= {limit.order}",
             )
         if spline.vanishing + 1 < limit.order:
-            found = f"{spline.rest}, with which it jumps at the ends"
             raise InputError(
-                asked, where="spline.rest", found=found, allowed="full or jerk"
+                asked,
+                where="spline.rest",
+                found=f"{spline.rest}, with which it jumps at the ends",
+                allowed="full or jerk",
             )
 
 
@@ -341,8 +330,7 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, key: str) ->
     target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
     gap = difference(answers, posture[rest], robot.revolute[rest])
-    exists = np.isfinite(gap).all(axis=2)
-    gaps = np.where(exists, np.abs(gap).max(axis=2), np.inf).min(axis=1)
+    gaps = np.nan_to_num(np.abs(gap).max(axis=2), nan=np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]
     if gaps[branch] > tolerances.POSTURE or np.any(margins <= tolerances.ANGLE):

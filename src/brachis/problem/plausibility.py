@@ -61,9 +61,6 @@ USUAL = {
     "path_start": ("the angle looks like degrees", TURN, "rad", ""),
     "path": ("the turn of the angle looks like degrees", 2.0 * TURN, "rad", ""),
     "path.dwell": ("the time looks like ms", 100.0, "s", ""),
-    # Of fits to points: the coarsest scans scatter by some mm.
-    "tolerance.position": ("the tolerance looks like mm", 5e-3, "m", ""),
-    "tolerances.position": ("the tolerance looks like mm", 0.2, "m", ""),
     "link": ("the distance from the joint before looks like mm", 20.0, "m", ""),
     # Times the arm's length.
     "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
@@ -106,35 +103,35 @@ Some of the largest figures are ratios to the robot's own measure.
 
 
 def _figure(
-    key: str, value: float, scale: float = 1.0, where: str = "", advice: str = ""
+    key: str, value: float, scale: float = 1.0, where: str = ""
 ) -> Iterator[Issue]:
     """Compare a value with `scale` times the largest usual one."""
     message, largest, unit, aside = USUAL[key]
-    usual = largest * scale
-    return issue_above(where or key, message, value, usual, unit, aside, advice=advice)
+    return issue_above(where or key, message, value, largest * scale, unit, aside)
 
 
 def of_task(task: Task) -> tuple[Issue, ...]:
-    """Look at limits of the tool, bodies, angles, tolerances, and points that the path was fitted to."""
-    return (*_tool(task), *_bodies(task), *_angles(task), *_tolerances(task))
+    """Look at limits of the tool, bodies, angles, and points that the path was fitted to."""
+    return (*_tool(task), *_bodies(task), *_angles(task), *_fits(task))
 
 
-def _tolerances(task: Task) -> Iterator[Issue]:
-    """Look at the points that the path was fitted to, and at how far from points and path the tool may be."""
+def _fits(task: Task) -> Iterator[Issue]:
+    """Look at the points that the path was fitted to, and at how far from them it may be."""
     for fit in task.fits:
         where = f"path: {fit.source}"
         if fit.doubt:
             usual = "a path within the robot's reach"
             yield Issue(where, fit.doubt, f"{fit.length:.4g} m", usual)
         tolerance = fit.position_tolerance
-        advice = f"{tolerance:.6g} m are {1e3 * tolerance:.6g} mm; write '{tolerance:.6g} mm' for mm"
-        where += ": tolerance.position"
-        yield from _figure("tolerance.position", tolerance, 1.0, where, advice)
-    for key, ends in task.tolerances.position:
-        if key != "axes":
-            farthest = float(np.abs(ends or 0.0).max())
-            where = f"tolerances.position.{key}"
-            yield from _figure("tolerances.position", farthest, where=where)
+        # The coarsest scans scatter by some mm.
+        yield from issue_above(
+            f"{where}: tolerance.position",
+            "the tolerance looks like mm",
+            tolerance,
+            5e-3,
+            "m",
+            advice=f"{tolerance:.6g} m are {1e3 * tolerance:.6g} mm; write '{tolerance:.6g} mm' for mm",
+        )
 
 
 def _bodies(task: Task) -> Iterator[Issue]:
@@ -152,15 +149,12 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
     """Look at what a task says about where the robot is, in postures or along a path of joints."""
     task_map = problem.task_map
     along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
-    looked_at = {
-        problem.task.posture_key(end): posture
-        for end, posture in problem.given_postures.items()
-    }
-    if isinstance(task_map, JointSpace):
-        looked_at["path"] = along
     issues: list[Issue] = []
-    for key, postures in looked_at.items():
-        issues += of_postures(task_map.robot, key, postures)
+    for end, posture in problem.given_postures.items():
+        key = problem.task.posture_key(end)
+        issues += of_postures(problem.robot, key, posture)
+    if isinstance(task_map, JointSpace):
+        issues += of_postures(problem.robot, "path", along)
     if task_map.angles and task_map.angles[0] in ANGLES:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
@@ -180,8 +174,8 @@ def of_postures(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]
         values = postures.reshape(-1, robot.n)[:, i]
         value = float(values[np.argmax(np.abs(values))])
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
-        of_posture = key.startswith(("start.", "end.", "postures."))
-        more = f"; in a task file: !degrees {value:.6g}" if of_posture else ""
+        # Neither the path nor an option is a key of a posture.
+        more = f"; in a task file: !degrees {value:.6g}" if "." in key else ""
         yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
 
 
@@ -351,13 +345,15 @@ def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
     return f", after {steps[:200].sum():.3g} m of {steps.sum():.3g} m"
 
 
-def check_within_reach(task_map: TaskMap, path: Path) -> None:
+def check_within_reach(problem: Problem) -> None:
     """Refuse a path of the tool that is farther away than the arm's links and slides together can reach.
 
     Raises
     ------
     PathError
     """
+    task_map = problem.task_map
+    path = problem.path
     if not task_map.axes:  # of joints
         return
     s = np.linspace(0.0, 1.0, 401)

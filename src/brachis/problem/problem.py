@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -94,35 +94,35 @@ class Problem(Summary):
             for a limit.
         """
         robot, task_map = bind(robot, task.task_space, task.tolerances)
-        joints = {"start": task.joints_at("start"), "end": task.joints_at("end")}
-        postures = {
-            end: robot.posture(*given) for end, given in joints.items() if given
-        }
+        start, end = (
+            stated and robot.posture(*stated)
+            for stated in (task.joints_at("start"), task.joints_at("end"))
+        )
         path = path_of(task_map, task)
         task = with_held_speeds(with_feed_rates(task, path), task_map, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
-            if "start" in postures:
-                postures["end"] = postures["start"]
+            end = start
         legs = legs_of(task, task_map, path)
         time_laws = tuple(time_law_of(leg, task_map, path) for leg in legs)
         limits = limits_of(robot, task, user_limits)
         check_smoothness(limits, task.spline)
-        limits = check_postures(task_map, limits, postures, path, task)
-        if "end" in postures and not task.boundary.periodic:
-            postures["end"] = _on_path(task_map, postures["end"], path)
-        return cls(
+        problem = cls(
             task,
             robot,
             task_map,
             path,
-            postures.get("start"),
-            postures.get("end"),
+            start,
+            end,
             limits,
             legs,
             time_laws,
             tuple(user_limits),
         )
+        limits = check_postures(problem)
+        if end is not None and not task.boundary.periodic:
+            end = _on_path(task_map, end, path)
+        return replace(problem, limits=limits, end=end)
 
     @property
     def given_postures(self) -> dict[str, np.ndarray]:
@@ -272,11 +272,11 @@ class Decompositions(Sequence[Decomposition]):
 
     def __len__(self) -> int:
         """How many they are."""
-        return len(self.find())
+        return len(self._found)
 
     def __getitem__(self, index: Any) -> Any:
         """Return one of them, or some."""
-        return self.find()[index]
+        return self._found[index]
 
 
 def decompositions_of(

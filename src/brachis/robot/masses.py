@@ -22,9 +22,14 @@ def list_users(
 ) -> list[str]:
     """List the keys of the task that need masses; a torque limit may also be an effort of the URDF."""
     is_user = {
-        f"limits.{kind}": np.isfinite(limits.both_ways(kind)).any()
+        f"limits.{kind}.{body.joint}": is_limited
         for kind, row in LIMIT_KINDS.items()
         if row.needs_masses
+        for body, is_limited in zip(
+            dynamics.bodies,
+            np.isfinite(limits.both_ways(kind)).any(axis=0),
+            strict=False,
+        )
     }
     is_user |= {
         "limits.torque_speed": any(limits.torque_speed),

@@ -66,6 +66,9 @@ def _list_omitted(compiled: Any) -> list[str]:
     """List what a URDF cannot say, and how often the file says it."""
     is_on_joint = compiled.actuator_trntype <= _ON_JOINT
     counts = {
+        "collision shapes": np.count_nonzero(
+            compiled.geom_contype | compiled.geom_conaffinity
+        ),
         "equality constraints": compiled.neq,
         "tendons": compiled.ntendon,
         "flexible bodies": compiled.nflex,

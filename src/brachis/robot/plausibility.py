@@ -108,7 +108,7 @@ def refuse_issues(
     PlausibilityError
     """
     groups: dict[tuple[str, str], list[Issue]] = {}
-    for issue in issues:
+    for issue in dict.fromkeys(issues):  # a posture may stand at both ends
         stem = issue.where.rpartition(".")[0]
         groups.setdefault((stem, issue.message), []).append(issue)
     joined = tuple(_join(stem, group) for (stem, _), group in groups.items())

@@ -32,6 +32,9 @@ class TaskProgram(Program):
 
     def __init__(self, start: InitialGuess) -> None:
         program = program_of(start.problem, start.maps_by_leg())
+        spline = start.problem.task.spline
+        if spline.knots == "free":
+            program = program.with_free_knots(spline.shortest_interval)
         super().__init__(program.phases, program.links)
         self._start = start
 

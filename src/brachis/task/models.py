@@ -266,8 +266,8 @@ class Task(CheckedModel):
             )
         return path
 
-    def joints_at(self, end: Literal["start", "end"]) -> tuple[Any, str] | None:
-        """Return the joint positions that the task gives at an end, and their key; None where it is free."""
+    def joints_at(self, end: str) -> tuple[Any, str] | None:
+        """Return the joint positions given at ``start`` or ``end``, and their key; None where it is free."""
         posture = getattr(self, end)
         if isinstance(posture, Posture):
             return posture.joints, f"{end}.joints"
@@ -275,8 +275,8 @@ class Task(CheckedModel):
             return None
         return self.postures[posture], f"postures.{posture}"
 
-    def posture_key(self, end: Literal["start", "end"]) -> str:
-        """Return the key of the joint positions at an end; of a periodic motion that of its start."""
+    def posture_key(self, end: str) -> str:
+        """Return the key of the joint positions at ``start`` or ``end``; of a periodic motion that of its start."""
         stated = self.joints_at(end) or self.joints_at("start")
         return stated[1] if stated else f"{end}.joints"
 

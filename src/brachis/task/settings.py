@@ -69,11 +69,16 @@ class FramePlacement(Placement):
 
 def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Placement:
     """Return where a frame is in the world, through all frames in which it is placed; None is the world."""
-    placed = Placement() if name is None else frames[name]
-    if not isinstance(placed, FramePlacement) or placed.frame is None:
+    if name is None:
+        return Placement()
+    placed = frames[name]
+    if placed.frame is None:
         return placed
-    outer = place_frame(frames, placed.frame)
-    return Placement.model_validate(outer.transform * placed.transform)
+    transform = placed.transform
+    while placed.frame is not None:
+        placed = frames[placed.frame]
+        transform = placed.transform * transform
+    return Placement.model_validate(transform)
 
 
 def check_frames(

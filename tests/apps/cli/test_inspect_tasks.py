@@ -96,7 +96,7 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
     outcome = run("inspect", file)
     text = outcome.out.replace("\n", " ")
     assert "add [link_1 0, floor] to collisions.disable" in text
-    assert "the task cannot be planned: start.joints" in text
+    assert "the task cannot be planned: postures.home" in text
     pairs = json.loads(run("inspect", file, "--json").out)["collisions"]["never_free"]
     free = run("inspect", file, "--set", f"collisions.disable={json.dumps(pairs)}")
     assert free.code == 0
@@ -120,3 +120,16 @@ def test_it_fits_a_screen_and_has_the_reasons_where_asked(run) -> None:
     many = run("inspect", "gen3_rails").out
     assert len(many.splitlines()) < 50
     assert "and 72 more" in many
+
+
+def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path) -> None:
+    pytest.importorskip("mujoco")
+    file = tmp_path / "arm.xml"
+    file.write_text(
+        """<mujoco><worldbody><body name="b"><joint name="k" axis="1 0 0" range="-90 90"/>
+        <geom size="0.1" pos="0 0 1"/></body></worldbody></mujoco>"""
+    )
+    for _ in range(2):
+        outcome = run("inspect", file)
+        assert outcome.code == 0
+        assert outcome.err.count("left out: collision shapes (1)") == 1

@@ -114,6 +114,16 @@ MISTAKES = [
     ),
     ("G0 X1 Y1 Z1\nG4 P2", r"line 2: a dwell is not read: .*; found G4"),
     ("G7 G18\nG0 X1 Y1 Z1", r"line 1: X would be a diameter: .*; found G7"),
+    (
+        "G0 X1 Y1 Z1\nG1 X2e1 F10",
+        r"line 2: .* not understood; found 'X2E1'; .*without exponents",
+    ),
+    (
+        "G0 X1 Y1 Z1\nG1 X2. Y1.25E-05",
+        r"line 2: this is not understood; found 'Y1.25E-05'",
+    ),
+    ("G0 X1 Y1 Z1\nG1 X.5E+1", r"line 2: this is not understood; found 'X.5E\+1'"),
+    ("G0 X1 Y1 Z1\nG1 X 12 E3 Y5E.2", r"line 2: this is not understood; found 'Y5E.2'"),
     ("G0 X1 Y1 Z1\n/G1 X2 F10", r"line 2: this is not understood; .*no / at the start"),
     ("G0 X1 Y1 Z1\nG1 X2 X3 F10", r"line 2: a letter stands twice .*; found X3"),
     ("G0 X1 Y1 Z1\nG1 X2 P2 F10", r"line 2: the letter P of this G1 .*; found P2"),

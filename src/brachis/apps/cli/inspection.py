@@ -158,7 +158,7 @@ def _problem_of(
             for pair in collisions["never_free"]
         ]
         problem = Problem.of(robot, task)
-        check_within_reach(problem.task_map, problem.path)
+        check_within_reach(problem)
     except InputError as error:
         report_issues(of_robot(robot) + of_task(task), strict=task.strict)
         if is_needed and not collisions["never_free"]:

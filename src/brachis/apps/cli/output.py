@@ -297,7 +297,7 @@ def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None
 def show_warnings() -> Iterator[None]:
     """Print warnings of brachis as messages on standard error; a quiet command prints none."""
     with warnings.catch_warnings():
-        warnings.simplefilter("always", BrachisWarning)
+        warnings.simplefilter("default", BrachisWarning)
         usual = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any) -> None:

@@ -23,7 +23,10 @@ from brachis.task.fields import POSITION
 from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
-_WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_WORD = re.compile(
+    r"((?<![0-9.])E|[A-DF-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?![0-9.]*E[0-9.+-])"
+)
+"""A letter and its number, which has no exponent: an E that follows a number at once is no word."""
 _COMMENT = re.compile(r"\([^)]*\)|;.*$|%")
 _MODES: Final = {
     **{f"G{number}": ("motion", f"G{number}") for number in range(4)},
@@ -164,8 +167,9 @@ def _obey(machine: _Machine, code: str) -> None:
     if "F" in values:
         feed = values.pop("F")
         if not feed > 0.0:
-            allowed = "more than 0"
-            raise machine.wrong("a feed rate must be positive", f"F{feed:g}", allowed)
+            raise machine.wrong(
+                "a feed rate must be positive", f"F{feed:g}", "more than 0"
+            )
         machine.feed = feed * machine.unit / 60.0
     if not set("XYZIJKR") & set(values):
         machine.skipped |= set(values)
@@ -184,7 +188,7 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
         raise machine.wrong(
             "this is not understood",
             repr(rest[:40]),
-            "G-code words, such as G1 X10 F600; no / at the start of a line",
+            "G-code words, such as G1 X10 F600, without exponents; no / at the start of a line",
         )
     values: dict[str, float] = {}
     codes = []
@@ -192,9 +196,10 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
         if letter in "GM":
             codes.append(f"{letter}{float(text):g}")
         elif letter in "ABCUVW":
-            allowed = "X, Y, Z, I, J, K, R, F"
             raise machine.wrong(
-                "axes other than X, Y, Z are not read", letter + text, allowed
+                "axes other than X, Y, Z are not read",
+                letter + text,
+                "X, Y, Z, I, J, K, R, F",
             )
         elif letter in values:
             raise machine.wrong(
@@ -315,8 +320,11 @@ def _arc(
         swept = turn
     turns = values.get("P", 1.0)
     if not 1.0 <= turns <= _MOST_TURNS or turns % 1.0:
-        allowed = f"a whole number from 1 to {_MOST_TURNS}"
-        raise machine.wrong("invalid number of turns of an arc", f"P{turns:g}", allowed)
+        raise machine.wrong(
+            "invalid number of turns of an arc",
+            f"P{turns:g}",
+            f"a whole number from 1 to {_MOST_TURNS}",
+        )
     swept += (turns - 1.0) * turn
     count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
     shares = _shares(count)
