@@ -221,12 +221,13 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
+    task_map = problem.task_map
     if has_charts(problem, decompositions):
-        check_independent(problem.task_map)
-        check_regular(problem)
+        check_independent(task_map)
+        check_regular(problem.task, task_map, problem.given_postures)
     else:
-        # Faulty decompositions are reported before the path is checked.
-        decompositions.find()
+        # They are found here, so that faulty ones are reported before the path is checked.
+        len(decompositions)
     check_within_reach(problem)
     return Search(problem, decompositions, deadline, report)
 

@@ -143,9 +143,14 @@ ELSEWHERE = brachis.Line(by=[0.1, 0.0, 0.0])
 def test_errors_name_the_key_of_a_posture(
     keys: dict[str, Any], key: str, message: str
 ) -> None:
-    home = keys.pop("home", HOME)
+    """Singular ones are refused before the search."""
+
+    def check() -> None:
+        given = problem("position", **keys)
+        check_regular(given.task, given.task_map, given.given_postures)
+
     with pytest.raises(StartError, match=message) as caught:
-        check_regular(problem("position", home=home, **keys))
+        check()
     assert caught.value.where == key
 
 

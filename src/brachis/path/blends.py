@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from decimal import ROUND_DOWN, Context
 from itertools import combinations
+from math import floor
 
 import numpy as np
 
@@ -99,12 +99,11 @@ def _check_neighbours(join: Join, size: float) -> None:
         )
     longest = join.shorter / 2 * (1.0 + tolerances.ROUNDING)
     if size > longest:
-        # So that the blend that the message names is accepted.
-        written = Context(prec=4, rounding=ROUND_DOWN).create_decimal(longest)
         raise join.wrong_blend(
             "the blend is longer than half of a neighbouring segment",
             found,
-            f"at most {float(written):g} {join.unit}",
+            # Rounded down, to micrometres, so that the blend that the message names is accepted.
+            f"at most {floor(longest * 1e6) / 1e6:.10g} {join.unit}",
             position_hint(size, 0.0, longest, join.unit),
         )
 

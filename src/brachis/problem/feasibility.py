@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,16 +14,13 @@ from brachis.errors import InputError, PathError, Remedy, StartError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments, Role
 from brachis.limits.joint import PositionLimit, position_measure
-from brachis.path import check_on_path
+from brachis.path import Path, check_on_path
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import complement, difference
 from brachis.robot.plausibility import position_hint
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import TURN_ROWS
-from brachis.task import SplineSettings
-
-if TYPE_CHECKING:
-    from brachis.problem.problem import Problem
+from brachis.task import SplineSettings, Task
 
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
@@ -36,8 +32,23 @@ _MOVE_BODIES = (
 )
 
 
-def check_postures(problem: Problem) -> tuple[Limit, ...]:
+def check_postures(
+    task: Task,
+    task_map: TaskMap,
+    limits: tuple[Limit, ...],
+    postures: Mapping[str, np.ndarray],
+    path: Path,
+) -> tuple[Limit, ...]:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
+
+    Parameters
+    ----------
+    task : Task
+    task_map : TaskMap
+    limits : tuple of Limit
+    postures : mapping of str to (n,) ndarray
+        Those of ``start`` and ``end`` that are given.
+    path : Path
 
     Returns
     -------
@@ -48,20 +59,18 @@ def check_postures(problem: Problem) -> tuple[Limit, ...]:
     ------
     StartError
     """
-    task = problem.task
-    robot = problem.robot
-    limits = problem.limits
+    robot = task_map.robot
     tolerance = task.refinement.tolerance
-    for end, posture in problem.given_postures.items():
+    for end, posture in postures.items():
         key = task.posture_key(end)
         _check_range(robot, posture[None], key, tolerance)
         _check_at_rest(robot, limits, posture, key, tolerance)
         limits = tuple(_widen(limit, posture[None], tolerance) for limit in limits)
-    along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
-    if problem.end is not None:
+    along = path.sample(np.linspace(0.0, 1.0, 401)).target
+    if "end" in postures:
         key = task.posture_key("end")
-        check_on_path(problem.task_map, problem.end, along[-1], "end", key)
-    if isinstance(problem.task_map, JointSpace):
+        check_on_path(task_map, postures["end"], along[-1], "end", key)
+    if isinstance(task_map, JointSpace):
         _check_range(robot, along, "path", tolerance)
         limits = tuple(
             _widen(limit, along, tolerance)
@@ -242,20 +251,21 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     return found, f"{word} {figures[0]}"
 
 
-def check_regular(problem: Problem) -> None:
+def check_regular(
+    task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
+) -> None:
     """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
 
     Raises
     ------
     StartError
     """
-    task_map = problem.task_map
-    for end, posture in problem.given_postures.items():
+    for end, posture in postures.items():
         jacobian = task_map.jacobian(task_map.twists(posture[None]))
         if _least_singular_values(jacobian)[0] < _REGULAR:
             raise StartError(
                 f"the {end} posture is singular",
-                where=problem.task.posture_key(end),
+                where=task.posture_key(end),
                 found="a posture in which the tool cannot move in all directions of the task space",
                 allowed="a posture in which it can",
                 hint="Bend the arm a little",

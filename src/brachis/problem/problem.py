@@ -119,7 +119,8 @@ class Problem(Summary):
             time_laws,
             tuple(user_limits),
         )
-        limits = check_postures(problem)
+        postures = problem.given_postures
+        limits = check_postures(task, task_map, limits, postures, path)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return replace(problem, limits=limits, end=end)
@@ -266,10 +267,6 @@ class Decompositions(Sequence[Decomposition]):
     def _found(self) -> list[Decomposition]:
         return decompositions_of(self._problem, self._families)
 
-    def find(self) -> list[Decomposition]:
-        """Return them all; raises as `decompositions_of` does."""
-        return self._found
-
     def __len__(self) -> int:
         """How many they are."""
         return len(self._found)
@@ -343,7 +340,7 @@ def decompositions_of(
     if refusals and not allowed and (asked or robot.n == task_map.m):
         raise refusals[0]
     if not allowed:
-        check_regular(problem)
+        check_regular(task, task_map, problem.given_postures)
     return sorted(allowed, key=lambda decomposition: -decomposition.clearance)
 
 
