@@ -390,14 +390,3 @@ def test_what_the_commands_need_is_installed_by_what_the_readme_says():
     assert asked <= set(extras)
     assert load(ROOT / "tasks.py").INSTALL["demo"] == ".[all]"
     assert 'pip install ".[all]"' in README
-
-
-def test_files_that_the_readme_writes_into_a_clone_are_ignored():
-    ignored = (ROOT / ".gitignore").read_text().splitlines()
-    files = re.findall(r'(?:--out |save\(")([\w.]+)', README)
-    assert "first.yaml" in files
-    assert {
-        name
-        for name in files
-        if f"/{name}" not in ignored and f"{name}/" not in ignored
-    } == set()
