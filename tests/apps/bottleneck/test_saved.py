@@ -123,7 +123,7 @@ def test_own_limits_are_passed_again(tmp_path):
     result = brachis.plan(
         brachis.examples.scara_line,
         redundant_joints=["j3"],
-        intervals=8,
+        intervals=10,
         effort="single",
         start={"joints": [0.5236, -1.9, 1.9]},
         **own,
