@@ -17,8 +17,9 @@ that a task does not use would make the same plan, and is left out. Every plan i
 plans that stand there are not made again.
 
 The table says how many tasks use a mechanism, and for these: end times and processor times without it, as ratios to
-those with it. A mechanism is to go if it gains less than 0.1 % of the end time on every task, loses no plan, and gains
-less than a tenth of the processor time, in the sum and in the geometric mean.
+those with it. A mechanism is to go if it gains less than 0.1 % of the end time on every task, no plan fails without
+it, and it gains less than a tenth of the processor time, in the sum and in the geometric mean. That is said by these
+figures alone: guards (`child_process`) and what a task asks for (`idle_joints`, `hopeless`) stay for other reasons.
 """
 
 from __future__ import annotations
@@ -172,8 +173,8 @@ def summarise(
         name,
         f"{len(times)} of {len(tasks)}",
         f"{np.exp(np.log(ratios).mean()):.5f}",
-        write_change(*ends[-1]) if ends else "",
-        write_change(*ends[0]) if ends else "",
+        write_change(*ends[-1]) if ends and ends[-1][0] > 1.0 else "none",
+        write_change(*ends[0]) if ends and ends[0][0] < 1.0 else "none",
         f"{', '.join(lost) or 'none'}; {', '.join(won) or 'none'}",
         f"{total:.2f}",
         f"{mean:.2f}",
@@ -183,11 +184,9 @@ def summarise(
 
 def write_change(ratio: float, task: str) -> str:
     """Write by how much an end time changes, and for which task; nothing if it hardly does."""
-    return (
-        f"{100.0 * (ratio - 1.0):+.3f} % ({task})"
-        if abs(ratio - 1.0) > 1e-5
-        else "none"
-    )
+    if abs(ratio - 1.0) < 1e-5:
+        return "none"
+    return f"{100.0 * (ratio - 1.0):+.3f} % ({task})"
 
 
 def choose_tasks(count: int | None, words: Sequence[str]) -> list[AblationTask]:
@@ -208,7 +207,7 @@ def main() -> None:
     parser.add_argument("--without", nargs="+", metavar="NAME")
     parser.add_argument("--tasks", type=int, metavar="COUNT")
     parser.add_argument("--only", nargs="+", default=[""], metavar="WORD")
-    parser.add_argument("--seconds", type=float, default=8.0)
+    parser.add_argument("--seconds", type=float, default=4.0)
     parser.add_argument("--out", type=Path, default=Path("ablation.jsonl"))
     parser.add_argument("--save", action="store_true")
     given = parser.parse_args()
@@ -218,15 +217,19 @@ def main() -> None:
     tasks = choose_tasks(given.tasks, given.only)
     brachis.plan(example(1))  # what is loaded on first use is not timed
     lines = run(tasks, mechanisms, given.out, given.seconds)
+    timed = [task.name for task in tasks if (task.name, TIMED) in lines]
     rows = []
-    for mechanism in mechanisms:
-        row = summarise(lines, mechanism.name, [task.name for task in tasks])
+    for mechanism in mechanisms[1:]:
+        row = summarise(lines, mechanism.name, timed)
         if row is not None:
             rows.append(row)
     print(f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|")
     for row in rows:
         print(f"| {' | '.join(row)} |")
-    about = "Ratios are those of plans without a mechanism to plans with it, over the tasks that use it."
+    about = (
+        f"{len(timed)} tasks; ratios are those of plans without a mechanism to plans with it, over the tasks that use "
+        "it. Processor times scatter by 5 to 7 %."
+    )
     save("What mechanisms gain", COLUMNS, rows, about)
 
 

@@ -16,6 +16,7 @@ from unittest import mock
 
 import numpy as np
 
+from brachis.errors import BrachisError
 from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.retiming import FINE, improve_joint_paths
@@ -94,7 +95,11 @@ def _recorder(
 
     @functools.wraps(original, updated=())
     def call(*arguments: Any, **keywords: Any) -> Any:
-        result = original(*arguments, **keywords)
+        try:
+            result = original(*arguments, **keywords)
+        except BrachisError:
+            names.add(mechanism.name)
+            raise
         if mechanism.is_used(result, *arguments, **keywords):
             names.add(mechanism.name)
         return result
