@@ -4,7 +4,7 @@ Usage: python benchmarks/ablation.py [--without NAME ...] [--tasks COUNT] [--onl
        [--seconds S] [--out FILE] [--save]
 
     python benchmarks/ablation.py --without near_rows --tasks 20
-    python benchmarks/ablation.py --without pull+slow_down --only rms tolerance
+    python benchmarks/ablation.py --without near_rows+follow_again --only rms tolerance
 
 Mechanisms and how they are switched off stand in `ablation_mechanisms`, tasks in `ablation_tasks`. --without takes
 names of mechanisms, several of them joined by + for all of them at once; if it is left out, all are tried one by one.

@@ -14,10 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 from unittest import mock
 
-import numpy as np
-
 from brachis.errors import BrachisError
-from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.retiming import FINE, improve_joint_paths
 from brachis.search.over_path import improve_guess, plan_timing
@@ -146,11 +143,6 @@ def solve_all_rows(program: Any, x: Any, solve: Callable[..., Any]) -> Any:
     return solve(program, x)
 
 
-def ease_nothing(_program: Any, x: Any, *_arguments: Any) -> Any:
-    """Take the place of `solve_without_third_order_limits`."""
-    return x, ()
-
-
 def choose_by_estimate(starts: Any, most: int, *_arguments: Any) -> Any:
     """Take the place of `screen`."""
     return sorted(starts, key=lambda start: start.estimate)[:most]
@@ -184,11 +176,6 @@ def plan_from_motion_alone(
 def fit_untimed(_phase: Any, curves: Any) -> Any:
     """Take the place of `_time_guess`."""
     return curves, None
-
-
-def space_evenly(count: int, *_lengths: float) -> Any:
-    """Take the place of `grade_breaks`."""
-    return np.linspace(0.0, 1.0, count + 1)
 
 
 def solve_here(
@@ -233,27 +220,6 @@ MECHANISMS = (
         use=_OPTIMISE + "near_rows.NearRows.__init__",
     ),
     Mechanism(
-        "margins",
-        "the smallest branch margin from the first solve on",
-        {
-            _SEARCH + "continuation.MARGINS": MARGINS[-1:],
-            _SEARCH + "candidates.MARGINS": MARGINS[-1:],
-        },
-        use=_SEARCH + "continuation.solve_by_margin_continuation",
-    ),
-    Mechanism(
-        "eased_limits",
-        "limits on third derivatives from the first solve on",
-        {_SEARCH + "candidates.solve_without_third_order_limits": ease_nothing},
-        is_used=lambda result, *_: bool(result[1]),
-    ),
-    Mechanism(
-        "lost_points",
-        "no points added where the motion leaves its chart between collocation points",
-        {_SEARCH + "continuation.add_points_where_lost": return_none},
-        is_used=is_found,
-    ),
-    Mechanism(
         "best_joints",
         "no other chart or joints in place of its rows after a solve over time",
         {_SEARCH + "candidates.best_of_joints": return_second},
@@ -263,24 +229,6 @@ MECHANISMS = (
         "idle joints move as they like",
         {_SEARCH + "fewer_joints._hold_idle_joints": return_none},
         is_used=is_found,
-    ),
-    Mechanism(
-        "slow_down",
-        "solves begin with motions slightly beyond the limits",
-        {_OPTIMISE + "improve._slow_down": return_second},
-        is_used=lambda result, _program, x: result is not x,
-    ),
-    Mechanism(
-        "pull",
-        "no pull towards the motion that is refined",
-        {_SEARCH + "candidates._PULL": 0.0},
-        use=_OPTIMISE + "pull.Pulled.__init__",
-    ),
-    Mechanism(
-        "levels",
-        "a solve over time begins over all given knots",
-        {_SEARCH + "candidates.coarsest": return_first},
-        is_used=lambda result, program: result.intervals != program.intervals,
     ),
     Mechanism(
         "halving",
@@ -332,11 +280,6 @@ MECHANISMS = (
         is_used=is_found,
     ),
     Mechanism(
-        "second_opinion",
-        "no fallback where the best motion is far slower than its joint path allows",
-        {_SEARCH + "portfolio.Search._second_opinion": return_empty},
-    ),
-    Mechanism(
         "begin_with_timing",
         "solves over time begin with even knots",
         {_SEARCH + "candidates.begin_with_timing": return_none},
@@ -371,19 +314,9 @@ MECHANISMS = (
         is_used=is_found,
     ),
     Mechanism(
-        "centred_chart",
-        "the chart is not laid anew around the better joint path",
-        {_SEARCH + "over_path._centre": return_first},
-    ),
-    Mechanism(
         "timed_guess",
         "guesses over time are smooth from rest to rest",
         {_SEARCH + "phase_plane._time_guess": fit_untimed},
-    ),
-    Mechanism(
-        "graded_knots",
-        "even knots beside phases of given speed",
-        {_SEARCH + "phase_plane.grade_breaks": space_evenly},
     ),
     Mechanism(
         "solver_for_large",
