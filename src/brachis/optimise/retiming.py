@@ -29,8 +29,6 @@ from brachis.timing import is_left_out
 
 SOLVER = "phase plane"
 """Name of what solves a program by its timing alone."""
-_ROUGHLY = 0.05
-"""Part of the time that first knots may lose."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
 _WORTH = 3.0
@@ -49,8 +47,8 @@ _COARSE_CURVES = 32
 """Intervals of all curves together in a coarse search, if these bounds allow it."""
 _CLEAR = 0.02
 """Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
-_FIRST_INTERVALS = 16
-"""Intervals over which a search over time begins, about."""
+_FEWEST = 12
+"""Intervals of a phase over which a search over time begins, no fewer if its timing needs as many."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,7 @@ ROUGH = PathEffort(
 )
 """To rank joint paths, clear of branch boundaries."""
 FINE = PathEffort(
-    intervals=(32, 64, 128, 256),
+    intervals=(32,),
     places=PLACES,
     may_add_places=True,
     margin=MARGIN,
@@ -169,17 +167,32 @@ def _report(
     )
 
 
+def time_joint_paths(
+    program: Program, joint_paths: Sequence[np.ndarray]
+) -> list[PhaseTiming]:
+    """Time the joint paths of all phases, (S, c) each, s and other curves; raise UnreachableError if they leave the map."""
+    pairs = zip(program.phases, joint_paths, strict=True)
+    return [PhaseTiming.through(*pair) for pair in pairs]
+
+
 def begin_with_timing(
-    program: Program, joint_paths: Sequence[np.ndarray], points: int
+    program: Program,
+    timings: Sequence[PhaseTiming],
+    lost: float,
+    most: int,
+    points: int,
 ) -> tuple[Program, np.ndarray] | None:
-    """Lay splines along the fastest timing of joint paths, over few knots, close together where it needs them.
+    """Lay splines along the timings of all phases, over few knots, close together where these need them.
 
     Parameters
     ----------
     program : Program
         Over any knots.
-    joint_paths : sequence of (S, c) ndarray
-        Of every phase, s and other curves.
+    timings : sequence of PhaseTiming
+    lost : float
+        Part of the time that the intervals may lose together.
+    most : int
+        Intervals of all phases together, about.
     points : int
         Collocation points an interval.
 
@@ -189,17 +202,20 @@ def begin_with_timing(
     x : (v,) ndarray
         Slowed down until the limits hold at the collocation points; None where the limits allow no timing.
     """
+    total = least_time(timings)
+    if not np.isfinite(total):
+        return None
     phases = []
     parts = []
+    for phase, own in zip(program.phases, timings, strict=True):
+        share = max(_FEWEST, int(most * own.t_end / total))
+        begun = begin(phase, own, lost, share, points)
+        if begun is None:
+            return None
+        phases.append(begun[0])
+        parts.append(begun[1])
+    first = program.with_phases(phases)
     try:
-        for phase, curves in zip(program.phases, joint_paths, strict=True):
-            own = PhaseTiming.through(phase, curves)
-            begun = begin(phase, own, _ROUGHLY, _FIRST_INTERVALS, points)
-            if begun is None:
-                return None
-            phases.append(begun[0])
-            parts.append(begun[1])
-        first = program.with_phases(phases)
         return first, shortest_time(first, np.concatenate(parts))
     except UnreachableError:
         return None

@@ -13,6 +13,7 @@ choices of single joints are tried, and the best one is kept.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from dataclasses import replace
 from functools import partial
@@ -37,20 +38,27 @@ from brachis.optimise.improve import (
     keep_feasible,
 )
 from brachis.optimise.mesh import adapt_mesh
-from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import (
     FINE,
     begin_with_timing,
     improve_joint_paths,
-    least_time,
+    time_joint_paths,
 )
 from brachis.optimise.transcription import maps_by_leg, program_of, program_over
 from brachis.problem.problem import Problem
 from brachis.search.over_path import plan_timing, solve_over_path
 from brachis.search.phase_plane import initial_guess
 
+_VARIABLES = 300
+"""Variables of a program over time that improves splines along a timing, about: with more a solve takes seconds."""
+_ROUGHLY = 0.05
+"""Part of the time that first knots may lose, where a mesh is refined from them."""
+_FIRST_INTERVALS = 16
+"""Intervals of such a first mesh, about."""
+NO_TIMING = "the limits allow no timing"
+"""Status of a candidate whose joint path cannot be followed within the limits."""
 _FOR_KNOTS = 0.5
 """Part of the time left after which the knots are not refined further."""
 _CLEAR = 0.1
@@ -105,7 +113,11 @@ def _solve_over_time(
     if is_open and not any(start.problem.time_laws):
         # Over few knots, close together where the fastest timing of the joint path needs them.
         points = task.spline.points_per_interval
-        begun = begin_with_timing(target, start.legs, points)
+        with contextlib.suppress(UnreachableError):
+            timings = time_joint_paths(target, start.legs)
+            begun = begin_with_timing(
+                target, timings, _ROUGHLY, _FIRST_INTERVALS, points
+            )
     if begun is not None:
         program, x = begun
         target = program
@@ -183,41 +195,28 @@ def finish_candidate(
 def _finish_over_path(
     candidate: Candidate, session: SolverSession, options: RefinementOptions
 ) -> Candidate:
-    """Improve joint paths further over the path, lay splines along their timing, and verify.
-
-    Where the tool stands while the joints move, curves over the path are none: then they are improved over time too.
-    """
+    """Improve joint paths further over the path, lay splines along their timing, and improve these over time."""
     start = candidate.start
     program = candidate.program
     assert start is not None and program is not None
     spline = start.problem.task.spline
     found = improve_joint_paths(program, start.legs, session, spline.tolerance, FINE)
     reports = (*candidate.reports, *found.reports)
-    done = None
-    if found.is_credible:
-        done = plan_timing(candidate, program, found.timings, reports, options)
-        if done is not None and (done.is_settled or session.deadline.passed):
-            return done
-    other = _solve_over_time(start, program, session)
-    reports = (*reports, *other.reports)
-    adapted = SolvedProgram(other.program or program, reports)
-    least = np.inf
-    if other.usable:
-        adapted = adapt_mesh(adapted, session, spline, options)
-        pairs = zip(adapted.program.phases, program.phases, strict=True)
-        whole = adapted.program.with_phases(
-            own.with_limits(first.limits) for own, first in pairs
-        )
-        timings = time_phases(whole, adapted.x)
-        least = least_time(timings)
-    if done is None and found.t_end < least:
-        done = plan_timing(candidate, program, found.timings, reports, options)
-    elif other.usable:
-        done = plan_timing(other, whole, timings, adapted.reports, options)
-    if done is not None and (done.is_settled or not other.usable):
-        return done
-    other = replace(other, to_beat=candidate.to_beat)
-    return _refine_if_fast(other, adapted, session, options)
+    r = start.joint_map.r
+    if r and not session.deadline.passed:
+        most = _VARIABLES // (1 + r)
+        points = spline.points_per_interval
+        begun = begin_with_timing(program, found.timings, spline.tolerance, most, points)
+        if begun is not None:
+            finer, x = begun
+            solved = attempt_once(session, finer, x, accept_early_end=True)
+            reports = (*reports, *solved.reports)
+            if solved.usable:
+                done = refine_and_verify(candidate, finer, reports, session, options)
+                if done.is_settled:
+                    return done
+    laid = plan_timing(candidate, program, found.timings, reports, options)
+    return laid or replace(candidate, status=NO_TIMING, reports=reports)
 
 
 def _finish_over_time(
