@@ -119,7 +119,7 @@ ROUGH = PathEffort(
 )
 """To rank joint paths, clear of branch boundaries."""
 FINE = PathEffort(
-    intervals=(32,),
+    intervals=(32, 64, 128, 256),
     places=PLACES,
     may_add_places=True,
     margin=MARGIN,

@@ -38,12 +38,14 @@ from brachis.optimise.improve import (
     keep_feasible,
 )
 from brachis.optimise.mesh import adapt_mesh
+from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import (
     FINE,
     begin_with_timing,
     improve_joint_paths,
+    least_time,
     time_joint_paths,
 )
 from brachis.optimise.transcription import maps_by_leg, program_of, program_over
@@ -51,8 +53,9 @@ from brachis.problem.problem import Problem
 from brachis.search.over_path import plan_timing, solve_over_path
 from brachis.search.phase_plane import initial_guess
 
-_VARIABLES = 300
-"""Variables of a program over time that improves splines along a timing, about: with more a solve takes seconds."""
+_ENTRIES = 600_000
+"""Variables times rows of a program over time that improves splines along a timing: with more an iteration takes tenths
+of a second."""
 _ROUGHLY = 0.05
 """Part of the time that first knots may lose, where a mesh is refined from them."""
 _FIRST_INTERVALS = 16
@@ -202,21 +205,37 @@ def _finish_over_path(
     spline = start.problem.task.spline
     found = improve_joint_paths(program, start.legs, session, spline.tolerance, FINE)
     reports = (*candidate.reports, *found.reports)
+    timings = found.timings
     r = start.joint_map.r
+    solved = None
+    done = None
     if r and not session.deadline.passed:
-        most = _VARIABLES // (1 + r)
+        # Variables times rows grow with the square of the intervals.
+        rows = len(program.lower) / program.intervals
+        most = int(np.sqrt(_ENTRIES / ((1 + r) * rows)))
         points = spline.points_per_interval
-        begun = begin_with_timing(program, found.timings, spline.tolerance, most, points)
+        begun = begin_with_timing(program, timings, spline.tolerance, most, points)
         if begun is not None:
-            finer, x = begun
-            solved = attempt_once(session, finer, x, accept_early_end=True)
+            solved = attempt_once(session, *begun, accept_early_end=True)
             reports = (*reports, *solved.reports)
-            if solved.usable:
-                done = refine_and_verify(candidate, finer, reports, session, options)
-                if done.is_settled:
-                    return done
-    laid = plan_timing(candidate, program, found.timings, reports, options)
-    return laid or replace(candidate, status=NO_TIMING, reports=reports)
+    if solved is not None and solved.usable:
+        again = time_phases(solved.program, solved.x)
+        fastest = min(least_time(again), found.t_end)
+        if least_time(again) < found.t_end:
+            program = solved.program
+            timings = again
+        within = fastest * (1.0 + spline.tolerance)
+        if solved.t_end < within:
+            done = refine_and_verify(
+                candidate, solved.program, reports, session, options
+            )
+            if done.is_settled and done.t_end < within:
+                return done
+    laid = plan_timing(candidate, program, timings, reports, options)
+    motions = [each for each in (done, laid) if each is not None]
+    if not motions:
+        return replace(candidate, status=NO_TIMING, reports=reports)
+    return min(motions, key=lambda each: (not each.is_settled, each.t_end))
 
 
 def _finish_over_time(
