@@ -170,14 +170,17 @@ def _report(
 def time_joint_paths(
     program: Program, joint_paths: Sequence[np.ndarray]
 ) -> list[PhaseTiming]:
-    """Time the joint paths of all phases, (S, c) each, s and other curves; raise UnreachableError if they leave the map."""
+    """Time the joint paths of all phases, (S, c) each: s and other curves.
+
+    Raises UnreachableError where they leave the map.
+    """
     pairs = zip(program.phases, joint_paths, strict=True)
     return [PhaseTiming.through(*pair) for pair in pairs]
 
 
 def begin_with_timing(
     program: Program,
-    timings: Sequence[PhaseTiming],
+    timings: Sequence[PhaseTiming | None],
     lost: float,
     most: int,
     points: int,
@@ -188,7 +191,7 @@ def begin_with_timing(
     ----------
     program : Program
         Over any knots.
-    timings : sequence of PhaseTiming
+    timings : sequence of PhaseTiming or None
     lost : float
         Part of the time that the intervals may lose together.
     most : int
@@ -208,6 +211,7 @@ def begin_with_timing(
     phases = []
     parts = []
     for phase, own in zip(program.phases, timings, strict=True):
+        assert own is not None
         share = max(_FEWEST, int(most * own.t_end / total))
         begun = begin(phase, own, lost, share, points)
         if begun is None:
