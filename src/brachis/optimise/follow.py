@@ -202,7 +202,7 @@ def begin(
     if own.timing is None:
         return None
     breaks = _knots(phase, own, own.timing, lost, most)
-    motion = _lay_splines(phase, own, own.timing, breaks)
+    motion, _ = _lay_splines(phase, own, own.timing, breaks)
     return _as_phase(phase, motion, points)
 
 
@@ -221,12 +221,27 @@ def _knots(
 
 def _lay_splines(
     phase: Phase, own: PhaseTiming, timing: Timing, breaks: np.ndarray
-) -> Motion:
-    """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`."""
+) -> tuple[Motion, float]:
+    """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`.
+
+    Accelerations that vanish at an end, and their rates, do so over an interval each, as long as the one beside it:
+    the timing begins so much later.
+
+    Returns
+    -------
+    motion : Motion
+    delay : float
+        When the timing begins, s.
+    """
     ends = phase.boundary.start, phase.boundary.end
     first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
-    knots = clamped_knots(phase.degree, breaks)
-    motion = splines_along(own.course, timing, knots, phase.degree, (first, last))
+    ahead = breaks[1] * np.arange(first)
+    behind = (1.0 - breaks[-2]) * np.arange(1, last + 1)
+    before = breaks[1] * first
+    moved = before + np.concatenate([ahead - before, breaks, 1.0 + behind])
+    delays = (before * timing.t_end, (moved[-1] - before - 1.0) * timing.t_end)
+    knots = clamped_knots(phase.degree, moved / moved[-1])
+    motion = splines_along(own.course, timing, knots, phase.degree, delays)
     splines = phase.boundary.splines(knots, phase.degree)
     t_end = motion.t_end
     points = [
@@ -236,7 +251,7 @@ def _lay_splines(
     if phase.joint_map.path is not None:
         # Where the tool stands, means of its rate are not exact.
         points[0] = np.maximum.accumulate(points[0].clip(max=points[0][-1]))
-    return replace(motion, control_points=np.array(points))
+    return replace(motion, control_points=np.array(points)), delays[0]
 
 
 def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndarray]:
@@ -276,14 +291,15 @@ def _hold_limits(
         if limit.is_checked_at_points and limit.longer_time == "relieves"
     ]
     timing = fastest
-    best = Laid(_lay_splines(phase, own, timing, breaks))
-    motion = best.motion
+    motion, delay = _lay_splines(phase, own, timing, breaks)
+    best = Laid(motion)
     idle = 0
     looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
     known = None
     for _ in range(_ROUNDS):
-        t_norm = np.union1d(spread(breaks, looks), timing.times / timing.t_end)
+        at_stations = (delay + timing.times) / motion.t_end
+        t_norm = np.union1d(spread(motion.breaks / motion.t_end, looks), at_stations)
         t = t_norm * motion.t_end
         near = None if known is None else interpolate_columns(t_norm, *known)
         try:
@@ -312,14 +328,15 @@ def _hold_limits(
         for limit in limits:
             more = np.where(beyond[limit] < _SMALL, factor, 1.0)
             excess = more * beyond[limit] / limit.violation_scale
-            added = _between_stations(excess, t_norm, breaks, timing)
+            t_timing = ((t - delay) / timing.t_end).clip(0.0, 1.0)
+            added = _between_stations(excess, t_timing, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
         next_timing = own.course.solve(own.rates, narrower, most_acceleration)
         if next_timing is None:
             return best
         breaks = _move(breaks, timing, next_timing)
         timing = next_timing
-        motion = _lay_splines(phase, own, timing, breaks)
+        motion, delay = _lay_splines(phase, own, timing, breaks)
     return replace(best, slower=best.needed / fastest.t_end - 1.0)
 
 

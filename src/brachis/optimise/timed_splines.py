@@ -112,81 +112,56 @@ def control_points_along(
     timing: Timing,
     knots: np.ndarray,
     degree: int,
-    vanishing: tuple[int, int],
+    delays: tuple[float, float],
 ) -> np.ndarray:
     """Control points, (c, N + d), of splines whose rates have means of the curves' rates for control points.
 
-    At the ends so many derivatives, from the acceleration on, vanish.
-
     A control point of the rate belongs to d - 1 knots. Its mean is the chord over as many of these as are even beside
-    their mean. Curves of degree 2 are met exactly, and accelerations stay among those near by. Means are moved and
-    sharpened where accelerations change smoothly.
+    their mean. So accelerations stay among those near by, whatever the knots. Beside its ends, for the delays, s, the
+    timing keeps its rates.
     """
-    t_end = timing.t_end
+    t_end = timing.t_end + sum(delays)
     windows = sliding_window_view(knots[2:-2], degree - 1)
     places = windows.mean(axis=1)
     half = np.minimum(places - windows[:, 0], windows[:, -1] - places)
     half[half < _POINT] = 0.0
-    ends = np.column_stack([places - half, places + half]) * t_end
+    ends = np.column_stack([places - half, places + half]) * t_end - delays[0]
     widths = ends[:, 1] - ends[:, 0]
     is_point = half <= 0.0
     y = course.curves(timing, ends.ravel())[0].reshape(len(ends), 2, -1)
     means = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths)[:, None]
     means[is_point] = course.curves(timing, ends[is_point, 0])[1]
-    rates = _sharpen(means, half, knots, degree, vanishing)
-    # What that takes from the rates is spread over all.
-    end = course.curves(timing, np.array([t_end]))[1]
-    rates = rates + (places**2 * (3.0 - 2.0 * places))[:, None] * (end - rates[-1])
-    first = course.curves(timing, np.zeros(1))[0]
+    # Second moments of the means, and of control points beside their curve.
+    beside = half**2 / 6.0 + windows.var(axis=1) / (2.0 * max(degree - 2, 1))
+    rates = _sharpen(means, places, beside)
+    first = course.curves(timing, np.array([-delays[0]]))[0]
     steps = (knots[degree + 1 : -1] - knots[1 : -degree - 1]) * t_end / degree
     points = first + np.cumsum(rates * steps[:, None], axis=0)
     return np.concatenate([first, points]).T
 
 
-def _sharpen(
-    rates: np.ndarray,
-    half: np.ndarray,
-    knots: np.ndarray,
-    degree: int,
-    vanishing: tuple[int, int],
-) -> np.ndarray:
-    """Turn accelerations of means, (w, c), over so much to both sides, (w,), into those where they belong.
+def _sharpen(means: np.ndarray, places: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Move means, (w, c), to where they would be if the curve's second derivative times `beside`, (w,), lay between.
 
-    Where intervals of different length meet these places differ; and means of a curve that bends are beside it. Slopes
-    and bends are the smallest ones near by, and none where they change their sign: so nothing swings beside a jump.
+    They are moved by no more than leaves every slope between those beside it: so nothing swings beside a jump
+    (Zalesak, J. Computational Physics 31(3), 1979).
     """
-    places = greville(knots[1:-1], degree - 1)
     widths = np.diff(places)[:, None]
-    means = np.diff(rates, axis=0) / widths
-    taken = 0.5 * (places[1:] + places[:-1]) + np.diff(half**2) / (6.0 * widths[:, 0])
-    inner = sliding_window_view(knots[2:-2], degree)[:, 1:-1]
-    belong = inner.mean(axis=1) if degree > 2 else taken
-    slopes = np.diff(means, axis=0) / np.diff(taken)[:, None]
-    bends = 2.0 * np.diff(slopes, axis=0) / (taken[2:] - taken[:-2])[:, None]
-    # Second moments of the means, and of control points beside their curve.
-    beside = widths[:, 0] ** 2 / 24.0 + (half[1:] ** 2 + half[:-1] ** 2) / 12.0
-    if degree == 3:
-        # Accelerations are linear between knots, and stay inside of what bends.
-        steps = np.diff(knots[2:-2]) ** 2
-        beside = beside + (steps[1:] + steps[:-1]) / 16.0
-    if degree > 3:
-        beside = beside + inner.var(axis=1) / (2.0 * (degree - 3))
-    slope = _smallest(slopes, 2, "edge")
-    bend = _smallest(bends, 3, "constant")
-    moved = means + slope * (belong - taken)[:, None] - bend * beside[:, None]
-    moved[: vanishing[0]] = 0.0
-    moved[len(moved) - vanishing[1] :] = 0.0
-    return np.concatenate([rates[:1], rates[:1] + np.cumsum(moved * widths, axis=0)])
-
-
-def _smallest(values: np.ndarray, count: int, beyond: str) -> np.ndarray:
-    """Smallest of so many neighbours, (n, c) to (n + count - 1, c), or zero where their signs differ."""
-    pad = ((count - 1, count - 1), (0, 0))
-    padded = np.pad(values, pad, mode=beyond)  # type: ignore[call-overload]
-    near = sliding_window_view(padded, count, axis=0)
-    size = np.abs(near).min(axis=-1)
-    is_same = np.abs(np.sign(near).sum(axis=-1)) == count
-    return np.where(is_same, np.sign(near[..., 0]) * size, 0.0)
+    slopes = np.diff(means, axis=0) / widths
+    bends = 2.0 * np.diff(slopes, axis=0) / (widths[1:] + widths[:-1])
+    moves = np.zeros_like(means)
+    moves[1:-1] = -beside[1:-1, None] * bends
+    near = sliding_window_view(np.pad(slopes, ((1, 1), (0, 0)), mode="edge"), 3, axis=0)
+    share = np.ones_like(means)
+    for sign in (1.0, -1.0):
+        slack = (sign * near).max(axis=-1) - sign * slopes
+        ahead = (sign * moves[1:]).clip(0.0)
+        behind = (-sign * moves[:-1]).clip(0.0)
+        change = (ahead + behind) / widths
+        most = np.divide(slack, change, out=np.ones_like(slack), where=change > slack)
+        np.minimum(share[1:], most, out=share[1:], where=ahead > 0.0)
+        np.minimum(share[:-1], most, out=share[:-1], where=behind > 0.0)
+    return np.asarray(means + share * moves)
 
 
 def splines_along(
@@ -194,16 +169,17 @@ def splines_along(
     timing: Timing,
     knots: np.ndarray,
     degree: int,
-    vanishing: tuple[int, int],
+    delays: tuple[float, float],
 ) -> Motion:
     """Lay splines along a timing; see `control_points_along`."""
-    t_end = timing.t_end
-    points = control_points_along(course, timing, knots, degree, vanishing)
+    t_end = timing.t_end + sum(delays)
+    points = control_points_along(course, timing, knots, degree, delays)
     places = greville(knots, degree)
     # Means of rates miss the curves by a little, which grows along the motion.
     count = 1 + (len(places) - degree) // _ANCHORED
     anchors = np.linspace(0.0, 1.0, count + 1)
-    wanted = course.curves(timing, anchors * t_end)[0]
+    inner = np.clip(anchors * t_end - delays[0], 0.0, timing.t_end)
+    wanted = course.curves(timing, inner)[0]
     for _ in range(2):
         reached = Motion(t_end, knots, degree, points).at(anchors * t_end)[0]
         points = points + _smoothly(anchors, wanted - reached, places).T

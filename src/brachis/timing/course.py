@@ -112,7 +112,9 @@ class TimedCourse:
         return self._plane.solve(rates, agreement)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Curves and their rates, (K, c), at times of a timing, (K,), s: cubics between the stations."""
+        """Curves and their rates, (K, c), at times of a timing, (K,), s: cubics between the stations, lines beside the ends."""
+        beyond = t - np.clip(t, 0.0, timing.t_end)
+        t = t - beyond
         i = np.searchsorted(timing.times, t, side="right") - 1
         i = np.clip(i, 0, len(timing.acceleration) - 1)
         ahead = t - timing.times[i]
@@ -130,7 +132,8 @@ class TimedCourse:
         bump = (1.0 - u) * first - u * last
         y = self._y[i] + u * (chord + (1.0 - u) * bump)
         by_u = chord + (1.0 - 2.0 * u) * bump - u * (1.0 - u) * (first + last)
-        return y, by_u * (rate / step)[:, None]
+        ydot = by_u * (rate / step)[:, None]
+        return y + ydot * beyond[:, None], ydot
 
     def accelerations(self, timing: Timing) -> np.ndarray:
         """Joint accelerations half-way between the stations, (P - 1, n), each as what it takes of a limit."""
