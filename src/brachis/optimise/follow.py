@@ -20,28 +20,23 @@ from brachis.optimise.bspline import clamped_knots, locate
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
-from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
-from brachis.timing.joint_path import halfway
 
 _FIRST_LOSS = 5.0
-"""What the intervals may lose together at first, in tolerances."""
+"""What the intervals may lose together at first, in tolerances: that is by how much their loss is overrated where
+accelerations are smooth."""
+_SHARE = 0.5
+"""Part of the tolerance that splines may lose; the rest is that of the joint path."""
 _AIM = 0.7
-"""Part of the tolerance that the next mesh should lose."""
+"""Part of this that the next mesh should lose."""
 _FINER = (0.02, 0.35)
 """Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
 _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
-_MESHES = 5
+_MESHES = 6
 """Choices of knots that are tried, no more."""
-_GAINS = 0.9
-"""Finer meshes are tried for speed as long as the last one was slower by less than this part of what it was before."""
-_GROWS = 1.2
-"""Finer meshes have so many times the knots of the last one, or twice as many: along a path with cusps even joint
-accelerations do not tell how uneven d2s/dt2 is."""
-_BETTER = 0.5
-"""A finer mesh is tried as long as the last one left less than this part of the violation of limits on postures."""
 _MOST_INTERVALS = 200_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 2,000,000."""
 _LOOKS = (4, 10)
@@ -71,15 +66,12 @@ class Laid:
         Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
     outside : float
         Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
-    is_cut : bool
-        Whether laying ended early, because the motion was slower than allowed.
     """
 
     motion: Motion
     violation: float = np.inf
     slower: float = np.inf
     outside: float = np.inf
-    is_cut: bool = False
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -136,41 +128,26 @@ def follow(
     Followed or None
         None where the limits allow no timing.
     """
-    timing = own.without_spikes().timing
+    timing = own.timing
     if timing is None:
         return None
     best = None
+    tolerance *= _SHARE
     lost = _FIRST_LOSS * tolerance
-    outside = np.inf
-    slower = np.inf
-    is_last = False
-    breaks = np.empty(0)
     for number in range(1, _MESHES + 1):
-        before = breaks
         breaks = _knots(phase, own, timing, lost)
-        if len(breaks) < _GROWS * len(before):
-            breaks = np.union1d(before, halfway(before))
         if len(breaks) > _MOST_INTERVALS:
             break
-        is_last = is_last or number == _MESHES
+        # Over the last knots limits are narrowed until they hold, however slow that is.
+        is_last = number == _MESHES or deadline.passed
         allowed = np.inf if is_last else tolerance
         laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
         laid = _look_at_postures(phase, laid)
         if best is None or laid.rank < best.rank:
             best = laid
         is_fast = laid.slower < tolerance
-        is_done = is_fast and not _ENOUGH < laid.outside < _BETTER * outside
-        if is_last or is_done:
+        if is_last or (is_fast and laid.outside <= _ENOUGH):
             break
-        # Over the last knots limits are narrowed until they hold, however slow that is.
-        is_last = deadline.passed or not (is_fast or laid.slower < _GAINS * slower)
-        # Over the same knots it would end in the same way, unless it was cut short.
-        if is_last and not laid.is_cut:
-            break
-        if is_last:
-            continue
-        slower = laid.slower
-        outside = laid.outside
         wanted = _AIM * tolerance / max(laid.slower, tolerance)
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
@@ -284,7 +261,6 @@ def _hold_limits(
     deadline: Deadline,
 ) -> Laid:
     """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
-    most_acceleration = largest_acceleration(fastest)
     limits = [
         limit
         for limit in phase.limits
@@ -317,7 +293,7 @@ def _hold_limits(
             best = laid
         slower = motion.t_end / fastest.t_end - 1.0
         if slower > allowed:
-            return replace(best, slower=slower, is_cut=True)
+            return replace(best, slower=slower)
         if violation <= _ENOUGH and looks < closer:
             looks = closer
             best = replace(best, violation=np.inf)
@@ -331,7 +307,7 @@ def _hold_limits(
             t_timing = ((t - delay) / timing.t_end).clip(0.0, 1.0)
             added = _between_stations(excess, t_timing, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
-        next_timing = own.course.solve(own.rates, narrower, most_acceleration)
+        next_timing = own.course.solve(own.rates, narrower)
         if next_timing is None:
             return best
         breaks = _move(breaks, timing, next_timing)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -25,12 +25,13 @@ _ROUGHLY = 1e-3
 """Change of the time, as a part of it, with which a rough timing ends."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
-_MOVES = 1e-3
-"""Part of the largest d2p/dt2 from which on a station counts: at others the motion cruises."""
-_USUAL = 0.98
-"""Part of these stations whose d2p/dt2 is usual."""
-_SPIKE = 3.0
-"""Times the usual d2p/dt2 that splines can follow."""
+_RAMP = 1e-6
+"""Part of the time that a switch within a step between stations may cost: with steps ten times as long, a slide whose
+drives take it to its speed within microseconds was 0.01 % slower, and its ramps were too flat to be told from rest."""
+_MOST_PARTS = 64
+"""Parts of such a step, no more at once."""
+_DIVISIONS = 6
+"""Times that steps are divided: six resolve ramps of a part of 1e-9 of the time."""
 
 
 @dataclass(frozen=True)
@@ -69,26 +70,22 @@ class PhaseTiming:
         count = max(_LEAST_PLACES, -(-PLACES // phase.intervals))
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
 
-        def course_at(t: np.ndarray) -> Course:
-            """Take the curves at times, (P,)."""
-            return Course(t, *motion.at(t)[:3])
+        def lay(t: np.ndarray) -> PhaseTiming:
+            """Time the curves at times, (P,)."""
 
-        try:
+            def course_at(t: np.ndarray) -> Course:
+                """Take the curves at times, (P,)."""
+                return Course(t, *motion.at(t)[:3])
+
             fine = _lay_finely(phase, course_at, t)
             course = TimedCourse(fine, phase.joint_map, phase.limits)
+            rates = float(course.speeds[0]), float(course.speeds[-1])
+            return cls(course, rates, course.solve(rates))
+
+        try:
+            return _resolve_ramps(lay, t)
         except UnreachableError:
             return None
-        rates = float(course.speeds[0]), float(course.speeds[-1])
-        return cls(course, rates, course.solve(rates))
-
-    def without_spikes(self) -> PhaseTiming:
-        """Time again where the timing all but stops for an instant, as no spline does: only as fast as they can."""
-        if self.timing is None:
-            return self
-        most = largest_acceleration(self.timing)
-        if np.abs(self.timing.acceleration).max() <= most:
-            return self
-        return replace(self, timing=self.course.solve(self.rates, {}, most))
 
     @classmethod
     def along(
@@ -143,8 +140,13 @@ class PhaseTiming:
         passed = np.maximum.accumulate(y[:, 0])
         s = drop_near(np.union1d(passed.clip(begin, end), pieces), tolerances.PATH)
         s[0] = begin
-        course, by_length = lay(s, (passed, ydot[:, 0]))
-        return cls(course, by_length, course.solve(by_length), given)
+
+        def time_at(s: np.ndarray) -> PhaseTiming:
+            """Time the course at path coordinates, (S,)."""
+            course, by_length = lay(s, (passed, ydot[:, 0]))
+            return cls(course, by_length, course.solve(by_length), given)
+
+        return _resolve_ramps(time_at, s)
 
     @classmethod
     def through(
@@ -162,18 +164,32 @@ class PhaseTiming:
         return cls.along(phase, course_at, (begin, end), places, is_rough=is_rough)
 
 
+def _resolve_ramps(
+    time_at: Callable[[np.ndarray], PhaseTiming], stations: np.ndarray
+) -> PhaseTiming:
+    """Time a joint path at stations, (P,), and at others where the timing switches within a step."""
+    for _ in range(_DIVISIONS):
+        own = time_at(stations)
+        timing = own.timing
+        if timing is None:
+            break
+        jumps = np.pad(np.abs(np.diff(timing.acceleration)), 1)
+        change = np.maximum(jumps[1:], jumps[:-1])
+        fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
+        lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
+        parts = np.ceil(np.sqrt(lost / _RAMP)).clip(1, _MOST_PARTS).astype(int)
+        if parts.max() == 1:
+            break
+        stations = spread(own.course.places, parts)
+    return own
+
+
 def _lay_finely(
     phase: Phase, course_at: Callable[[np.ndarray], Course], p: np.ndarray
 ) -> Course:
     """Lay a course over stations, (P,), and others between them where the joint path turns."""
     state = course_at(p).state(phase.joint_map)
     return course_at(divide_turns(p, state.qdot))
-
-
-def largest_acceleration(timing: Timing) -> float:
-    """Largest d2p/dt2 that splines can follow, 1/s^2."""
-    sizes = np.abs(timing.acceleration)
-    return float(_SPIKE * np.quantile(sizes[sizes >= _MOVES * sizes.max()], _USUAL))
 
 
 def time_phases(program: Program, x: np.ndarray) -> list[PhaseTiming | None]:

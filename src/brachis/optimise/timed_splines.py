@@ -17,13 +17,14 @@ from brachis.kernel import Spline, collocation
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.motion import Motion
 from brachis.timing import TimedCourse, Timing
+from brachis.timing.joint_path import halfway
 
 _FIRST_INTERVALS = 8
 """Intervals that are halved, no fewer."""
 _PLACES_AN_INTERVAL = 250
 """Places for each of these."""
-SHORTEST = 2e-4
-"""Shortest interval that is halved, s: accelerations are rounded over shorter ones."""
+_SHORTEST = 0.05
+"""Shortest interval that is halved, in tolerances: no more than its own time is lost in it."""
 _LONGER = 4.5
 """Times the length of an interval that those beside it may have."""
 _SWITCH = 0.2
@@ -89,7 +90,7 @@ def breaks_for(
         few=_FEW,
         pieces=max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL),
         tolerance=tolerance,
-        shortest=SHORTEST / timing.t_end,
+        shortest=_SHORTEST * tolerance,
         most=most,
     )
     return even_out(np.append(begins, 1.0))
@@ -133,35 +134,32 @@ def control_points_along(
     means[is_point] = course.curves(timing, ends[is_point, 0])[1]
     # Second moments of the means, and of control points beside their curve.
     beside = half**2 / 6.0 + windows.var(axis=1) / (2.0 * max(degree - 2, 1))
-    rates = _sharpen(means, places, beside)
+    rates = _sharpen(means, places, half, beside)
     first = course.curves(timing, np.array([-delays[0]]))[0]
     steps = (knots[degree + 1 : -1] - knots[1 : -degree - 1]) * t_end / degree
     points = first + np.cumsum(rates * steps[:, None], axis=0)
     return np.concatenate([first, points]).T
 
 
-def _sharpen(means: np.ndarray, places: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Move means, (w, c), to where they would be if the curve's second derivative times `beside`, (w,), lay between.
+def _sharpen(
+    means: np.ndarray, places: np.ndarray, half: np.ndarray, beside: np.ndarray
+) -> np.ndarray:
+    """Turn means of a curve, (w, c), over `half`, (w,), to both sides into control points of a spline that follows it.
 
-    They are moved by no more than leaves every slope between those beside it: so nothing swings beside a jump
-    (Zalesak, J. Computational Physics 31(3), 1979).
+    The curve's second derivative, times `beside`, (w,), lies between. It is taken for the smallest one near by, and for
+    none where it changes its sign: so nothing swings beside a jump.
     """
     widths = np.diff(places)[:, None]
     slopes = np.diff(means, axis=0) / widths
-    bends = 2.0 * np.diff(slopes, axis=0) / (widths[1:] + widths[:-1])
-    moves = np.zeros_like(means)
-    moves[1:-1] = -beside[1:-1, None] * bends
-    near = sliding_window_view(np.pad(slopes, ((1, 1), (0, 0)), mode="edge"), 3, axis=0)
-    share = np.ones_like(means)
-    for sign in (1.0, -1.0):
-        slack = (sign * near).max(axis=-1) - sign * slopes
-        ahead = (sign * moves[1:]).clip(0.0)
-        behind = (-sign * moves[:-1]).clip(0.0)
-        change = (ahead + behind) / widths
-        most = np.divide(slack, change, out=np.ones_like(slack), where=change > slack)
-        np.minimum(share[1:], most, out=share[1:], where=ahead > 0.0)
-        np.minimum(share[:-1], most, out=share[:-1], where=behind > 0.0)
-    return np.asarray(means + share * moves)
+    # Where means over different widths have the curve's slopes.
+    taken = halfway(places) + np.diff(half**2) / (6.0 * widths[:, 0])
+    bends = np.diff(slopes, axis=0) / np.diff(taken)[:, None]
+    near = sliding_window_view(np.pad(bends, ((1, 1), (0, 0))), 3, axis=0)
+    is_smooth = np.abs(np.sign(near).sum(axis=-1)) == 3
+    smallest = np.sign(bends) * np.abs(near).min(axis=-1)
+    sharpened = means.copy()
+    sharpened[1:-1] -= beside[1:-1, None] * np.where(is_smooth, smallest, 0.0)
+    return sharpened
 
 
 def splines_along(

@@ -67,6 +67,8 @@ class TimedCourse:
     ----------
     path : JointPath
         By its length, at the stations at which the joints move.
+    places : (P',) ndarray
+        Values of the parameter of the course at these.
     speeds : (P,) ndarray
         How fast its length grows with the parameter of the course, at all stations of this.
 
@@ -86,6 +88,7 @@ class TimedCourse:
         state = course.state(joint_map)
         path = JointPath(course.p, state.s, state.q, state.qdot, state.qddot)
         self.path, places = path.by_length()
+        self.places = places
         self.speeds = np.linalg.norm(state.qdot, axis=1)
         speeds = np.interp(places, course.p, self.speeds)
         by_length = None
@@ -104,11 +107,10 @@ class TimedCourse:
         self,
         rates: tuple[float, float],
         narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
-        most_acceleration: float = np.inf,
         agreement: float = AGREEMENT,
     ) -> Timing | None:
         """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane`."""
-        self._plane.narrow(narrower, most_acceleration)
+        self._plane.narrow(narrower)
         return self._plane.solve(rates, agreement)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

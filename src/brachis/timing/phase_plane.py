@@ -160,7 +160,6 @@ class PhasePlane:
         ]
         self._steps = np.diff(path.p)
         self._narrower: Mapping[Limit, np.ndarray] = {}
-        self._most_acceleration = np.inf
         self._rounds: list[list[_Rows]] = []
         if rate is None:
             rate = np.full(len(path.p), path.p[-1] - path.p[0])
@@ -208,14 +207,6 @@ class PhasePlane:
             np.hstack(blank + [getattr(own, part) for own in sloped])
             for part in ("by_u", "by_x", "lower", "upper")
         )
-        if np.isfinite(self._most_acceleration):
-            most = self._most_acceleration
-            row = np.ones((len(self._steps), 1))
-            a = np.hstack([a, row])
-            b = np.hstack([b, 0.0 * row])
-            low = np.hstack([low, -most * row])
-            high = np.hstack([high, most * row])
-            self._labels.insert(a.shape[1] - 1, "d2p/dt2")
         self._slope, self._lower, self._upper = _as_lines(a, b, low, high)
         # Half-way x is x + step u, seen from the station before.
         step = self._steps[:, None]
@@ -260,12 +251,8 @@ class PhasePlane:
             between = share * values[:-1] + (1.0 - share) * values[1:]
         return np.concatenate([values[:1], between, values[-1:]])
 
-    def narrow(
-        self,
-        narrower: Mapping[Limit, np.ndarray],
-        most_acceleration: float = np.inf,
-    ) -> None:
-        """Bring the bounds of limits nearer half-way between the stations, and bound d2p/dt2.
+    def narrow(self, narrower: Mapping[Limit, np.ndarray]) -> None:
+        """Bring the bounds of limits nearer half-way between the stations.
 
         Where the arm can hold a posture at rest, it still can.
 
@@ -274,13 +261,9 @@ class PhasePlane:
         narrower : mapping of Limit to (P - 1, c) ndarray
             Or (2, P - 1, c): for the lower and for the upper bounds. Negative numbers move them outwards. Limits that
             are missing keep their bounds.
-        most_acceleration : float, optional
-            Largest size of d2p/dt2, 1/s^2.
         """
-        is_plain = not (narrower or self._narrower)
-        if is_plain and most_acceleration == self._most_acceleration:
+        if not (narrower or self._narrower):
             return
-        self._most_acceleration = most_acceleration
         held = dict(narrower)
         for own in self._rounds[0]:
             if own.by_u is not None and own.limit in held:
