@@ -31,10 +31,8 @@ _SHARE = 0.5
 """Part of the tolerance that splines may lose; the rest is that of the joint path."""
 _AIM = 0.7
 """Part of this that the next mesh should lose."""
-_FINER = (0.02, 0.35)
+_FINER = (0.02, 0.5)
 """Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
-_SLOWER_BY_LOSS = 1.6
-"""Power of the slowness wanted that is the factor of the loss, about."""
 _MESHES = 6
 """Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 200_000
@@ -148,8 +146,7 @@ def follow(
         is_fast = laid.slower < tolerance
         if is_last or (is_fast and laid.outside <= _ENOUGH):
             break
-        wanted = _AIM * tolerance / max(laid.slower, tolerance)
-        lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
+        lost *= np.clip(_AIM * tolerance / laid.slower, *_FINER)
     if best is None:
         return None
     finer, x = _as_phase(phase, best.motion, points)

@@ -25,9 +25,11 @@ _ROUGHLY = 1e-3
 """Change of the time, as a part of it, with which a rough timing ends."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
-_RAMP = 1e-6
-"""Part of the time that a switch within a step between stations may cost: with steps ten times as long, a slide whose
-drives take it to its speed within microseconds was 0.01 % slower, and its ramps were too flat to be told from rest."""
+_SWITCHES = 0.1
+"""What switches within steps between stations may cost together, in mean steps: that is 0.0025 % with 4000. Drives that
+take a slide to its speed within microseconds lost 0.01 % without, and their ramps could not be told from rest."""
+_SWITCH = 0.1
+"""Part of this that one step may cost if not."""
 _MOST_PARTS = 64
 """Parts of such a step, no more at once."""
 _DIVISIONS = 6
@@ -177,10 +179,11 @@ def _resolve_ramps(
         change = np.maximum(jumps[1:], jumps[:-1])
         fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
         lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
-        parts = np.ceil(np.sqrt(lost / _RAMP)).clip(1, _MOST_PARTS).astype(int)
-        if parts.max() == 1:
+        most = _SWITCHES / len(lost)
+        if lost.sum() <= most:
             break
-        stations = spread(own.course.places, parts)
+        parts = np.ceil(np.sqrt(lost / (_SWITCH * most))).clip(1, _MOST_PARTS)
+        stations = spread(own.course.places, parts.astype(int))
     return own
 
 

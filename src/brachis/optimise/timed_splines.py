@@ -29,7 +29,7 @@ _LONGER = 4.5
 """Times the length of an interval that those beside it may have."""
 _SWITCH = 0.2
 """Part of accelerations by which they change where the motion switches from one limit to another."""
-_FEW = 8
+_FEW = 5
 _POINT = 1e-12
 """Half a chord below which it is a point, as a part of the time."""
 _ANCHORED = 100
