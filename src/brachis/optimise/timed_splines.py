@@ -11,7 +11,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis import kernel
-from brachis.common import tolerances
 from brachis.common.arrays import greville
 from brachis.kernel import Spline, collocation
 from brachis.optimise.bspline import clamped_knots
@@ -23,8 +22,6 @@ _FIRST_INTERVALS = 8
 """Intervals that are halved, no fewer."""
 _PLACES_AN_INTERVAL = 250
 """Places for each of these."""
-_SHORTEST = 0.05
-"""Shortest interval that is halved, in tolerances: no more than its own time is lost in it."""
 _LONGER = 4.5
 """Times the length of an interval that those beside it may have."""
 _SWITCH = 0.2
@@ -37,13 +34,14 @@ _ANCHORED = 100
 
 
 def breaks_for(
-    course: TimedCourse, timing: Timing, tolerance: float, *, from_rest: bool, most: int
+    course: TimedCourse, timing: Timing, tolerance: float, most: int
 ) -> np.ndarray:
     """Choose knots over which splines follow a timing.
 
     Intervals are halved, those first that lose most. An interval of length h loses h times how far accelerations are
     from linear within it, as a part of the limits. A jump of d2p/dt2 costs less: a ramp in its place takes the motion
-    less far by the jump's height times h^2 / 24.
+    less far by the jump's height times h^2 / 24. None is shorter than the mean step of the timing, in which the limits hold
+    once.
 
     Parameters
     ----------
@@ -51,8 +49,6 @@ def breaks_for(
     timing : Timing
     tolerance : float
         Part of the time that all intervals together may lose.
-    from_rest : bool
-        Whether accelerations vanish at both ends.
     most : int
         Intervals with which halving ends, before those beside much shorter ones are halved too.
 
@@ -65,15 +61,6 @@ def breaks_for(
     rate = timing.middle_rate
     acceleration = timing.acceleration
     t = 0.5 * (timing.times[1:] + timing.times[:-1]) / timing.t_end
-    if from_rest:
-        # Accelerations begin and end at zero, and are linear beside it.
-        parts = t[0] / (t[1] - t[0]), (1.0 - t[-1]) / (t[-1] - t[-2])
-        first = values[0] + parts[0] * (values[0] - values[1])
-        last = values[-1] + parts[1] * (values[-1] - values[-2])
-        values = np.pad(np.vstack([first, values, last]), ((1, 1), (0, 0)))
-        acceleration = np.pad(np.pad(acceleration, 1, mode="edge"), 1)
-        rate = np.pad(rate, 2)
-        t = np.concatenate([[0.0, tolerances.TIME], t, [1.0 - tolerances.TIME, 1.0]])
     sizes = np.abs(values).max(axis=1)
     jumps = np.abs(np.diff(values, axis=0)).max(axis=1)
     # A smaller step is one of the limits themselves, which a ramp exceeds.
@@ -90,7 +77,7 @@ def breaks_for(
         few=_FEW,
         pieces=max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL),
         tolerance=tolerance,
-        shortest=_SHORTEST * tolerance,
+        shortest=1.0 / len(timing.times),
         most=most,
     )
     return even_out(np.append(begins, 1.0))
