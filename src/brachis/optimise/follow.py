@@ -28,7 +28,7 @@ from brachis.timing.joint_path import halfway
 _FIRST_LOSS = 5.0
 """What the intervals may lose together at first, in tolerances: that is by how much their loss is overrated where
 accelerations are smooth."""
-_SHARE = 0.25
+_SHARE = 0.5
 """Part of the tolerance that splines may lose; joint paths lose more."""
 _AIM = 0.7
 """Part of this that the next mesh should lose."""
