@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -60,7 +61,7 @@ def test_slides_of_any_force_are_as_fast_as_their_trapezoid(
         assert result.verified
         assert result.t_end == pytest.approx(least_time(speed, force), rel=1e-3)
         times.append(result.t_end)
-    for weaker, stronger in zip(times, times[1:], strict=False):
+    for weaker, stronger in itertools.pairwise(times):
         assert stronger < weaker * (1.0 + SAME)
 
 

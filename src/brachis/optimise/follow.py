@@ -3,7 +3,8 @@
 Splines follow a timing nearly (`timed_splines`). Where they exceed a limit, this is narrowed there by so much, and the
 joint path is timed anew, until the limits hold. That leaves the motion as fast as possible.
 
-Knots stand where accelerations jump. They stay there on the path, whatever its timing.
+Knots stand where accelerations jump, and where limits were exceeded over fewer knots. They stay there on the path,
+whatever its timing.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ _WAITS = 0.1
 _FIRST_WAIT = 0.01
 """The same for first knots, as a part of the time."""
 _FOR_AIM = 3
-"""The first choice of knots that may lose all of the tolerance: along paths that wind quickly no fewer are much slower."""
+"""The first choice of knots that may lose all of the tolerance: along paths that wind quickly (example 16) others would
+take several times as many."""
 _MESHES = 6
 """Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 200_000

@@ -27,6 +27,8 @@ _LONGER = 4.5
 _SWITCH = 0.2
 """Part of accelerations by which they change where the motion switches from one limit to another."""
 _FEW = 5
+"""Times within an interval that are needed to tell whether it is smooth. With 8 an arc of degree 5 was 0.1 % slower,
+with 3 there were a third more intervals for the same time."""
 _POINT = 1e-12
 """Half a chord below which it is a point, as a part of the time."""
 _ANCHORED = 100
@@ -40,8 +42,8 @@ def breaks_for(
 
     Intervals are halved, those first that lose most. An interval of length h loses h times how far accelerations are
     from linear within it, as a part of the limits. A jump of d2p/dt2 costs less: a ramp in its place takes the motion
-    less far by the jump's height times h^2 / 24. None is shorter than the mean step of the timing, in which the limits hold
-    once.
+    less far by the jump's height times h^2 / 24. None is shorter than the mean step of the timing: in a step the limits
+    hold once.
 
     Parameters
     ----------
