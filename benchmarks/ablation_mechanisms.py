@@ -298,12 +298,6 @@ MECHANISMS = (
         use=_OPTIMISE + "retiming.follow",
     ),
     Mechanism(
-        "spikes",
-        "timings keep accelerations that splines cannot follow",
-        {_OPTIMISE + "phase_timing.PhaseTiming.without_spikes": return_first},
-        is_used=is_changed,
-    ),
-    Mechanism(
         "more_charts",
         "a guess is improved over the path in one chart",
         {

@@ -114,7 +114,7 @@ class TimedCourse:
         return self._plane.solve(rates, agreement)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Curves and their rates, (K, c), at times of a timing, (K,), s: cubics between stations, lines beside the ends."""
+        """Curves and their rates, (K, c), at times (K,), s: cubics between stations, lines beyond the ends."""
         beyond = t - np.clip(t, 0.0, timing.t_end)
         t = t - beyond
         i = np.searchsorted(timing.times, t, side="right") - 1
