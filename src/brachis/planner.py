@@ -15,13 +15,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
-from threadpoolctl import ThreadpoolController
-
 from brachis import ik
 from brachis.common.arguments import check_callable, check_executor, count
 from brachis.common.deadline import Deadline
 from brachis.common.interrupts import SigintHandler
 from brachis.common.progress import Listener, ignore, report_progress
+from brachis.common.threads import use_one_thread
 from brachis.common.words import write_count
 from brachis.errors import BrachisError, InputError
 from brachis.optimise.candidate import Candidate
@@ -145,9 +144,8 @@ def plan(
     """
     check_callable(listener, "listener")
     ik.check_families(families)
-    # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with (
-        ThreadpoolController().limit(limits=1, user_api="blas"),
+        use_one_thread(),
         report_progress(listener, progress) as report,
     ):
         began = time.perf_counter()

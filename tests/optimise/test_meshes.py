@@ -88,7 +88,7 @@ def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
     result = brachis.plan(robot(), task(intervals="auto", rest=rest))
     assert result.verified
     assert result.t_end < 1.005 * FINE["j1", rest]
-    assert len(np.unique(result.trajectory.knots)) - 1 < 500
+    assert len(np.unique(result.trajectory.knots)) - 1 < 150
 
 
 def test_a_motion_along_a_branch_boundary_is_verified_too():

@@ -222,7 +222,7 @@ def test_guesses_are_looked_at_the_farthest_from_each_other_first(starts):
     assert {start.origin for start in (first, second, *others)} <= {
         start.origin for start in starts
     }
-    paths = [start.postures_at_places(49) for start in starts]
+    paths = [start.postures_at(np.linspace(0.0, 1.0, 49)) for start in starts]
     distances = [np.abs(path - paths[0]).max() for path in paths]
     assert second is starts[int(np.argmax(distances))]
     assert len(others) + 2 == len({path.tobytes() for path in map(np.array, paths)})

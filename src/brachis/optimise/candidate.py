@@ -104,9 +104,8 @@ class InitialGuess(Summary):
             raise UnreachableError("the joint path leaves the branch, or the chart")
         return maps_by_leg(self.problem, self.joint_map, q[begins])
 
-    def postures_at_places(self, count: int) -> np.ndarray:
-        """Take so many postures, (count, n), at even places of the path; NaN where there are none."""
-        s = np.linspace(0.0, 1.0, count)
+    def postures_at(self, s: np.ndarray) -> np.ndarray:
+        """Take postures, (S, n), at path coordinates, (S,); NaN where there are none."""
         path = self.joint_path
         return self.joint_map.postures(interpolate_columns(s, path[:, 0], path))
 
@@ -281,8 +280,6 @@ def refine_and_verify(
 ) -> Candidate:
     """Refine and verify; only verify where the time is up.
 
-    A motion that the verification refuses is refined up to four times again, where it failed.
-
     Parameters
     ----------
     candidate : Candidate
@@ -298,41 +295,8 @@ def refine_and_verify(
     -------
     Candidate
     """
-    report = reports[-1]
-    for looks_left in range(4 if options.max_rounds else 0, -1, -1):
-        refined = refine(program, report, solve, options)
-        done = verify(candidate, reports[:-1], refined)
-        if not looks_left or options.deadline.passed:
-            break
-        finer = with_points_at_violations(done)
-        if finer is None:
-            break
-        report = solve(finer, refined.x)
-        if not report.status.usable:
-            break
-        program = finer
-    return done
-
-
-def with_points_at_violations(candidate: Candidate) -> Program | None:
-    """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
-    refined = candidate.refined
-    if refined is None or candidate.verification is None or candidate.is_settled:
-        return None
-    failed = [check for check in candidate.verification.checks if not check.passed]
-    if not failed or any(not check.of_limit or check.time is None for check in failed):
-        return None
-    assert candidate.trajectory is not None
-    moves = [phase for phase in candidate.trajectory.phases if not phase.is_dwell]
-    times = np.array([check.time for check in failed])
-    points = []
-    for phase, move in zip(refined.program.phases, moves, strict=True):
-        own = times[(times >= move.begin) & (times <= move.end)]
-        t_norm = (own - move.begin) / move.duration
-        # A peak moves when it is held down.
-        near = t_norm[:, None] + 1e-4 * np.array([-1.0, 0.0, 1.0])
-        points.append(np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0)))
-    return refined.program.with_points(points)
+    refined = refine(program, reports[-1], solve, options)
+    return verify(candidate, reports[:-1], refined)
 
 
 def verify(

@@ -150,8 +150,10 @@ def follow(
         breaks = even_out(np.union1d(breaks, needed))
         if len(breaks) > _MOST_INTERVALS:
             break
-        # Over the last knots limits are narrowed until they hold, however slow that is.
-        is_last = number == _MESHES or deadline.passed
+        # Over the last knots limits are narrowed until they hold, however slow that is. The timing says nothing between
+        # its stations.
+        is_fine = 2 * len(breaks) > len(timing.times)
+        is_last = number == _MESHES or is_fine or deadline.passed
         allowed = np.inf if is_last else tolerance
         laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
         laid = _look_at_postures(phase, laid)

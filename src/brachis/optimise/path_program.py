@@ -6,7 +6,7 @@ between them
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
-Limits hold half-way between the stations, or at two places there, and at both ends.
+Limits hold half-way between the stations, and at both ends.
 
 What it finds is a joint path: its timing is computed anew, on a finer grid.
 """
@@ -43,13 +43,6 @@ _NOTHING = 1e-24
 """Stands for zero where it is divided by."""
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
-HALF_WAY: tuple[float, ...] = (0.5,)
-"""Where limits hold between two stations, as parts of the interval that are still ahead: at one place."""
-POINTS_OF_GAUSS: tuple[float, ...] = (
-    0.5 + np.sqrt(1.0 / 12.0),
-    0.5 - np.sqrt(1.0 / 12.0),
-)
-"""The same at two places: where curves bend much, torques swing beyond their limits on both sides of a single one."""
 _SMALL = 2e-5
 """Violation up to which a limit on postures is not narrowed."""
 _RAMP = 2.0
@@ -86,8 +79,6 @@ class PathPhase:
         From which the solve begins.
     intervals, stations : int
         Of the splines, and between the stations; both are as long in time.
-    ahead : tuple of float
-        Where limits hold between the stations: `HALF_WAY` or `POINTS_OF_GAUSS`.
 
     Attributes
     ----------
@@ -108,7 +99,6 @@ class PathPhase:
         own: PhaseTiming,
         intervals: int,
         stations: int,
-        ahead: tuple[float, ...],
     ) -> None:
         timing = own.timing
         assert timing is not None and phase.joint_map.path is not None
@@ -124,9 +114,8 @@ class PathPhase:
         self._s = _with_pieces(s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
         # Where limits hold: the interval between stations, and the part of it that is ahead.
-        inner = np.tile(ahead, len(self._steps))
-        number = np.repeat(np.arange(len(self._steps)), len(ahead))
-        self._number = np.pad(number, 1, mode="edge")
+        inner = np.full(len(self._steps), 0.5)
+        self._number = np.pad(np.arange(len(inner)), 1, mode="edge")
         self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
         behind = self._ahead[:, 0] * self._steps[self._number]
         self._places = self._s[self._number + 1] - behind

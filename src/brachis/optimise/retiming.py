@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -13,12 +12,10 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK, MARGIN
 from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
-from brachis.optimise.follow import Followed, begin, follow
+from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.path_program import (
-    HALF_WAY,
-    POINTS_OF_GAUSS,
     PathPhase,
     PathProgram,
     violation_of_postures,
@@ -31,8 +28,6 @@ SOLVER = "phase plane"
 """Name of what solves a program by its timing alone."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
-_WORTH = 3.0
-"""Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _MOST_INTERVALS = 256
 """Intervals of all redundant curves together: with four curves of 128 a solve takes half a minute, and gains 0.2 %."""
 _LEAST_INTERVALS = 4
@@ -68,8 +63,6 @@ class PathEffort:
     is_rough_before, is_rough_after : bool, optional
         Whether joint paths are timed roughly before they are improved, and afterwards. Of a joint path that is not
         improved the latter counts. A gain or a loss of less than 1 % over a rough timing is not noticed.
-    may_add_places : bool, optional
-        Whether limits hold at two places between stations where one is not enough.
     posture_violation : float, optional
         Violation of limits on postures that is small enough.
     """
@@ -80,7 +73,6 @@ class PathEffort:
     options: SolverOptions
     is_rough_before: bool = False
     is_rough_after: bool = False
-    may_add_places: bool = False
     posture_violation: float = 5e-5
 
 
@@ -121,7 +113,6 @@ ROUGH = PathEffort(
 FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     places=PLACES,
-    may_add_places=True,
     margin=MARGIN,
     options=SolverOptions(
         tolerance=1e-5,
@@ -165,17 +156,6 @@ def _report(
         wall_time=seconds,
         message="the fastest timing of the joint path",
     )
-
-
-def time_joint_paths(
-    program: Program, joint_paths: Sequence[np.ndarray]
-) -> list[PhaseTiming]:
-    """Time the joint paths of all phases, (S, c) each: s and other curves.
-
-    Raises UnreachableError where they leave the map.
-    """
-    pairs = zip(program.phases, joint_paths, strict=True)
-    return [PhaseTiming.through(*pair) for pair in pairs]
 
 
 def begin_with_timing(
@@ -250,9 +230,6 @@ class BetterPaths:
     is_credible : bool
         Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
         curves over the path are none.
-    swings : bool
-        Whether the answers are so much faster than their timings that limits are exceeded between the places where they
-        hold; such answers are not credible.
     is_held_back : bool
         Whether a branch margin is so near to its bound that it holds the motion back.
     """
@@ -262,7 +239,6 @@ class BetterPaths:
     reports: tuple[SolverReport, ...] = ()
     violation: float = 0.0
     is_credible: bool = True
-    swings: bool = False
     is_held_back: bool = False
 
     @property
@@ -326,18 +302,12 @@ def improve_joint_paths(
     if not r:
         return best
     apart = program.with_margin(effort.margin)
-    ahead = HALF_WAY
     for count in effort.intervals:
         before = best.t_end
         is_too_large = count * r > _MOST_INTERVALS
         if is_too_large or not np.isfinite(before) or solve.deadline.passed:
             break
-        solve_level = partial(_better, apart, solve, effort, count)
-        best = solve_level(best, ahead)
-        wants_more = best.swings and ahead == HALF_WAY and effort.may_add_places
-        if wants_more and not solve.deadline.passed:
-            ahead = POINTS_OF_GAUSS
-            best = solve_level(best, ahead)
+        best = _better(apart, solve, effort, count, best)
         if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
     if best.timings is timings and is_first_rough and not effort.is_rough_after:
@@ -351,15 +321,14 @@ def _better(
     effort: PathEffort,
     intervals: int,
     best: BetterPaths,
-    ahead: tuple[float, ...],
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
     phases = []
     for phase, own in zip(program.phases, best.timings, strict=True):
         share = own.t_end / best.t_end
         count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
-        stations = int(_PLACES_AN_INTERVAL * count) // len(ahead)
-        phases.append(PathPhase(phase, own, count, stations, ahead))
+        stations = int(_PLACES_AN_INTERVAL * count)
+        phases.append(PathPhase(phase, own, count, stations))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
     reports = (*best.reports, report)
@@ -390,7 +359,6 @@ def _better(
     return replace(
         found,
         is_credible=abs(missed) < _CREDIBLE,
-        swings=report.violation < _CREDIBLE < missed < 1.0,
         is_held_back=is_held_back,
     )
 
@@ -435,22 +403,9 @@ def lay_splines(
         followed = follow(phase, own, tolerance, points, deadline)
         if followed is None:
             return None
-        found.append(_follow_again(followed, tolerance, points, deadline))
+        found.append(followed)
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
     violation = max(own.laid.violation for own in found)
     seconds = time.perf_counter() - began
     return finer, _report(finer, x, SolveStatus.FOLLOWED, violation, seconds)
-
-
-def _follow_again(
-    first: Followed, tolerance: float, points: int, deadline: Deadline
-) -> Followed:
-    """Follow the timing of the splines' own joint path, where these cut its curves so that it is faster."""
-    if not first.phase.joint_map.r or deadline.passed:
-        return first
-    own = PhaseTiming.of(first.phase, first.x)
-    if own is None or own.t_end > first.laid.needed * (1.0 - _WORTH * tolerance):
-        return first
-    again = follow(first.phase, own, tolerance, points, deadline)
-    return again if again and again.laid.rank < first.laid.rank else first

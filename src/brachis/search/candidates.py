@@ -47,7 +47,6 @@ from brachis.optimise.retiming import (
     begin_with_timing,
     improve_joint_paths,
     least_time,
-    time_joint_paths,
 )
 from brachis.optimise.transcription import maps_by_leg, program_of, program_over
 from brachis.problem.problem import Problem
@@ -55,7 +54,7 @@ from brachis.search.over_path import plan_timing, solve_over_path
 from brachis.search.phase_plane import initial_guess
 from brachis.task import SplineSettings
 
-_ENTRIES = 600_000
+_ENTRIES = 500_000
 """Variables times rows of a program over time that improves a joint path: with more an iteration takes tenths of a
 second."""
 _ITERATIONS = 80
@@ -114,10 +113,7 @@ def _solve_over_time(
     start: InitialGuess, target: Program, session: SolverSession
 ) -> Candidate:
     """Solve over time, with knots that the fastest timing needs, or those that are given."""
-    target = target.with_phases(
-        phase.restrict_to(curves)
-        for phase, curves in zip(target.phases, start.legs, strict=True)
-    )
+    target = _restrict(target, start.legs)
     task = start.problem.task
     begun = None
     is_open = task.spline.intervals == "auto" and not task.boundary.periodic
@@ -125,7 +121,8 @@ def _solve_over_time(
         # Over few knots, close together where the fastest timing of the joint path needs them.
         points = task.spline.points_per_interval
         with contextlib.suppress(UnreachableError):
-            timings = time_joint_paths(target, start.legs)
+            pairs = zip(target.phases, start.legs, strict=True)
+            timings = [PhaseTiming.through(*pair) for pair in pairs]
             begun = begin_with_timing(
                 target, timings, _ROUGHLY, _FIRST_INTERVALS, points
             )
@@ -168,15 +165,12 @@ def _solve_clear_first(
     the collocation points.
     """
     clear = attempt_once(session, program.with_margin(_CLEAR), x)
-    if not clear.usable:
-        return attempt_once(session, program, x)
-    if clear.program.safeguard_slack(clear.x) > HELD_BACK:
+    if clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK:
         return clear
-    near = attempt_once(session, program, clear.x)
-    reports = (*clear.reports, *near.reports)
-    if near.usable:
-        return replace(near, reports=reports)
-    return replace(clear, reports=reports[::-1])
+    near = attempt_once(session, program, clear.x if clear.usable else x)
+    if near.usable or not clear.usable:
+        return replace(near, reports=clear.reports + near.reports)
+    return replace(clear, reports=near.reports + clear.reports)
 
 
 def finish_candidate(
@@ -221,12 +215,17 @@ def _finish_over_path(
     done = None
     solved = None
     if start.joint_map.r and not session.deadline.passed:
-        solved = _improve_over_time(program, timings, session, spline)
+        near = _restrict(program, found.curves)
+        solved = _improve_over_time(near, timings, session, spline)
     if solved is not None:
         reports = (*reports, *solved.reports)
-        again = time_phases(solved.program, solved.x)
+        pairs = zip(solved.program.phases, program.phases, strict=True)
+        whole = solved.program.with_phases(
+            own.with_limits(first.limits) for own, first in pairs
+        )
+        again = time_phases(whole, solved.x)
         if least_time(again) < found.t_end:
-            program = solved.program
+            program = whole
             timings = again
         within = least_time(timings) * (1.0 + spline.tolerance)
         if solved.t_end < within:
@@ -237,10 +236,17 @@ def _finish_over_path(
             if done.is_settled and done.t_end < within:
                 return done
     laid = plan_timing(candidate, program, timings, reports, options)
+    nothing = replace(candidate, status=NO_TIMING, reports=reports)
     motions = [each for each in (done, laid) if each is not None]
-    if not motions:
-        return replace(candidate, status=NO_TIMING, reports=reports)
-    return min(motions, key=lambda each: (not each.is_settled, each.t_end))
+    return min(
+        motions, key=lambda each: (not each.is_settled, each.t_end), default=nothing
+    )
+
+
+def _restrict(program: Program, curves: Sequence[np.ndarray]) -> Program:
+    """Return a program with the limits that are near along the curves of its phases, (S, c) each."""
+    pairs = zip(program.phases, curves, strict=True)
+    return program.with_phases(phase.restrict_to(own) for phase, own in pairs)
 
 
 def _improve_over_time(

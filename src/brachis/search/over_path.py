@@ -115,6 +115,8 @@ def improve_guess(
             better = BetterGuess(_along(moved, found), own, found)
             if gain < tolerances.GAIN:
                 break
+    with contextlib.suppress(UnreachableError):
+        better = _centre(better)
     return better
 
 
@@ -122,6 +124,18 @@ def _program_like(program: Program, start: InitialGuess) -> Program:
     """Write the program of a guess down over the knots of another."""
     grids = [phase.grid for phase in program.phases]
     return program_over(start.problem, start.maps_by_leg(), grids)
+
+
+def _centre(better: BetterGuess) -> BetterGuess:
+    """Lay the same chart around the better joint path: the search for a posture then begins beside it.
+
+    Its coordinates stay, and so do the timings that were found. Raises UnreachableError where no chart can be laid.
+    """
+    chart, s, q = _chart_of(better.start)
+    centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
+    start = replace(better.start, joint_map=centred)
+    program = _program_like(better.program, start)
+    return replace(better, start=start, program=program)
 
 
 def _chart_of(start: InitialGuess) -> tuple[ChartMap, np.ndarray, np.ndarray]:

@@ -159,7 +159,5 @@ def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | N
 
 def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:
     """Postures of a guess, (S, n), at path coordinates, (S,); None if some do not exist."""
-    path = start.joint_path
-    others = interpolate_columns(s, path[:, 0], path)[:, 1:]
-    q = start.joint_map.postures(np.column_stack([s, others]))
+    q = start.postures_at(s)
     return q if np.isfinite(q).all() else None

@@ -16,10 +16,9 @@ from importlib import import_module
 from pickle import PicklingError
 from typing import Any, TypeVar
 
-from threadpoolctl import ThreadpoolController
-
 from brachis.common import interrupts
 from brachis.common.progress import Listener, ignore
+from brachis.common.threads import use_one_thread
 from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
@@ -198,7 +197,7 @@ def _do_here(function: Callable[..., _Made], *arguments: object) -> Future[_Made
 
 def _run_in_worker(function: Callable[..., _Made], *arguments: object) -> _Made:
     """Do a piece of work in a process of its own: one thread for linear algebra, nobody listening."""
-    with ThreadpoolController().limit(limits=1, user_api="blas"):
+    with use_one_thread():
         return function(*arguments, ignore)
 
 

@@ -44,7 +44,8 @@ def _postures_of(candidate: Candidate) -> np.ndarray:
     program = candidate.program
     assert start is not None and program is not None
     if candidate.is_over_path:
-        return start.postures_at_places(_COMPARED * len(start.problem.legs))
+        count = _COMPARED * len(start.problem.legs)
+        return start.postures_at(np.linspace(0.0, 1.0, count))
     motions = program.motions(candidate.reports[-1].x)
     found = []
     for phase, motion in zip(program.phases, motions, strict=True):

@@ -28,8 +28,8 @@ from brachis.search.processes import run_in_processes
 
 _NEAR_LEAST = 1.01
 """Factor on the least time up to which others are as fast, about: plans from there may end in either order."""
-_COMPARED = 49
-"""Even places at which joint paths are compared."""
+_PLACES = np.linspace(0.0, 1.0, 49)
+"""Places at which joint paths are compared."""
 _SLOW = 1.03
 """Times the least time that is slow."""
 
@@ -84,7 +84,7 @@ def _spread_out(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
     Neighbours end in the same optimum. Where some that are far apart do, others do too. Guesses without some of their
     postures come last.
     """
-    paths = np.array([start.postures_at_places(_COMPARED).ravel() for start in starts])
+    paths = np.array([start.postures_at(_PLACES).ravel() for start in starts])
     (known,) = np.isfinite(paths).all(axis=1).nonzero()
     order = known[:1].tolist()
     if len(known) > 1:
@@ -173,5 +173,5 @@ def _is_same(first: InitialGuess, second: InitialGuess) -> bool:
         return False
     if abs(first.estimate - second.estimate) > 0.02 * second.estimate:
         return False
-    postures = [start.postures_at_places(_COMPARED) for start in (first, second)]
+    postures = [start.postures_at(_PLACES) for start in (first, second)]
     return bool(np.abs(postures[0] - postures[1]).max() < 0.15)  # rad or m

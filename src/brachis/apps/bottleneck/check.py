@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from brachis.apps.bottleneck.sensitivities import (
     Sensitivities,
@@ -31,6 +30,7 @@ from brachis.apps.bottleneck.sensitivities import (
     sensitivities,
 )
 from brachis.common.summary import Summary
+from brachis.common.threads import use_one_thread
 from brachis.errors import PlanningError, UnreachableError
 from brachis.optimise.backends import SolverOptions, residual, solvers_for
 from brachis.optimise.improve import SolvedProgram
@@ -180,7 +180,7 @@ def check_sensitivities(
     base = refined.report.x
     t_end = program.end_time
     checked = []
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
+    with use_one_thread():
         if max(residual(program, base), _stationarity(program, base)) > 1e-9:
             base, _ = _solve_again(program, base)
         for entry in (predictions or sensitivities(refined)).limits:

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from brachis.common.arrays import spread
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
+from brachis.common.threads import use_one_thread
 from brachis.errors import (
     DecompositionError,
     PlanningError,
@@ -76,7 +76,7 @@ def solve_again(
     deadline = Deadline.after(task.search.time_limit)
     options = RefinementOptions.of(task.refinement, deadline)
     ends = []
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
+    with use_one_thread():
         program, x = _problem(trajectory, families, own_limits)
         first = program.phases[0].joint_map
         longest = 1e-3

@@ -22,9 +22,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from brachis.common.deadline import Deadline
+from brachis.common.threads import use_one_thread
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import (
     Solver,
@@ -121,7 +121,7 @@ def find_reference(
     finest = max(2, intervals // (own.intervals * max(1, r)))
     meshes = [(3, times) for times in sorted({1, 2, finest})]
     fastest = refined
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
+    with use_one_thread():
         for degree, times in (*meshes, (_PARABOLAS, finest)):
             if fastest is not refined and deadline.passed:
                 break

@@ -22,9 +22,9 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from brachis.common import interrupts
+from brachis.common.threads import use_one_thread
 from brachis.optimise.backends.monitor import (
     SolveMonitor,
     is_usable,
@@ -225,7 +225,7 @@ def _work(
 
     monitor = SolveMonitor(problem, options, progress)
     try:
-        with ThreadpoolController().limit(limits=1, user_api="blas"):
+        with use_one_thread():
             sender.send(run(monitor, x))
     except Exception as error:  # noqa: BLE001  (raised where the solve was asked for)
         sender.send(_make_sendable(error))
