@@ -258,15 +258,16 @@ def _improve_over_time(
     """Solve over time from splines along the timings of all phases; None where that gives no motion."""
     r = program.phases[0].joint_map.r
     # Variables times rows grow with the square of the intervals.
-    rows = len(program.lower) / program.intervals
-    most = int(np.sqrt(_ENTRIES / ((1 + r) * rows)))
-    points = spline.points_per_interval
-    begun = begin_with_timing(program, timings, spline.tolerance, most, points)
+    rows = (1 + r) * len(program.lower) / program.intervals
+    intervals = int(np.sqrt(_ENTRIES / rows))
+    begun = begin_with_timing(
+        program, timings, spline.tolerance, intervals, spline.points_per_interval
+    )
     if begun is None:
         return None
-    iterations = min(_ITERATIONS, session.options.max_iterations)
-    bounds = replace(session.options, max_iterations=iterations, widening=_WIDENING)
-    session = replace(session, options=bounds, acceptable=_NEARLY)
+    most = min(_ITERATIONS, session.options.max_iterations)
+    options = replace(session.options, max_iterations=most, widening=_WIDENING)
+    session = replace(session, options=options, acceptable=_NEARLY)
     solved = attempt_once(session, *begun, accept_early_end=True)
     return solved if solved.usable else None
 
