@@ -15,6 +15,7 @@ from typing import Any
 from unittest import mock
 
 from brachis.errors import BrachisError
+from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.retiming import FINE, improve_joint_paths
 from brachis.search.over_path import improve_guess, plan_timing
@@ -286,12 +287,6 @@ MECHANISMS = (
         is_used=is_found,
     ),
     Mechanism(
-        "follow_again",
-        "the timing of the splines' own joint path is not followed",
-        {_OPTIMISE + "retiming._follow_again": return_first},
-        use=_OPTIMISE + "phase_timing.PhaseTiming.of",
-    ),
-    Mechanism(
         "follow_meshes",
         "splines along a timing over one choice of knots",
         {_OPTIMISE + "follow._MESHES": 1},
@@ -321,10 +316,26 @@ MECHANISMS = (
         },
     ),
     Mechanism(
-        "violation_points",
-        "no refinement where the verification found a violation",
-        {_OPTIMISE + "candidate.with_points_at_violations": return_none},
-        is_used=is_found,
+        "levels",
+        "a solve over time begins over all given knots",
+        {_SEARCH + "candidates.coarsest": return_first},
+        is_used=lambda result, program: result.intervals != program.intervals,
+    ),
+    Mechanism(
+        "centred_chart",
+        "the chart is not laid anew around the better joint path",
+        {_SEARCH + "over_path._centre": return_first},
+    ),
+    Mechanism(
+        "clear_first",
+        "the smallest branch margin from the first solve on",
+        {_SEARCH + "candidates._CLEAR": MARGIN},
+        use=_SEARCH + "candidates._solve_clear_first",
+    ),
+    Mechanism(
+        "improve_over_time",
+        "joint paths are not improved over time after the search over the path",
+        {_SEARCH + "candidates._improve_over_time": return_none},
     ),
     Mechanism(
         "over_path",
@@ -342,12 +353,6 @@ MECHANISMS = (
         "fine_stations",
         "no more than 64 intervals of the redundant curves over the path",
         {_SEARCH + "candidates.FINE": replace(FINE, intervals=FINE.intervals[:2])},
-        use=_SEARCH + "candidates._finish_over_path",
-    ),
-    Mechanism(
-        "more_places",
-        "limits over the path hold at one place between stations, not at two",
-        {_SEARCH + "candidates.FINE": replace(FINE, may_add_places=False)},
         use=_SEARCH + "candidates._finish_over_path",
     ),
     Mechanism(

@@ -15,8 +15,10 @@ from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
     adapt_mesh,
+    coarsest,
     optimise_knots,
     refine_mesh,
+    solve_by_levels,
 )
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings
@@ -88,7 +90,7 @@ def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
     result = brachis.plan(robot(), task(intervals="auto", rest=rest))
     assert result.verified
     assert result.t_end < 1.005 * FINE["j1", rest]
-    assert len(np.unique(result.trajectory.knots)) - 1 < 150
+    assert len(np.unique(result.trajectory.knots)) - 1 < 500
 
 
 def test_a_motion_along_a_branch_boundary_is_verified_too():
@@ -198,14 +200,95 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     )
 
 
-def test_no_mesh_is_begun_after_the_deadline(solved):
+@pytest.mark.parametrize("intervals", [20, 53, 100])
+def test_coarsest_problem(intervals):
+    program, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(program)
+    assert 12 <= coarse.intervals < 26
+    assert (intervals > 24) == (coarse.variables < program.variables)
+    (whole,), (part,) = program.phases, coarse.phases
+    for fine, rough in ((whole.breaks, part.breaks), (whole.t_norm, part.t_norm)):
+        assert np.isin(rough, fine).all()
+        assert (rough[0], rough[-1]) == (0.0, 1.0)
+    assert np.diff(part.t_norm).max() == pytest.approx(
+        np.diff(part.breaks).max() / 3.0
+    ), "3 points an interval"
+
+
+def test_solves_of_many_variables_begin_over_half_a_dozen_intervals(monkeypatch):
+    program, _ = brachis.transcribe(robot(), task(intervals=20))
+    assert coarsest(program) is program
+    monkeypatch.setattr("brachis.optimise.mesh._COARSE_VARIABLES", 20)
+    assert coarsest(program).intervals == 10
+
+
+@pytest.mark.parametrize("intervals", [53, 100])
+def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
+    intervals,
+):
+    program, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(program).with_margin(0.05)
+    report = solve(coarse, next(starting_points(coarse)))
+    solved = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
+    nested = solved.program
+    reports = solved.reports
+    assert not solved.not_completed
+    np.testing.assert_array_equal(nested.phases[0].knots, program.phases[0].knots)
+    np.testing.assert_array_equal(nested.phases[0].t_norm, program.phases[0].t_norm)
+    assert reports[0] is report
+    assert max(later.iterations for later in reports[1:]) <= 10
+    assert reports[-1].objective == pytest.approx(
+        solve(program, next(starting_points(program))).objective, rel=1e-4
+    )
+
+
+def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
+    program, _ = brachis.transcribe(robot(), task(intervals=100))
+    coarse = coarsest(program)
+    report = solve(coarse, next(starting_points(coarse)))
+
+    def small_ones_only(tried, x):
+        return solve(tried, x) if tried.variables < 150 else failing(tried, x)
+
+    first = SolvedProgram(coarse, (report,))
+    nested = solve_by_levels(program, first, small_ones_only)
+    reports = nested.reports
+    assert nested.program.intervals == 50
+    assert [later.status for later in reports][-2:] == [
+        SolveStatus.FAILED,
+        SolveStatus.OPTIMAL,
+    ]
+    assert reports[-1].x.shape == (nested.program.variables,)
+    assert (
+        nested.not_completed
+        == "the motion has 50 intervals, and was not solved with all 100"
+    )
+    settled = adapt_mesh(
+        first,
+        failing,
+        SplineSettings(),
+        RefinementOptions(),
+        target=program,
+    )
+    assert settled.reports[-1] is report
+    assert (
+        settled.not_completed
+        == "the motion has 13 intervals, and was not solved with all 100"
+    )
+
+
+def test_no_level_is_begun_after_the_deadline(solved):
     program = solved.program
     report = solved.report
 
     def never(*_arguments):
         raise AssertionError("solved after the deadline")
 
+    target, _ = brachis.transcribe(robot(), task(intervals=60))
+    coarse = coarsest(target)
+    first = SolvedProgram(coarse, (solve(coarse, next(starting_points(coarse))),))
     over = RefinementOptions(deadline=Deadline(0.0))
+    assert solve_by_levels(target, first, never, over.deadline).not_completed
     for spline in (
         SplineSettings(knots="free", intervals=10),
         SplineSettings(intervals="auto"),
@@ -225,6 +308,15 @@ def test_many_intervals_are_planned_at_once_from_the_timing():
     reports = result.candidate.reports
     assert {len(report.x) for report in reports} == {196}
     assert sum(report.iterations for report in reports) < 60
+
+
+def test_many_intervals_are_planned_from_few_where_the_timing_leaves_a_limit_out():
+    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
+    arm = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=jerks)
+    result = brachis.plan(arm, task(intervals=50, degree=4))
+    assert result.verified
+    reports = result.candidate.reports
+    assert len(reports[0].x) < 0.6 * len(reports[-1].x)
 
 
 def test_settings_choose_what_is_done(solved):

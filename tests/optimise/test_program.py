@@ -22,8 +22,10 @@ from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
+    coarsest,
     optimise_knots,
     refine_mesh,
+    solve_by_levels,
 )
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
@@ -162,6 +164,21 @@ def test_knots_of_every_phase_are_freed():
     assert moved.program.variables == program.variables
     assert moved.report.objective < 0.99 * report.objective
     assert moved.report.objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
+
+
+def test_phases_are_solved_from_few_intervals():
+    phases = [
+        move(0.0, 0.5, degree=3, intervals=60),
+        move(FREE, LENGTH, degree=3, intervals=14),
+    ]
+    program = Program(phases, [Link(0, 1, ALONE, (0,))])
+    coarse = coarsest(program)
+    assert [phase.intervals for phase in coarse.phases] == [15, 14]
+    report = solve(coarse, first_point(coarse))
+    nested = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
+    assert not nested.not_completed
+    assert [phase.intervals for phase in nested.program.phases] == [60, 14]
+    assert nested.report.objective < report.objective
 
 
 def test_a_limit_of_several_phases_is_one_figure():

@@ -521,7 +521,7 @@ def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
     not sys.platform.startswith("linux"),
     reason="what is patched here is only forked there",
 )
-def test_a_solver_that_does_not_come_back_leaves_the_motion_it_began_with(monkeypatch):
+def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     honest = uno.call_uno
 
     def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
@@ -542,7 +542,10 @@ def test_a_solver_that_does_not_come_back_leaves_the_motion_it_began_with(monkey
         ),
     )
     assert result.verified
-    assert any("a solve ran out of time" in text for text in result.not_completed)
+    assert (
+        "the motion has 25 intervals, and was not solved with all 100"
+        in result.not_completed
+    )
 
 
 def test_within_other_workers_no_processes_are_made(robot):

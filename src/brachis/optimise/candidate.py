@@ -137,6 +137,8 @@ class Candidate(Summary):
         None where no joint path was found, and once the search is over.
     program : Program or None
         The first one that was solved; None where there was none, and once the search is over.
+    target : Program or None
+        The program over all its knots, where `program` has only some of them.
     is_over_path : bool
         Whether it is not solved over time: the joint path of `start` is the answer, and its estimate the end time.
     reports : tuple of SolverReport
@@ -172,6 +174,7 @@ class Candidate(Summary):
     status: str
     start: InitialGuess | None = None
     program: Program | None = None
+    target: Program | None = None
     is_over_path: bool = False
     reports: tuple[SolverReport, ...] = ()
     coarse: float = np.inf
@@ -205,10 +208,11 @@ class Candidate(Summary):
     @property
     def keeps_knots(self) -> bool:
         """True where the finished plan has the same knots, so that its end time cannot be shorter."""
-        if self.start is None or self.program is None:
+        if self.start is None or self.program is None or self.target is None:
             return False
         spline = self.start.problem.task.spline
-        return spline.knots != "free" and spline.intervals != "auto"
+        is_given = spline.knots != "free" and spline.intervals != "auto"
+        return is_given and self.program.intervals == self.target.intervals
 
     @property
     def t_end(self) -> float:
@@ -254,7 +258,7 @@ class Candidate(Summary):
 
     def without_programs(self) -> Candidate:
         """Return the candidate without what only the search needs."""
-        return replace(self, start=None, program=None, to_beat=np.inf)
+        return replace(self, start=None, program=None, target=None, to_beat=np.inf)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: what was tried and what came of it."""

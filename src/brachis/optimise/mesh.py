@@ -1,5 +1,8 @@
 """The knots of a solved program: more of them, better ones, or free ones.
 
+- `solve_by_levels` reaches many given intervals from few. A cold solve with hundreds of
+  variables takes seconds; from a coarse motion, inserted exactly, it takes a few
+  iterations on every level.
 - `refine_mesh` halves the intervals that lose most. A time-optimal motion has 1 + r
   limits active at almost every instant, and jumps from one set of them to another. A
   spline can only ramp, and loses about the ramp's length times its height.
@@ -9,7 +12,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis.common import tolerances
 from brachis.common.arrays import spread
-from brachis.common.deadline import Deadline
+from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import (
@@ -34,8 +37,65 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
+_FEW_INTERVALS = 12
+"""Least number of intervals of a phase over which a solve begins."""
+_FEWEST_INTERVALS = 6
+"""The same for programs of many variables."""
+_COARSE_VARIABLES = 100
+"""Variables, about, above which these are many. From far away a solve takes hundreds of iterations, and each of them
+the longer the more variables there are."""
 _SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
+
+
+def coarsest(program: Program) -> Program:
+    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals.
+
+    Half a dozen is enough where a solve would have many variables: several phases, several redundant joints.
+    """
+    return next(_levels(program))
+
+
+def solve_by_levels(
+    target: Program, coarse: SolvedProgram, solve: Solve, deadline: Deadline = NEVER
+) -> SolvedProgram:
+    """Solve a program from the answer of its coarsest one, level by level.
+
+    Parameters
+    ----------
+    target : Program
+    coarse : SolvedProgram
+        ``coarsest(target)`` solved, perhaps with another branch margin, which is kept.
+    solve : callable
+        ``solve(program, x)`` returns a `SolverReport`.
+    deadline : Deadline, optional
+        No level is begun after it.
+
+    Returns
+    -------
+    SolvedProgram
+        Over the target's knots; over those of the last level that was solved, where one could not be.
+    """
+
+    def change_to(level: Program, solved: SolvedProgram) -> tuple[Program, np.ndarray]:
+        """Write a motion over the knots of a level."""
+        pairs = zip(solved.program.phases, level.phases, strict=True)
+        # The solved program may have another branch margin.
+        phases = [own.with_knots(fine.knots, fine.t_norm) for own, fine in pairs]
+        return _transfer(solved, phases)
+
+    finer = (
+        partial(change_to, level)
+        for level in _levels(target)
+        if level.intervals > coarse.program.intervals
+    )
+    attempt = partial(attempt_once, solve, accept_early_end=True)
+    reached = improve(coarse, finer, attempt, deadline=deadline)
+    intervals = reached.program.intervals
+    if intervals == target.intervals:
+        return reached
+    not_completed = f"the motion has {intervals} intervals, and was not solved with all {target.intervals}"
+    return replace(reached, not_completed=not_completed)
 
 
 def _transfer(
@@ -46,6 +106,31 @@ def _transfer(
     pairs = zip(solved.program.motions(solved.x), phases, strict=True)
     motions = [motion.with_knots(phase.knots) for motion, phase in pairs]
     return finer, finer.variables_from(motions)
+
+
+def _levels(program: Program) -> Iterator[Program]:
+    """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
+    for least in (_FEW_INTERVALS, _FEWEST_INTERVALS):
+        counts = [own.intervals / least for own in program.phases]
+        halvings = [int(np.log2(max(count, 1.0))) for count in counts]
+        if program.variables <= _COARSE_VARIABLES * 2 ** max(halvings):
+            break
+    for k in range(max(halvings), 0, -1):
+        pairs = zip(program.phases, halvings, strict=True)
+        yield program.with_phases(
+            _thin_out(own, 2 ** min(k, most)) for own, most in pairs
+        )
+    yield program
+
+
+def _thin_out(phase: Phase, step: int) -> Phase:
+    """Keep every so many-th knot and collocation point, and the last ones."""
+
+    def thin_out(values: np.ndarray) -> np.ndarray:
+        return np.union1d(values[::step], values[-1:])
+
+    knots = clamped_knots(phase.degree, thin_out(phase.breaks))
+    return phase.with_knots(knots, thin_out(phase.t_norm))
 
 
 COARSE_INTERVALS = 10
@@ -231,6 +316,8 @@ def adapt_mesh(
     solve: Solve,
     spline: SplineSettings,
     refinement: RefinementOptions,
+    *,
+    target: Program | None = None,
 ) -> SolvedProgram:
     """Do with the knots of a solved program what a task's ``spline`` part asks for: nothing, free them, or refine.
 
@@ -242,6 +329,8 @@ def adapt_mesh(
     spline : SplineSettings
     refinement : RefinementOptions
         After its deadline no further round is begun.
+    target : Program, optional
+        The program over all its knots, where the solved one is its coarsest (see `solve_by_levels`).
 
     Returns
     -------
@@ -250,9 +339,17 @@ def adapt_mesh(
     """
     if not solved.usable:
         return solved
-    adapted = SolvedProgram(solved.program, (solved.report,))
+    nested = SolvedProgram(solved.program, (solved.report,))
+    if target is not None:
+        nested = solve_by_levels(target, nested, solve, refinement.deadline)
+    adapted = SolvedProgram(nested.program, (nested.report,))
     if spline.knots == "free":
         adapted = optimise_knots(adapted, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
         adapted = refine_mesh(adapted, solve, spline, refinement.deadline)
-    return replace(adapted, reports=(*solved.reports[:-1], *adapted.reports))
+    messages = filter(None, (nested.not_completed, adapted.not_completed))
+    return SolvedProgram(
+        adapted.program,
+        (*solved.reports[:-1], *nested.reports[:-1], *adapted.reports),
+        "; ".join(messages),
+    )

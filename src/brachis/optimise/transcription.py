@@ -40,7 +40,7 @@ def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:
     Program
     """
     spline = problem.task.spline
-    breaks = _breaks_of(problem)
+    breaks = breaks_of(problem)
     knots = clamped_knots(spline.degree, breaks)
     t_norm = spread(breaks, spline.points_per_interval)
     grid = FixedGrid(knots, spline.degree, t_norm)
@@ -152,11 +152,10 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
         yield Link(last, 0, (0,), in_motion[1:])
 
 
-def _breaks_of(problem: Problem) -> np.ndarray:
+def breaks_of(problem: Problem) -> np.ndarray:
     """Return the ends of a phase's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
-    intervals = problem.task.spline.intervals
-    count = COARSE_INTERVALS if intervals == "auto" else intervals
-    if intervals == "auto" and any(problem.time_laws):
+    count = problem.task.spline.intervals
+    if count == "auto":
         # The way to a given speed may be short: over few intervals no motion reaches it.
-        count = _FOR_SPEEDS
+        count = _FOR_SPEEDS if any(problem.time_laws) else COARSE_INTERVALS
     return np.linspace(0.0, 1.0, count + 1)

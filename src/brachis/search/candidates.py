@@ -38,7 +38,7 @@ from brachis.optimise.improve import (
     improve,
     keep_feasible,
 )
-from brachis.optimise.mesh import adapt_mesh
+from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.phase_timing import PhaseTiming, time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
@@ -46,6 +46,7 @@ from brachis.optimise.retiming import (
     FINE,
     begin_with_timing,
     improve_joint_paths,
+    is_timing_all,
     least_time,
 )
 from brachis.optimise.transcription import maps_by_leg, program_of, program_over
@@ -112,7 +113,7 @@ def solve_candidate(
 def _solve_over_time(
     start: InitialGuess, target: Program, session: SolverSession
 ) -> Candidate:
-    """Solve over time, with knots that the fastest timing needs, or those that are given."""
+    """Solve over time, with knots that the fastest timing needs, or those that are given: few of them at first."""
     target = _restrict(target, start.legs)
     task = start.problem.task
     begun = None
@@ -130,7 +131,10 @@ def _solve_over_time(
         program, x = begun
         target = program
     else:
-        program = target
+        is_near = start.joint_map.r <= 1 and is_timing_all(target)
+        # At a given speed motions leave their charts between few points.
+        is_whole = is_near or any(start.problem.time_laws)
+        program = target if is_whole else coarsest(target)
         first = initial_guess(program, start)
         if first is None:
             return Candidate.of(
@@ -150,6 +154,7 @@ def _solve_over_time(
         start,
         words,
         program=solved.program,
+        target=target,
         reports=solved.reports,
         coarse=coarse,
         not_completed=solved.not_completed,
@@ -280,13 +285,15 @@ def _finish_over_time(
     program = candidate.program
     assert start is not None and program is not None
     solved = SolvedProgram(program, candidate.reports)
+    target = candidate.target
     # The chart around a given motion is kept.
     is_free = start.in_chart and start.durations is None
     if candidate.keeps_knots and is_free and not session.deadline.passed:
         solved = best_of_joints(start.problem, solved, session)
+        target = solved.program
     spline = start.problem.task.spline
     soon = replace(options, deadline=session.deadline)
-    adapted = adapt_mesh(solved, session, spline, soon)
+    adapted = adapt_mesh(solved, session, spline, soon, target=target)
     undone = filter(None, (candidate.not_completed, adapted.not_completed))
     named = replace(candidate, not_completed="; ".join(undone))
     return _refine_if_fast(named, adapted, session, options)
