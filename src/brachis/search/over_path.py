@@ -9,7 +9,6 @@ this one, and the search goes on in it.
 from __future__ import annotations
 
 import contextlib
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -19,8 +18,8 @@ from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, Newton, chart_around, transversality
 from brachis.optimise.backends import SolverReport, solvers_for
-from brachis.optimise.candidate import Candidate, InitialGuess, verify
-from brachis.optimise.improve import SolvedProgram, SolverSession
+from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
+from brachis.optimise.improve import SolverSession
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
@@ -30,6 +29,7 @@ from brachis.optimise.retiming import (
     PathEffort,
     improve_joint_paths,
     is_timing_all,
+    keep,
     lay_splines,
 )
 from brachis.optimise.transcription import program_over
@@ -38,12 +38,6 @@ CHARTS = 4
 """Charts in which a guess is improved, no more, unless stated."""
 _TRANSVERSAL = 0.5
 """Least transversality of rows along a motion, below which its chart is left for another."""
-_MORE = 1.2
-"""Times the violation by which a timing takes longer."""
-_LESS = 0.9
-"""Factor on an excess beyond a limit that such a longer time should bring, at least."""
-_LONGEST = 0.1
-"""Part of the time by which it may."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +225,7 @@ def plan_timing(
 ) -> Candidate | None:
     """Lay splines along the timings of all phases, and verify them.
 
-    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer, if that helps.
+    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer.
 
     Parameters
     ----------
@@ -256,25 +250,4 @@ def plan_timing(
     if laid is None:
         return None
     finer, report = laid
-    factor = 1.0
-    if options.tolerance < report.violation < _LONGEST:
-        factor += _MORE * report.violation
-    most = np.inf
-    for number in itertools.count(1):
-        own = SolvedProgram(
-            finer, (report,), violation=report.violation, time_scaled=factor
-        )
-        done = verify(candidate, reports, own)
-        found = done.verification
-        if done.is_settled or found is None:
-            break
-        is_of_limits = all(check.passed or check.of_limit for check in found.checks)
-        excess = found.worst_ratio - 1.0
-        if not is_of_limits or excess > most:
-            break
-        most = _LESS * excess
-        # Torques that gravity adds to fall more slowly.
-        factor *= 1.0 + number * _MORE * max(excess, options.tolerance)
-        if factor > 1.0 + _LONGEST:
-            break
-    return done
+    return refine_and_verify(candidate, finer, (*reports, report), keep, options)
