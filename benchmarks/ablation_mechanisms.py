@@ -366,18 +366,6 @@ MECHANISMS = (
         "no solve over time where splines along the timing were not verified, or not credible",
         {_SEARCH + "candidates._finish_over_path": finish_by_timing_alone},
     ),
-    Mechanism(
-        "same_motion",
-        "candidates that are the same motion are all finished",
-        {_SEARCH + "portfolio.is_same_motion": return_zero},
-        is_used=is_found,
-    ),
-    Mechanism(
-        "longer_timing",
-        "a timing that exceeds a limit a little is not lengthened",
-        {_SEARCH + "over_path._LONGEST": 0.0},
-        use=_SEARCH + "over_path.plan_timing",
-    ),
 )
 
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from brachis.optimise.candidate import coordinates
-from brachis.search.same_motion import SAME_MOTION
 
 WORDS = ("joints", "branch", "origin")
 TIMES = ("coarse [s]", "t_end [s]")
@@ -16,12 +15,10 @@ STATUS = "status"
 
 
 def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Return a row of text for each candidate, as `Candidate.to_dict` gives it; the same motion is listed once."""
+    """Return a row of text for each candidate, as `Candidate.to_dict` gives it."""
     rows = []
     for candidate in candidates:
         status = str(candidate.get("status", ""))
-        if status == SAME_MOTION:
-            continue
         branch = str(candidate.get("branch", ""))
         joints = coordinates(candidate.get("redundant_joints", ()), branch)
         origin = str(candidate.get("origin", ""))

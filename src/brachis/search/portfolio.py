@@ -1,8 +1,8 @@
 """The search: initial guesses from lattices, solved coarsely, ranked, the best refined and verified.
 
 1. Lattices give initial guesses, batch by batch (see `schedule`).
-2. They are solved at the first collocation points. Candidates that agree are merged.
-3. The others are refined and verified in the order of their end times as long as they may beat the best verified one.
+2. They are solved at the first collocation points.
+3. They are refined and verified in the order of their end times as long as they may beat the best verified one.
    Refinement slows all motions by about as much. So a motion that does not beat the best one before is not refined.
 4. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
@@ -34,7 +34,6 @@ from brachis.search.holding import explain_holding, explain_postures
 from brachis.search.hopeless import explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, NO_TIME, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
-from brachis.search.same_motion import SAME_MOTION, is_same_motion
 from brachis.search.schedule import Batch, batches
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory
@@ -88,7 +87,6 @@ class Search:
         self._given_motion = ""
         self._solved: dict[int, Candidate] = {}
         self._waiting: list[int] = []
-        self._known: list[Candidate] = []
         self._gain = 1.0
         self._to_beat = np.inf
         self._gap: tuple[Candidate, TimingGap | None] | None = None
@@ -189,7 +187,7 @@ class Search:
             self._given_motion = outcome
 
     def _solve(self, batch: Batch) -> None:
-        """Solve the guesses of a batch coarsely, and rank those that differ."""
+        """Solve the guesses of a batch coarsely, and rank them."""
         first = self._add_starts(batch)
         limit = self._deadline
         if not self.is_satisfied:
@@ -208,16 +206,7 @@ class Search:
                     self.interrupted = True
                 if candidate.usable:
                     self._solved[number] = candidate
-        # As a fallback a motion that could not be verified gets another chance, with another solver.
-        known = [] if batch.fallback else self._known
-        self._waiting = []
-        for number in self._by_end_time(first):
-            candidate = self._solved[number]
-            if any(is_same_motion(candidate, other) for other in known):
-                self.candidates[number] = replace(candidate, status=SAME_MOTION)
-            else:
-                known.append(candidate)
-                self._waiting.append(number)
+        self._waiting = self._by_end_time(first)
 
     def _refine_and_verify(self, batch: Batch) -> None:
         """Refine and verify the candidates of a batch in the order of their end times while they may be the fastest."""

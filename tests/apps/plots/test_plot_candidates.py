@@ -9,7 +9,6 @@ import pytest
 from brachis.apps.plots import plot_candidates
 from brachis.errors import InputError
 from brachis.optimise.candidate import Candidate
-from brachis.search.same_motion import SAME_MOTION
 
 
 def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
@@ -44,13 +43,6 @@ def test_no_first_plan_is_left_of_the_fastest_for_its_few_collocation_points(t_e
     )
     assert planned == pytest.approx([2.0005 * t_end / 2.0, 2.5 * t_end / 2.0])
     assert min(planned) > star
-
-
-def test_one_motion_is_drawn_once():
-    fastest = candidate("j1", 2.0, 2.002, verified=True)
-    marks, rows = drawn([fastest, candidate("j2", 1.9999, status=SAME_MOTION)])
-    assert marks == {"the fastest": [2.002]}
-    assert rows == ["j1: elbow_up"]
 
 
 def test_refined_times_are_drawn_as_they_are():

@@ -16,7 +16,6 @@ from brachis.apps.view.bodies import placements, prescribed_path
 from brachis.apps.view.panel import look
 from brachis.apps.view.tables import candidates_table, state_table, summary
 from brachis.robot import Robot
-from brachis.search.same_motion import SAME_MOTION
 from support.shown import PANDA, ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")
@@ -198,11 +197,6 @@ def test_tables_have_units_and_escape_names(bare_robot, motion_of):
     assert "inf" not in listed
     assert "result.json" in candidates_table([])
     assert "40 more" in candidates_table([known] * 100)
-    again = candidates_table(
-        [known, {**known, "origin": "twice", "status": SAME_MOTION}]
-    )
-    assert "twice" not in again
-    assert "1 more" in again
 
 
 def test_the_panel_says_whether_the_motion_is_verified(line_result):

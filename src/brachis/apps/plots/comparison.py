@@ -12,7 +12,6 @@ from brachis.apps.plots import style
 from brachis.common.arguments import check_list
 from brachis.errors import InputError
 from brachis.optimise.candidate import Candidate, coordinates
-from brachis.search.same_motion import SAME_MOTION
 from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -198,7 +197,7 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     Figure
         Two columns wide; the row of the fastest candidate is the uppermost one. Candidates that were planned at the
         first collocation points only are drawn at that time multiplied by what refining did to the time of the fastest
-        one, so that like is compared with like. What turned out to be the same motion as another is drawn once.
+        one, so that like is compared with like.
 
     Raises
     ------
@@ -213,14 +212,13 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
             found=f"{candidates!r:.60}",
             allowed="the candidates of a result: result.candidates",
         )
-    fastest, *others = candidates
-    shown = [fastest, *(each for each in others if each.status != SAME_MOTION)]
-    rows = list(dict.fromkeys(_row(candidate) for candidate in shown))
+    fastest = candidates[0]
+    rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
     refining = 1.0
     if math.isfinite(fastest.t_end):
         refining = fastest.t_end / fastest.coarse
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
-    for candidate in shown:
+    for candidate in candidates:
         is_refined = math.isfinite(candidate.t_end)
         time = candidate.t_end if is_refined else refining * candidate.coarse
         kind = "failed"

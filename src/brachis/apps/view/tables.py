@@ -59,17 +59,14 @@ def phases_table(trajectory: Trajectory) -> str:
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
-    """List what the search looked at, as `Candidate.to_dict` gives it, the fastest verified one first.
-
-    The same motion is listed once.
-    """
+    """List what the search looked at, as `Candidate.to_dict` gives it, the fastest verified one first."""
     if not candidates:
         return _paragraph(
             "The candidates of the search are not known: they are in result.json, in the folder of result.npz."
         )
     rows = candidate_rows(candidates)[:60]
     left = len(candidates) - len(rows)
-    note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
+    note = _paragraph(f"{left} more, slower ones") if left else ""
     return _table((*WORDS, *TIMES, STATUS), rows, cell=_WRAPPED) + note
 
 
