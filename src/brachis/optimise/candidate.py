@@ -142,7 +142,7 @@ class Candidate(Summary):
     is_over_path : bool
         Whether it is not solved over time: the joint path of `start` is the answer, and its estimate the end time.
     reports : tuple of SolverReport
-        Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
+        Of all solves: with one or two branch margins, on ever finer meshes, then of the refinement rounds.
     coarse : float
         End time at the first collocation points, s; infinite without a motion.
     adapted : float

@@ -1,7 +1,7 @@
 """Solve again, and keep the better motion.
 
-Finer meshes, free knots, smaller branch margins, another chart, other joints: each of these is a change of a solved
-program. `improve` tries such changes in turn, and its answer is a `SolvedProgram`.
+Finer meshes, free knots, another chart, other joints: each of these is a change of a solved program. `improve` tries
+such changes in turn, and its answer is a `SolvedProgram`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Programs beside the fastest timing of their joint paths: timed, begun with it, and timed again."""
+"""Programs beside the fastest timing of their joint paths: timed, and begun with it."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 1. `solve_candidate` solves over the path where its timing may be the plan (`over_path`), else over time at the first
    collocation points.
-2. `finish_candidate` improves the joint path and lays splines along its timing, or adapts the mesh and refines. Then it
-   verifies.
+2. `finish_candidate` improves the joint path, over the path and over time, and follows its timing; or it adapts the
+   mesh and refines. Then it verifies.
 
 In between, changes of the solved program are tried, and the better motion is kept (`improve`). At the optimum any rows
 that are transversal along the motion describe the same motions, but splines of their coordinates are not the same
