@@ -27,8 +27,8 @@ from brachis.timing import Timing
 from brachis.timing.joint_path import halfway
 
 _FIRST_LOSS = 5.0
-"""What the intervals may lose together at first, in tolerances: that is by how much their loss is overrated where
-accelerations are smooth."""
+"""What the intervals may lose together at first, as a multiple of what splines may lose: where accelerations are smooth
+their loss is overrated by this factor."""
 _SHARE = 0.5
 """Part of the tolerance that splines may lose; joint paths lose more."""
 _AIM = 0.7
@@ -36,9 +36,9 @@ _AIM = 0.7
 _FINER = (0.02, 0.5)
 """Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
 _WAITS = 0.1
-"""Part of the tolerance that the timing waits at an end for every derivative that vanishes there."""
+"""Part of what splines may lose that the timing waits at an end, for every derivative that vanishes there."""
 _FIRST_WAIT = 0.01
-"""The same for first knots, as a part of the time."""
+"""Part of the time of such a wait over first knots."""
 _FOR_AIM = 3
 """The first choice of knots that may lose all of the tolerance: along paths that wind quickly (example 16) others would
 take several times as many."""
@@ -162,7 +162,7 @@ def follow(
         is_fast = laid.slower < (aim if number < _FOR_AIM else tolerance)
         if is_last or (is_fast and laid.outside <= _ENOUGH):
             break
-        lost *= np.clip(_AIM * aim / laid.slower, *_FINER)
+        lost *= np.clip(_AIM * aim / max(laid.slower, aim), *_FINER)
         if len(laid.beyond):
             most = _AIM * aim / len(laid.beyond)
             steps = np.diff(breaks)

@@ -32,8 +32,8 @@ _SWITCH = 0.1
 """Part of this that one step may cost if not."""
 _MOST_PARTS = 64
 """Parts of such a step, no more at once."""
-_DIVISIONS = 6
-"""Times that steps are divided: six resolve ramps of a part of 1e-9 of the time."""
+_TIMINGS = 7
+"""Times that a joint path is timed, no more: after six divisions ramps of a part of 1e-9 of the time are resolved."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def _resolve_ramps(
     time_at: Callable[[np.ndarray], PhaseTiming], stations: np.ndarray
 ) -> PhaseTiming:
     """Time a joint path at stations, (P,), and at others where the timing switches within a step."""
-    for _ in range(_DIVISIONS):
+    for _ in range(_TIMINGS):
         own = time_at(stations)
         timing = own.timing
         if timing is None:

@@ -30,7 +30,6 @@ from brachis.optimise.backends import SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.improve import (
-    Change,
     Solve,
     SolvedProgram,
     SolverSession,
@@ -59,7 +58,7 @@ _ENTRIES = 500_000
 """Variables times rows of a program over time that improves a joint path: with more an iteration takes tenths of a
 second."""
 _ITERATIONS = 80
-"""Iterations on it: from the timing most solves take 5 to 25, one beside a singular posture 74."""
+"""Iterations of a solve that does so: from the timing most solves take 5 to 25, one beside a singular posture 74."""
 _WIDENING = 1e-6
 """See `SolverOptions`: along a timing hundreds of rows are at their bounds, and a solve of 0.1 s took 4 s without."""
 _NEARLY = 0.01
@@ -170,7 +169,9 @@ def _solve_clear_first(
     the collocation points.
     """
     clear = attempt_once(session, program.with_margin(_CLEAR), x)
-    if clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK:
+    is_late = clear.report.status is SolveStatus.TIME_LIMIT
+    is_free = clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK
+    if is_late or is_free:
         return clear
     near = attempt_once(session, program, clear.x if clear.usable else x)
     if near.usable or not clear.usable:
@@ -181,7 +182,9 @@ def _solve_clear_first(
 def finish_candidate(
     candidate: Candidate, deadline: Deadline, listener: Listener
 ) -> Candidate:
-    """Adapt the mesh, refine and verify; only verify if the time is up.
+    """Improve a candidate as far as the time allows, and verify it.
+
+    A joint path is improved and its timing followed; a motion over time gets a finer mesh and is refined.
 
     Parameters
     ----------
@@ -233,6 +236,7 @@ def _finish_over_path(
             program = whole
             timings = again
         within = least_time(timings) * (1.0 + spline.tolerance)
+        within += start.problem.dwell_time
         if solved.t_end < within:
             rounds = replace(session, deadline=options.deadline)
             done = refine_and_verify(
@@ -367,16 +371,11 @@ def best_of_joints(
     points = [move_to_chart(problem, solved, rows) for rows in choices]
     return improve(
         solved,
-        [_go_to(point) for point in points if point is not None],
+        [lambda _, point=point: point for point in points if point is not None],
         partial(attempt_once, solve),
         least_gain=0.0,
         go_on_above=None,
     )
-
-
-def _go_to(point: tuple[Program, np.ndarray]) -> Change:
-    """Change to a program and a point, whatever was kept so far."""
-    return lambda _kept: point
 
 
 def move_to_chart(

@@ -18,8 +18,8 @@ from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, Newton, chart_around, transversality
 from brachis.optimise.backends import SolverReport, solvers_for
-from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
-from brachis.optimise.improve import SolverSession
+from brachis.optimise.candidate import Candidate, InitialGuess, verify
+from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
@@ -29,7 +29,6 @@ from brachis.optimise.retiming import (
     PathEffort,
     improve_joint_paths,
     is_timing_all,
-    keep,
     lay_splines,
 )
 from brachis.optimise.transcription import program_over
@@ -38,6 +37,14 @@ CHARTS = 4
 """Charts in which a guess is improved, no more, unless stated."""
 _TRANSVERSAL = 0.5
 """Least transversality of rows along a motion, below which its chart is left for another."""
+
+
+_MORE = 1.2
+"""Times the violation by which a timing takes longer."""
+_LONGEST = 0.1
+"""Part of the time by which it may at once."""
+_LENGTHENINGS = 4
+"""Times that a motion is verified, no more."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +232,7 @@ def plan_timing(
 ) -> Candidate | None:
     """Lay splines along the timings of all phases, and verify them.
 
-    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer.
+    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer, a few times.
 
     Parameters
     ----------
@@ -250,4 +257,16 @@ def plan_timing(
     if laid is None:
         return None
     finer, report = laid
-    return refine_and_verify(candidate, finer, (*reports, report), keep, options)
+    excess = report.violation
+    factor = 1.0
+    for _ in range(_LENGTHENINGS):
+        if options.tolerance < excess < _LONGEST:
+            factor *= 1.0 + _MORE * excess
+        longer = SolvedProgram(
+            finer, (report,), violation=report.violation, time_scaled=factor
+        )
+        done = verify(candidate, reports, longer)
+        if done.is_settled or done.verification is None:
+            break
+        excess = max(done.verification.worst_ratio - 1.0, 2.0 * options.tolerance)
+    return done

@@ -29,8 +29,8 @@ from brachis.timing import JointPath, PhasePlane
 
 _STATIONS = 401
 """Stations along a joint path of a guess."""
-FEW_VARIABLES = 60
-"""Up to so many variables a solve over time begins over all knots that are given."""
+_FEW_VARIABLES = 60
+"""With no more variables, a joint path that was not improved is not timed: its timing leads to other optima."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
 _ROUGH = 0.99
@@ -120,7 +120,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     guesses = [(start.legs, durations)]
     if start.durations is None:
         # The joint paths of legs are timed that are near the best ones, have many knots, or moving ends.
-        is_near = start.is_improved or program.variables > FEW_VARIABLES
+        is_near = start.is_improved or program.variables > _FEW_VARIABLES
         timed = [
             _time_guess(phase, curves)
             if is_near or any(phase.boundary.rates)
