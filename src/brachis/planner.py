@@ -300,8 +300,8 @@ def transcribe(
     program : TaskProgram
         ``program.guess`` is a point x to begin with, ``program.names`` says what stands where in x, and
         ``program.trajectory(x)`` is its motion, for `verify_trajectory`. There are as many knot intervals a phase as
-        the task says; with ``intervals: auto`` 10, the first mesh, which `plan` refines. With ``knots: free`` their
-        lengths are variables.
+        the task says; with ``intervals: auto`` 10, or 12 where a speed is given, while `plan` chooses its own knots.
+        With ``knots: free`` their lengths are variables.
     family : str
         Family of the closed form.
 

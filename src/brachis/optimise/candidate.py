@@ -136,9 +136,10 @@ class Candidate(Summary):
     start : InitialGuess or None
         None where no joint path was found, and once the search is over.
     program : Program or None
-        The first one that was solved; None where there was none, and once the search is over.
+        The first one that was solved; over the path, the one whose joint path was improved. None where there was none,
+        and once the search is over.
     target : Program or None
-        The program over all its knots, where `program` has only some of them.
+        The program over all its knots; None over the path.
     is_over_path : bool
         Whether it is not solved over time: the joint path of `start` is the answer, and its estimate the end time.
     reports : tuple of SolverReport

@@ -1,4 +1,4 @@
-"""Programs beside the fastest timing of their joint paths: timed, and begun with it."""
+"""The search for joint paths over the path, and programs that begin with the fastest timing of one."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from brachis.optimise.program import Link, Program
 from brachis.problem.problem import Problem
 
 _FOR_SPEEDS = 12
-"""Intervals of the first mesh of a phase beside given speeds; with 20 plans took two to three times as long."""
+"""Intervals of the first mesh of every phase, where a speed is given; with 20 plans took two to three times as long."""
 
 
 def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:

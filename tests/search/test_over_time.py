@@ -1,0 +1,33 @@
+"""Joint paths that are improved over time, where the arm waits between its phases."""
+
+from __future__ import annotations
+
+import brachis
+from brachis.search import candidates
+
+
+def test_dwells_do_not_keep_a_motion_from_being_improved_over_time(monkeypatch):
+    solved = []
+    refine = candidates.refine_and_verify
+
+    def look(*given):
+        done = refine(*given)
+        solved.append(done.t_end)
+        return done
+
+    monkeypatch.setattr(candidates, "refine_and_verify", look)
+    waiting = [
+        {"line": {"by": [0.0, 0.4]}, "stop": True, "dwell": 1.0},
+        {"line": {"by": [0.3, 0.0]}},
+    ]
+    result = brachis.plan(
+        brachis.examples.scara_line,
+        path=waiting,
+        redundant_joints="auto",
+        intervals="auto",
+        rest="velocity",
+        effort="single",
+    )
+    assert result.verified
+    assert result.t_end in solved
+    assert result.t_end > 1.0
