@@ -30,6 +30,7 @@ from brachis.optimise.backends import SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.improve import (
+    Change,
     Solve,
     SolvedProgram,
     SolverSession,
@@ -371,11 +372,16 @@ def best_of_joints(
     points = [move_to_chart(problem, solved, rows) for rows in choices]
     return improve(
         solved,
-        [lambda _, point=point: point for point in points if point is not None],
+        [_go_to(point) for point in points if point is not None],
         partial(attempt_once, solve),
         least_gain=0.0,
         go_on_above=None,
     )
+
+
+def _go_to(point: tuple[Program, np.ndarray]) -> Change:
+    """Change to a program and a point, whatever was kept so far."""
+    return lambda _kept: point
 
 
 def move_to_chart(
