@@ -94,31 +94,13 @@ class Laid:
         return self.motion.t_end * (1.0 + self.violation)
 
 
-@dataclass(frozen=True)
-class Followed:
-    """A motion along a timing.
-
-    Attributes
-    ----------
-    phase : Phase
-        Over the knots that the timing needs.
-    x : (v,) ndarray
-    laid : Laid
-        The splines.
-    """
-
-    phase: Phase
-    x: np.ndarray
-    laid: Laid
-
-
 def follow(
     phase: Phase,
     own: PhaseTiming,
     tolerance: float,
     points: int,
     deadline: Deadline = NEVER,
-) -> Followed | None:
+) -> tuple[Phase, np.ndarray, float] | None:
     """Lay splines along the fastest timing of a phase's joint path, within the limits.
 
     Parameters
@@ -135,8 +117,12 @@ def follow(
 
     Returns
     -------
-    Followed or None
-        None where the limits allow no timing.
+    phase : Phase
+        Over the knots that the timing needs.
+    x : (v,) ndarray
+        The splines; None in place of all where the limits allow no timing.
+    violation : float
+        Largest one of a limit, as a part of it; infinite if it is not known.
     """
     timing = own.timing
     if timing is None:
@@ -171,7 +157,7 @@ def follow(
     if best is None:
         return None
     finer, x = _as_phase(phase, best.motion, points)
-    return Followed(finer, x, best)
+    return finer, x, best.violation
 
 
 def begin(

@@ -39,20 +39,12 @@ from brachis.task import SplineSettings
 
 _FEW_INTERVALS = 12
 """Least number of intervals of a phase over which a solve begins."""
-_FEWEST_INTERVALS = 6
-"""The same for programs of many variables."""
-_COARSE_VARIABLES = 100
-"""Variables, about, above which these are many. From far away a solve takes hundreds of iterations, and each of them
-the longer the more variables there are."""
 _SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
 
 
 def coarsest(program: Program) -> Program:
-    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals.
-
-    Half a dozen is enough where a solve would have many variables: several phases, several redundant joints.
-    """
+    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals."""
     return next(_levels(program))
 
 
@@ -110,11 +102,8 @@ def _transfer(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    for least in (_FEW_INTERVALS, _FEWEST_INTERVALS):
-        counts = [own.intervals / least for own in program.phases]
-        halvings = [int(np.log2(max(count, 1.0))) for count in counts]
-        if program.variables <= _COARSE_VARIABLES * 2 ** max(halvings):
-            break
+    counts = [own.intervals / _FEW_INTERVALS for own in program.phases]
+    halvings = [int(np.log2(max(count, 1.0))) for count in counts]
     for k in range(max(halvings), 0, -1):
         pairs = zip(program.phases, halvings, strict=True)
         yield program.with_phases(

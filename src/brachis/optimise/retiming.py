@@ -398,14 +398,18 @@ def lay_splines(
     began = time.perf_counter()
     found = []
     for phase, own in zip(program.phases, timings, strict=True):
-        if own is None:
-            return None
-        followed = follow(phase, own, tolerance, points, deadline)
+        followed = own and follow(phase, own, tolerance, points, deadline)
         if followed is None:
             return None
         found.append(followed)
-    finer = program.with_phases([own.phase for own in found])
-    x = np.concatenate([own.x for own in found])
-    violation = max(own.laid.violation for own in found)
+    phases, parts, violations = zip(*found, strict=True)
+    finer = program.with_phases(phases)
     seconds = time.perf_counter() - began
-    return finer, _report(finer, x, SolveStatus.FOLLOWED, violation, seconds)
+    report = _report(
+        finer,
+        np.concatenate(parts),
+        SolveStatus.FOLLOWED,
+        max(violations),
+        seconds,
+    )
+    return finer, report
