@@ -202,11 +202,6 @@ def is_found(result: Any, *_arguments: Any, **_keywords: Any) -> bool:
     return bool(result) if isinstance(result, list | bool) else result is not None
 
 
-def is_changed(result: Any, given: Any, *_arguments: Any, **_keywords: Any) -> bool:
-    """Take those calls that do not return what they are given."""
-    return result is not given
-
-
 MECHANISMS = (
     Mechanism(
         "nothing",
@@ -329,7 +324,7 @@ MECHANISMS = (
     Mechanism(
         "clear_first",
         "the smallest branch margin from the first solve on",
-        {_SEARCH + "candidates._CLEAR": MARGIN},
+        {_SEARCH + "candidates._FIRST_MARGIN": MARGIN},
         use=_SEARCH + "candidates._solve_clear_first",
     ),
     Mechanism(

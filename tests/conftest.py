@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import shutil
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import hypothesis
@@ -146,3 +147,14 @@ def browser() -> Iterator[Any]:
         started = driver.chromium.launch(executable_path=chromium, args=list(_CHROMIUM))
         yield started
         started.close()
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Callable[[str], ModuleType]]:
+    """Import modules of the benchmarks by name."""
+    folder = str(_TESTS.parent / "benchmarks")
+    sys.path.insert(0, folder)
+    try:
+        yield importlib.import_module
+    finally:
+        sys.path.remove(folder)

@@ -5,26 +5,12 @@ The full count is `benchmarks/ablation.py`.
 
 from __future__ import annotations
 
-import importlib
 import pkgutil
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from brachis.robot.from_task import robot_for
-
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
-
-
-@pytest.fixture(scope="module")
-def bench():
-    sys.path.insert(0, str(BENCHMARKS))
-    try:
-        yield importlib.import_module
-    finally:
-        sys.path.remove(str(BENCHMARKS))
 
 
 def test_every_mechanism_exists(bench):

@@ -5,10 +5,6 @@ The full counts are `benchmarks/mixed_tasks.py` and `benchmarks/restarts.py`.
 
 from __future__ import annotations
 
-import importlib
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -16,21 +12,11 @@ from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
 from brachis.task import load_task
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 CASES = [
     *(("tx90l_rail", number) for number in range(6)),
     ("planar4", 1),
     ("scara3", 2),
 ]
-
-
-@pytest.fixture(scope="module")
-def bench():
-    sys.path.insert(0, str(BENCHMARKS))
-    try:
-        yield importlib.import_module
-    finally:
-        sys.path.remove(str(BENCHMARKS))
 
 
 @pytest.fixture(scope="module")

@@ -21,15 +21,15 @@ _PLACES_A_PIECE = 24
 """Places in every piece of a path, unless there are very many of these."""
 _MOST_PLACES = 40_000
 """Places in all pieces together, about."""
-_ROUGHLY = 1e-3
+_ROUGH_AGREEMENT = 1e-3
 """Change of the time, as a part of it, with which a rough timing ends."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
-_SWITCHES = 0.1
+_LOSS_OF_SWITCHES = 0.1
 """What switches within steps between stations may cost together, in mean steps: that is 0.0025 % with 4000. Drives that
 take a slide to its speed within microseconds lost 0.01 % without, and their ramps could not be told from rest."""
-_SWITCH = 0.1
-"""Part of this that one step may cost if not."""
+_SHARE_OF_STEP = 0.1
+"""Part of this that a step may cost after it is divided."""
 _MOST_PARTS = 64
 """Parts of such a step, no more at once."""
 _TIMINGS = 7
@@ -131,7 +131,7 @@ class PhaseTiming:
             return timed, tuple(timed.speeds[[0, -1]] * phase.boundary.rates)
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
-        timing = course.solve(by_length, agreement=_ROUGHLY)
+        timing = course.solve(by_length, agreement=_ROUGH_AGREEMENT)
         law = phase.time_law
         given = None if law is None else law.duration
         if timing is None or is_rough:
@@ -179,10 +179,10 @@ def _resolve_ramps(
         change = np.maximum(jumps[1:], jumps[:-1])
         fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
         lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
-        most = _SWITCHES / len(lost)
+        most = _LOSS_OF_SWITCHES / len(lost)
         if lost.sum() <= most:
             break
-        parts = np.ceil(np.sqrt(lost / (_SWITCH * most))).clip(1, _MOST_PARTS)
+        parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * most))).clip(1, _MOST_PARTS)
         stations = spread(own.course.places, parts.astype(int))
     return own
 

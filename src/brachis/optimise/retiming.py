@@ -36,11 +36,7 @@ _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
-_COARSE_INTERVALS = (8, 12)
-"""Least and largest number of intervals of a redundant curve in a coarse search."""
-_COARSE_CURVES = 32
-"""Intervals of all curves together in a coarse search, if these bounds allow it."""
-_CLEAR = 0.02
+_ROUGH_MARGIN = 0.02
 """Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
 _FEWEST = 12
 """Intervals of a phase over which a search over time begins, no fewer if its timing needs as many."""
@@ -77,11 +73,11 @@ class PathEffort:
 
 
 COARSE = PathEffort(
-    intervals=_COARSE_INTERVALS[1:],
+    intervals=(12,),
     places=200,
     is_rough_before=True,
     is_rough_after=True,
-    margin=_CLEAR,
+    margin=_ROUGH_MARGIN,
     options=SolverOptions(
         tolerance=1e-3,
         max_iterations=25,
@@ -98,7 +94,7 @@ ROUGH = PathEffort(
     intervals=(16,),
     places=800,
     is_rough_before=True,
-    margin=_CLEAR,
+    margin=_ROUGH_MARGIN,
     options=SolverOptions(
         tolerance=3e-4,
         max_iterations=40,
@@ -124,12 +120,6 @@ FINE = PathEffort(
     ),
 )
 """For a plan, from the answer of a rough search."""
-
-
-def coarse_for(r: int) -> PathEffort:
-    """Return the coarse search for r redundant joints, at least one: with more joints each has fewer intervals."""
-    least, most = _COARSE_INTERVALS
-    return replace(COARSE, intervals=(min(most, max(least, _COARSE_CURVES // r)),))
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:

@@ -94,10 +94,10 @@ class Problem(Summary):
             for a limit.
         """
         robot, task_map = bind(robot, task.task_space, task.tolerances)
-        start, end = (
-            stated and robot.posture(*stated)
-            for stated in (task.joints_at("start"), task.joints_at("end"))
-        )
+        at_start = task.joints_at("start")
+        at_end = task.joints_at("end")
+        start = at_start and robot.posture(*at_start)
+        end = at_end and robot.posture(*at_end)
         path = path_of(task_map, task)
         task = with_held_speeds(with_feed_rates(task, path), task_map, path)
         if task.boundary.periodic:

@@ -64,7 +64,7 @@ _WIDENING = 1e-6
 """See `SolverOptions`: along a timing hundreds of rows are at their bounds, and a solve of 0.1 s took 4 s without."""
 _NEARLY = 0.01
 """Violation that refinement mends, where the iterations end a solve."""
-_ROUGHLY = 0.05
+_FIRST_LOSS = 0.05
 """Part of the time that first knots may lose, where a mesh is refined from them."""
 _FIRST_INTERVALS = 16
 """Intervals of such a first mesh, about."""
@@ -72,7 +72,7 @@ NO_TIMING = "the limits allow no timing"
 """Status of a candidate whose joint path cannot be followed within the limits."""
 _FOR_KNOTS = 0.5
 """Part of the time left after which the knots are not refined further."""
-_CLEAR = 0.1
+_FIRST_MARGIN = 0.1
 """Branch margin of a first solve: without it a rail at 0.1 m/s took three times as long, after four motions that left
 their charts."""
 NOT_TRIED = "not tried: the search ended"
@@ -125,7 +125,7 @@ def _solve_over_time(
             pairs = zip(target.phases, start.legs, strict=True)
             timings = [PhaseTiming.through(*pair) for pair in pairs]
             begun = begin_with_timing(
-                target, timings, _ROUGHLY, _FIRST_INTERVALS, points
+                target, timings, _FIRST_LOSS, _FIRST_INTERVALS, points
             )
     if begun is not None:
         program, x = begun
@@ -169,7 +169,7 @@ def _solve_clear_first(
     Where many motions are equally fast, as at a given speed, they drift to the boundary, and leave the branch between
     the collocation points.
     """
-    clear = attempt_once(session, program.with_margin(_CLEAR), x)
+    clear = attempt_once(session, program.with_margin(_FIRST_MARGIN), x)
     is_late = clear.report.status is SolveStatus.TIME_LIMIT
     is_free = clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK
     if is_late or is_free:
@@ -218,38 +218,42 @@ def _finish_over_path(
     program = candidate.program
     assert start is not None and program is not None
     spline = start.problem.task.spline
-    found = improve_joint_paths(program, start.legs, session, spline.tolerance, FINE)
-    timings: Sequence[PhaseTiming | None] = found.timings
-    reports = (*candidate.reports, *found.reports)
-    done = None
+    better_paths = improve_joint_paths(
+        program, start.legs, session, spline.tolerance, FINE
+    )
+    timings: Sequence[PhaseTiming | None] = better_paths.timings
+    reports = (*candidate.reports, *better_paths.reports)
+    refined = None
     solved = None
     if start.joint_map.r and not session.deadline.passed:
-        near = _restrict(program, found.curves)
-        solved = _improve_over_time(near, timings, session, spline)
+        restricted = _restrict(program, better_paths.curves)
+        solved = _improve_over_time(restricted, timings, session, spline)
     if solved is not None:
         reports = (*reports, *solved.reports)
         pairs = zip(solved.program.phases, program.phases, strict=True)
-        whole = solved.program.with_phases(
-            own.with_limits(first.limits) for own, first in pairs
+        unrestricted = solved.program.with_phases(
+            phase.with_limits(original.limits) for phase, original in pairs
         )
-        again = time_phases(whole, solved.x)
-        if least_time(again) < found.t_end:
-            program = whole
-            timings = again
-        within = least_time(timings) * (1.0 + spline.tolerance)
-        within += start.problem.dwell_time
-        if solved.t_end < within:
-            rounds = replace(session, deadline=options.deadline)
-            done = refine_and_verify(
-                candidate, solved.program, reports, rounds, options
+        new_timings = time_phases(unrestricted, solved.x)
+        if least_time(new_timings) < better_paths.t_end:
+            program = unrestricted
+            timings = new_timings
+        longest = least_time(timings) * (1.0 + spline.tolerance)
+        longest += start.problem.dwell_time
+        if solved.t_end < longest:
+            refining = replace(session, deadline=options.deadline)
+            refined = refine_and_verify(
+                candidate, solved.program, reports, refining, options
             )
-            if done.is_settled and done.t_end < within:
-                return done
-    laid = plan_timing(candidate, program, timings, reports, options)
-    nothing = replace(candidate, status=NO_TIMING, reports=reports)
-    motions = [each for each in (done, laid) if each is not None]
+            if refined.is_settled and refined.t_end < longest:
+                return refined
+    followed = plan_timing(candidate, program, timings, reports, options)
+    without_timing = replace(candidate, status=NO_TIMING, reports=reports)
+    motions = [each for each in (refined, followed) if each is not None]
     return min(
-        motions, key=lambda each: (not each.is_settled, each.t_end), default=nothing
+        motions,
+        key=lambda each: (not each.is_settled, each.t_end),
+        default=without_timing,
     )
 
 
@@ -275,8 +279,8 @@ def _improve_over_time(
     )
     if begun is None:
         return None
-    most = min(_ITERATIONS, session.options.max_iterations)
-    options = replace(session.options, max_iterations=most, widening=_WIDENING)
+    iterations = min(_ITERATIONS, session.options.max_iterations)
+    options = replace(session.options, max_iterations=iterations, widening=_WIDENING)
     session = replace(session, options=options, acceptable=_NEARLY)
     solved = attempt_once(session, *begun, accept_early_end=True)
     return solved if solved.usable else None

@@ -20,7 +20,7 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverOptions, solver_for_large, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.retiming import ROUGH, PathEffort, coarse_for
+from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
 from brachis.optimise.transcription import program_of
 from brachis.search.lattice import farthest
 from brachis.search.over_path import CHARTS, improve_guess
@@ -59,8 +59,7 @@ def screen(
     is_many = len(starts) > most
     if is_many:
         # The half that looks worse after a coarse search is left out.
-        effort = coarse_for(starts[0].joint_map.r)
-        coarse = improve(_spread_out(starts), effort, 1, alike + 1)
+        coarse = improve(_spread_out(starts), COARSE, 1, alike + 1)
         count = max(most, (len(coarse) + 1) // 2)
         place = {start.origin: number for number, start in enumerate(starts)}
         coarse.sort(key=lambda start: (start.estimate, place[start.origin]))
