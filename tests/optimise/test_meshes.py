@@ -215,13 +215,6 @@ def test_coarsest_problem(intervals):
     ), "3 points an interval"
 
 
-def test_solves_of_many_variables_begin_over_half_a_dozen_intervals(monkeypatch):
-    program, _ = brachis.transcribe(robot(), task(intervals=20))
-    assert coarsest(program) is program
-    monkeypatch.setattr("brachis.optimise.mesh._COARSE_VARIABLES", 20)
-    assert coarsest(program).intervals == 10
-
-
 @pytest.mark.parametrize("intervals", [53, 100])
 def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     intervals,

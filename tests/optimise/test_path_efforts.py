@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.optimise import retiming
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.search.differential_ik import differential_ik_paths
 from brachis.timing import phase_plane
@@ -20,13 +19,6 @@ def phase():
     )
     (own,) = program.phases
     return own, next(differential_ik_paths(own.joint_map))
-
-
-@pytest.mark.parametrize(
-    ("r", "intervals"), [(1, 12), (2, 12), (3, 10), (4, 8), (7, 8)]
-)
-def test_more_redundant_joints_have_fewer_intervals_each(r, intervals):
-    assert retiming.coarse_for(r).intervals == (intervals,)
 
 
 @pytest.mark.parametrize("places", [200, 800])
