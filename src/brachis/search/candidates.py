@@ -223,6 +223,9 @@ def _finish_over_path(
     )
     timings: Sequence[PhaseTiming | None] = better_paths.timings
     reports = (*candidate.reports, *better_paths.reports)
+    iterations = min(_ITERATIONS, session.options.max_iterations)
+    bounds = replace(session.options, max_iterations=iterations, widening=_WIDENING)
+    session = replace(session, options=bounds)
     refined = None
     solved = None
     if start.joint_map.r and not session.deadline.passed:
@@ -279,9 +282,7 @@ def _improve_over_time(
     )
     if begun is None:
         return None
-    iterations = min(_ITERATIONS, session.options.max_iterations)
-    options = replace(session.options, max_iterations=iterations, widening=_WIDENING)
-    session = replace(session, options=options, acceptable=_NEARLY)
+    session = replace(session, acceptable=_NEARLY)
     solved = attempt_once(session, *begun, accept_early_end=True)
     return solved if solved.usable else None
 
