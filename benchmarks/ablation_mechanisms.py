@@ -111,7 +111,7 @@ _BACKENDS = _OPTIMISE + "backends."
 
 find_original = pkgutil.resolve_name
 plan_simpler = find_original(_SEARCH + "fewer_joints._plan_simpler")
-finish_over_path = find_original(_SEARCH + "candidates._finish_over_path")
+finish_over_path = find_original(_SEARCH + "pipeline._finish_over_path")
 improve_most = find_original(_SEARCH + "screening._improve_most")
 
 
@@ -186,15 +186,17 @@ def solve_here(
     return solver.run(SolveMonitor(problem, options, progress), x)
 
 
-def finish_by_timing_alone(candidate: Any, session: Any, options: Any) -> Any:
+def finish_by_timing_alone(
+    candidate: Any, session: Any, options: Any, to_beat: float
+) -> Any:
     """Take the place of `_finish_over_path`, without solves over time where the timing can be laid."""
     program = candidate.program
-    tolerance = candidate.start.problem.task.spline.tolerance
-    legs = candidate.start.legs
+    tolerance = candidate.problem.task.spline.tolerance
+    legs = candidate.guess.legs
     paths = improve_joint_paths(program, legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
     planned = plan_timing(candidate, program, paths.timings, reports, options)
-    return planned or finish_over_path(candidate, session, options)
+    return planned or finish_over_path(candidate, session, options, to_beat)
 
 
 def is_found(result: Any, *_arguments: Any, **_keywords: Any) -> bool:
@@ -218,7 +220,7 @@ MECHANISMS = (
     Mechanism(
         "best_joints",
         "no other chart or joints in place of its rows after a solve over time",
-        {_SEARCH + "candidates.best_of_joints": return_second},
+        {_SEARCH + "pipeline.best_of_joints": return_second},
     ),
     Mechanism(
         "idle_joints",
@@ -278,7 +280,7 @@ MECHANISMS = (
     Mechanism(
         "begin_with_timing",
         "solves over time begin with even knots",
-        {_SEARCH + "candidates.begin_with_timing": return_none},
+        {_SEARCH + "over_time.begin_with_timing": return_none},
         is_used=is_found,
     ),
     Mechanism(
@@ -313,7 +315,7 @@ MECHANISMS = (
     Mechanism(
         "levels",
         "a solve over time begins over all given knots",
-        {_SEARCH + "candidates.coarsest": return_first},
+        {_SEARCH + "over_time.coarsest": return_first},
         is_used=lambda result, program: result.intervals != program.intervals,
     ),
     Mechanism(
@@ -324,18 +326,18 @@ MECHANISMS = (
     Mechanism(
         "clear_first",
         "the smallest branch margin from the first solve on",
-        {_SEARCH + "candidates._FIRST_MARGIN": MARGIN},
-        use=_SEARCH + "candidates._solve_clear_first",
+        {_SEARCH + "over_time._FIRST_MARGIN": MARGIN},
+        use=_SEARCH + "over_time._solve_clear_first",
     ),
     Mechanism(
         "improve_over_time",
         "joint paths are not improved over time after the search over the path",
-        {_SEARCH + "candidates._improve_over_time": return_none},
+        {_SEARCH + "over_time._solve_from_timings": return_none},
     ),
     Mechanism(
         "over_path",
         "everything over time",
-        {_SEARCH + "candidates.solve_over_path": return_none},
+        {_SEARCH + "pipeline.solve_over_path": return_none},
         is_used=is_found,
     ),
     Mechanism(
@@ -347,8 +349,8 @@ MECHANISMS = (
     Mechanism(
         "fine_stations",
         "no more than 64 intervals of the redundant curves over the path",
-        {_SEARCH + "candidates.FINE": replace(FINE, intervals=FINE.intervals[:2])},
-        use=_SEARCH + "candidates._finish_over_path",
+        {_SEARCH + "pipeline.FINE": replace(FINE, intervals=FINE.intervals[:2])},
+        use=_SEARCH + "pipeline._finish_over_path",
     ),
     Mechanism(
         "narrowing",
@@ -359,7 +361,7 @@ MECHANISMS = (
     Mechanism(
         "over_time_after_path",
         "no solve over time where splines along the timing were not verified, or not credible",
-        {_SEARCH + "candidates._finish_over_path": finish_by_timing_alone},
+        {_SEARCH + "pipeline._finish_over_path": finish_by_timing_alone},
     ),
 )
 

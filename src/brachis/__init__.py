@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
-    from brachis.optimise.candidate import Candidate as Candidate
     from brachis.path import bspline_segment as bspline_segment
     from brachis.planner import plan as plan
     from brachis.planner import plan_many as plan_many
@@ -59,6 +58,8 @@ if TYPE_CHECKING:
     from brachis.robot import TaskMap as TaskMap
     from brachis.robot import task_map_of as task_map_of
     from brachis.robot.plausibility import PlausibilityWarning as PlausibilityWarning
+    from brachis.search.stages import Candidate as Candidate
+    from brachis.search.stages import FinishedCandidate as FinishedCandidate
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
     from brachis.task import fit_path as fit_path
@@ -102,7 +103,7 @@ _NAMES = {
     "apps.sweeps": "SweepResult sweep",
     "apps.view": "view",
     "errors": "BrachisError InputError PlanningError",
-    "optimise.candidate": "Candidate",
+    "search.stages": "Candidate FinishedCandidate",
     "path": "bspline_segment",
     "planner": "plan plan_many transcribe",
     "result": "Result",

@@ -23,9 +23,7 @@ from brachis.common.progress import Listener, ignore, report_progress
 from brachis.common.threads import use_one_thread
 from brachis.common.words import write_count
 from brachis.errors import BrachisError, InputError
-from brachis.optimise.candidate import Candidate
 from brachis.optimise.layout import SHORTEST_TIME
-from brachis.optimise.least_motion import LeastMotion, find_least_motion
 from brachis.problem.feasibility import check_independent, check_regular
 from brachis.problem.plausibility import (
     check_within_reach,
@@ -45,10 +43,12 @@ from brachis.robots import is_robot, locate
 from brachis.search import Search, TaskProgram, first_guess, try_remedies
 from brachis.search.fewer_joints import search_motion
 from brachis.search.given_motion import widen_plan
+from brachis.search.least_motion import LeastMotion, find_least_motion
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
+from brachis.search.stages import FinishedCandidate
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
-from brachis.timing import SlowTimingWarning
+from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
@@ -162,7 +162,6 @@ def plan(
             opening = partial(_open_search, families=families, report=report)
             search = search_motion(problem, robot, known, opening, deadline, report)
             best = search.best
-            assert best is not None
             searched = time.perf_counter()
             report(
                 f"{best.status}: t_E = {best.t_end:.4f} s, after {searched - began:.2f} s"
@@ -173,7 +172,9 @@ def plan(
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict)
-            gap = None if deadline.passed else search.find_gap_of_best()
+            gap = None
+            if not deadline.passed:
+                gap = find_timing_gap(best.trajectory, problem.limits)
             if gap is not None and not end_time:
                 is_given = asked.spline.intervals != "auto"
                 slow = gap.issues(intervals_are_given=is_given)
@@ -187,14 +188,12 @@ def plan(
         total = time.perf_counter() - began
         report(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
         motion = best if smoothed is None else smoothed
-        assert best.start is not None
-        assert motion.trajectory is not None and motion.verification is not None
         return Result(
             task=problem.task,
             trajectory=motion.trajectory,
             verification=motion.verification,
-            family=best.start.family,
-            candidate=best.without_programs(),
+            family=best.family,
+            candidate=best,
             least_motion=smoothed,
             timing={
                 "load": loaded - began,
@@ -202,9 +201,9 @@ def plan(
                 "least_motion": ended - searched,
                 "total": total,
             },
-            candidates=search.in_order(),
+            candidates=search.candidates,
             interrupted=search.interrupted,
-            not_completed=search.not_completed(),
+            not_completed=search.not_completed,
             warnings=remarks,
             timing_gap=gap,
         )
@@ -231,15 +230,14 @@ def _open_search(
 
 
 def _find_smoother(
-    best: Candidate, problem: Problem, deadline: Deadline, report: Listener
+    best: FinishedCandidate, problem: Problem, deadline: Deadline, report: Listener
 ) -> LeastMotion | None:
     """Find the smoothest motion that is as fast, if the task asks for it."""
     if not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")
     found = find_least_motion(best, deadline, report)
-    assert best.start is not None
-    is_exact = best.start.problem.robot.n != problem.robot.n
+    is_exact = best.problem.robot.n != problem.robot.n
     if is_exact and found.trajectory is not best.trajectory:
         return widen_plan(found, problem)
     return found

@@ -10,10 +10,10 @@ import pytest
 import brachis
 from brachis.errors import PathError
 from brachis.kinematics import JointSpaceMap
-from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
 from brachis.search.holding import explain_postures
+from brachis.search.stages import InitialGuess
 from brachis.task import load_task
 
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import brachis
-from brachis.search import candidates
+from brachis.search import pipeline
 
 
 def test_dwells_do_not_keep_a_motion_from_being_improved_over_time(monkeypatch):
     solved = []
-    refine = candidates.refine_and_verify
+    refine = pipeline.refine_and_verify
 
     def look(*given):
         done = refine(*given)
         solved.append(done.t_end)
         return done
 
-    monkeypatch.setattr(candidates, "refine_and_verify", look)
+    monkeypatch.setattr(pipeline, "refine_and_verify", look)
     waiting = [
         {"line": {"by": [0.0, 0.4]}, "stop": True, "dwell": 1.0},
         {"line": {"by": [0.3, 0.0]}},

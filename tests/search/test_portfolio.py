@@ -23,11 +23,12 @@ from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import candidates, portfolio, schedule, starts
+from brachis.search import over_time, pipeline, portfolio, schedule, starts
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
+from brachis.search.stages import Candidate, facts_of
 from brachis.search.starts import SEARCH_LEVELS
 from brachis.task import load_task
 
@@ -269,8 +270,8 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
 
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
     honest, finished, calls = (
-        candidates.solve_candidate,
-        candidates.finish_candidate,
+        pipeline.solve_candidate,
+        pipeline.finish_candidate,
         [],
     )
 
@@ -285,8 +286,8 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
         calls.extend(["verified"] * done.verified)
         return done
 
-    monkeypatch.setattr(candidates, "solve_candidate", interrupted)
-    monkeypatch.setattr(candidates, "finish_candidate", noted)
+    monkeypatch.setattr(pipeline, "solve_candidate", interrupted)
+    monkeypatch.setattr(pipeline, "finish_candidate", noted)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.interrupted
     assert result.verified
@@ -320,7 +321,7 @@ def test_a_real_ctrl_c_ends_worker_processes(robot):
 @pytest.fixture
 def ctrl_c_before_refinement(monkeypatch):
     """Ctrl-C as the first motion is finished; the second call is the last look at it."""
-    honest, calls = candidates.finish_candidate, []
+    honest, calls = pipeline.finish_candidate, []
 
     def interrupted(*arguments: Any) -> Any:
         calls.append(1)
@@ -328,7 +329,7 @@ def ctrl_c_before_refinement(monkeypatch):
             raise KeyboardInterrupt
         return honest(*arguments)
 
-    monkeypatch.setattr(candidates, "finish_candidate", interrupted)
+    monkeypatch.setattr(pipeline, "finish_candidate", interrupted)
 
 
 @pytest.mark.usefixtures("ctrl_c_before_refinement")
@@ -379,7 +380,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
-    calls = clock.jump(candidates, "finish_candidate", at=1)
+    calls = clock.jump(pipeline, "finish_candidate", at=1)
     result = brachis.plan(robot, task(search={"effort": "exhaustive"}))
     assert len(calls) == 1
     assert result.verified
@@ -403,7 +404,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
 ):
     monkeypatch.setattr(schedule, "_SIZE", 4)
     monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
-    clock.jump(candidates, "solve_candidate", at=solved)
+    clock.jump(pipeline, "solve_candidate", at=solved)
     result = brachis.plan(robot, task(spline=FEW_POINTS, **asked))
     assert result.interrupted
     assert not result.verified
@@ -438,7 +439,7 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joi
 
 
 def test_no_solve_begins_without_time_and_its_start_is_the_motion(robot, clock):
-    calls = clock.jump(candidates, "initial_guess", at=1)
+    calls = clock.jump(over_time, "initial_guess", at=1)
     joints = {
         "task_space": "joints",
         "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
@@ -500,15 +501,13 @@ def test_a_lattice_ends_between_its_layers(robot, clock):
 
 
 def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
-    honest = candidates.finish_candidate
+    honest = pipeline.finish_candidate
     monkeypatch.setattr(
-        candidates,
+        pipeline,
         "finish_candidate",
-        lambda *given: dataclasses.replace(
-            honest(*given), trajectory=None, verification=None
-        ),
+        lambda *given: Candidate(**facts_of(honest(*given))),
     )
-    calls = clock.jump(candidates, "finish_candidate", at=1, by=0.6)
+    calls = clock.jump(pipeline, "finish_candidate", at=1, by=0.6)
     with pytest.raises(PlanningError, match="within the time limit"):
         brachis.plan(robot, task(search={"time_limit": 1.5}))
     assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, (
@@ -605,11 +604,11 @@ def test_a_motion_no_faster_over_all_knots_is_not_refined(robot, monkeypatch):
     assert first == second
     np.testing.assert_allclose(others, times, rtol=1e-6)
     best, *rest = one.candidates
-    slow = [each for each in rest if each.status == candidates.SLOW]
+    slow = [each for each in rest if each.status == pipeline.SLOW]
     assert slow
     assert all(each.adapted > (1.0 - 2e-4) * best.adapted for each in slow)
     assert all(each.adapted >= each.coarse * 0.9 for each in slow)
-    assert f"uno: {candidates.SLOW}" in map(str, said)
+    assert f"uno: {pipeline.SLOW}" in map(str, said)
     assert f"uno: t_E = {best.t_end:.4f} s, verified" in map(str, said)
 
 

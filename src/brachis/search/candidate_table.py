@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from brachis.optimise.candidate import coordinates
+from brachis.search.stages import coordinates
 
 WORDS = ("joints", "branch", "origin")
 TIMES = ("coarse [s]", "t_end [s]")

@@ -16,7 +16,6 @@ from brachis.common import tolerances
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError, PlanningError, Remedy
 from brachis.limits import Limit, Role
-from brachis.optimise.candidate import Candidate
 from brachis.problem.feasibility import load_remedies
 from brachis.problem.plausibility import of_places, say_how_far
 from brachis.problem.problem import Decomposition, Problem
@@ -31,6 +30,7 @@ from brachis.search.joint_path import (
     reaches,
     sampling_box,
 )
+from brachis.search.stages import Candidate
 from brachis.task import SolverSettings, Task
 
 _NO_TIME = "The reason was not found in time: raise search.time_limit"

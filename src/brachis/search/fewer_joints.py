@@ -12,11 +12,11 @@ from collections.abc import Callable
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import BrachisError, UrdfError
-from brachis.optimise.candidate import Candidate
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 from brachis.search.given_motion import lock_idle, widen_plan, without_tolerances
-from brachis.search.portfolio import Search
+from brachis.search.portfolio import Search, SearchOutcome
+from brachis.search.stages import FinishedCandidate
 from brachis.task import Task, Tolerances
 from brachis.trajectory import Trajectory
 
@@ -33,7 +33,7 @@ def search_motion(
     open_search: Opening,
     deadline: Deadline,
     report: Listener,
-) -> Search:
+) -> SearchOutcome:
     """Search for the fastest motion, from a known one if one is given; raise what explains that none was found."""
     search = open_search(problem, deadline)
     exact = None
@@ -47,25 +47,23 @@ def search_motion(
     if search.best is None and search.interrupted and exact is not None:
         search.candidates.append(exact)
         search.best = exact
-    if search.best is None:
-        raise search.explain()
-    if search.is_satisfied and not search.interrupted:
-        best = search.best
+    best = search.best
+    if best is not None and search.is_satisfied and not search.interrupted:
         with search.end_early():
             held = _hold_idle_joints(problem, robot, best, open_search, deadline)
             if held is not None:
                 search.candidates.append(held)
                 search.best = held
-    return search
+    return search.outcome()
 
 
 def _hold_idle_joints(
     problem: Problem,
     robot: Robot,
-    best: Candidate,
+    best: FinishedCandidate,
     open_search: Opening,
     deadline: Deadline,
-) -> Candidate | None:
+) -> FinishedCandidate | None:
     """Plan again, from the best motion, with idle joints at rest; None without idle joints, or if moving them pays."""
     postures = problem.given_postures
     try:
@@ -89,7 +87,7 @@ def _plan_simpler(
     known: Trajectory | None,
     open_search: Opening,
     deadline: Deadline,
-) -> Candidate | None:
+) -> FinishedCandidate | None:
     """Plan with fewer joints: a short search, or from a known motion alone. The motion need not be verified."""
     try:
         simpler = Problem.of(robot, task, problem.user_limits)

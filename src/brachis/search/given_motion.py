@@ -25,14 +25,14 @@ from brachis.kinematics import (
     transversality,
 )
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.candidate import Candidate, InitialGuess, PathMap
-from brachis.optimise.least_motion import LeastMotion
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import lock_joints
 from brachis.robot.task_map import JointSpace
-from brachis.search.candidates import SELECTABLE
+from brachis.search.joint_choice import SELECTABLE
+from brachis.search.least_motion import LeastMotion
 from brachis.search.schedule import has_charts
+from brachis.search.stages import FinishedCandidate, InitialGuess, PathMap
 from brachis.search.starts import FAMILY, bring_onto_path
 from brachis.task import Posture, Task, Tolerances
 from brachis.trajectory import Trajectory
@@ -41,7 +41,7 @@ from brachis.verify import verify_trajectory
 GIVEN = "given motion"
 EXACT = "from the plan without tolerances"
 """Origins of guesses."""
-Planned = TypeVar("Planned", Candidate, LeastMotion)
+Planned = TypeVar("Planned", FinishedCandidate, LeastMotion)
 
 
 def given_guess(
@@ -166,7 +166,6 @@ def stand_still(robot: Robot, postures: Mapping[str, np.ndarray]) -> np.ndarray:
 def widen_plan(planned: Planned, problem: Problem) -> Planned:
     """Return a plan with fewer joints, see `lock_idle` and `without_tolerances`, as one of the problem itself."""
     motion = planned.trajectory
-    assert motion is not None
     robot = problem.robot
     columns = [robot.joint_names.index(name) for name in motion.joint_names]
 

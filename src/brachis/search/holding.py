@@ -10,11 +10,11 @@ import numpy as np
 
 from brachis.errors import PathError, PlanningError, Remedy
 from brachis.limits import Label, Limit, Moments
-from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 from brachis.search.phase_plane import postures_along
+from brachis.search.stages import InitialGuess
 
 _HEAVY = 0.95
 """Ratio of a load at rest to a limit on its mean above which that is the most likely reason of a failure."""

@@ -22,13 +22,13 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import PlanningError, Remedy
-from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.motion import follow_law
 from brachis.path.legs import key_of_speed
 from brachis.path.sequence import tool_distance
 from brachis.problem.problem import Problem
 from brachis.search.holding import explain_holding
 from brachis.search.phase_plane import phase_plane_on, postures_along
+from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
 from brachis.timing import Timing
 

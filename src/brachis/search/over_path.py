@@ -17,8 +17,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, Newton, chart_around, transversality
-from brachis.optimise.backends import SolverReport, solvers_for
-from brachis.optimise.candidate import Candidate, InitialGuess, verify
+from brachis.optimise.backends import SolverReport
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
@@ -28,10 +27,18 @@ from brachis.optimise.retiming import (
     BetterPaths,
     PathEffort,
     improve_joint_paths,
-    is_timing_all,
     lay_splines,
 )
 from brachis.optimise.transcription import program_over
+from brachis.search.stages import (
+    Candidate,
+    FinishedCandidate,
+    InitialGuess,
+    SolvedCandidate,
+    begin_candidate,
+    facts_of,
+)
+from brachis.search.verified import verify
 
 CHARTS = 4
 """Charts in which a guess is improved, no more, unless stated."""
@@ -180,51 +187,46 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
 
 
 def solve_over_path(
-    start: InitialGuess, program: Program, session: SolverSession
-) -> Candidate | None:
-    """Solve from a guess over the path, where its timing may be the plan.
-
-    That is where the phase plane knows all limits, and the knots are open. As a fallback other solvers solve over time.
+    guess: InitialGuess, program: Program, session: SolverSession
+) -> SolvedCandidate | None:
+    """Solve from a guess over the path.
 
     Parameters
     ----------
-    start : InitialGuess
+    guess : InitialGuess
     program : Program
-        Of its joint maps, over any knots.
+        Of its joint maps, over any knots; the phase plane knows all its limits.
     session : SolverSession
 
     Returns
     -------
-    Candidate or None
-        None where that is not so, or where the limits allow no timing.
+    SolvedCandidate or None
+        None where the limits allow no timing.
     """
-    task = start.problem.task
-    is_open = task.spline.intervals == "auto"
-    is_first = start.solver == solvers_for(task.solver.name)[0].name
-    if not (is_open and is_first and is_timing_all(program)):
-        return None
     reports: tuple[SolverReport, ...] = ()
-    if not start.is_improved:
+    if not guess.is_improved:
         try:
-            better = improve_guess(start, program, session, ROUGH)
+            better = improve_guess(guess, program, session, ROUGH)
         except UnreachableError:
             return None
-        start, program = better.start, better.program
+        guess, program = better.start, better.program
         reports = better.found.reports
-    if not start.is_improved:
+    if not guess.is_improved:
         return None
-    return Candidate.of(
-        start,
-        "planned",
+    candidate = replace(
+        begin_candidate(guess, "planned"), coarse=guess.estimate, reports=reports
+    )
+    return SolvedCandidate(
+        **facts_of(candidate),
+        guess=guess,
         program=program,
+        target=program,
         is_over_path=True,
-        reports=reports,
-        coarse=start.estimate,
     )
 
 
 def plan_timing(
-    candidate: Candidate,
+    candidate: SolvedCandidate,
     program: Program,
     timings: Sequence[PhaseTiming | None],
     reports: tuple[SolverReport, ...],
@@ -236,7 +238,7 @@ def plan_timing(
 
     Parameters
     ----------
-    candidate : Candidate
+    candidate : SolvedCandidate
     program : Program
         Over any knots.
     timings : sequence of PhaseTiming or None
@@ -249,8 +251,7 @@ def plan_timing(
     Candidate or None
         None where a phase has no timing.
     """
-    assert candidate.start is not None
-    spline = candidate.start.problem.task.spline
+    spline = candidate.problem.task.spline
     laid = lay_splines(
         program, timings, spline.tolerance, spline.points_per_interval, options.deadline
     )
@@ -266,7 +267,7 @@ def plan_timing(
             finer, (report,), violation=report.violation, time_scaled=factor
         )
         done = verify(candidate, reports, longer)
-        if done.is_settled or done.verification is None:
+        if done.is_settled or not isinstance(done, FinishedCandidate):
             break
         excess = max(done.verification.worst_ratio - 1.0, 2.0 * options.tolerance)
     return done

@@ -17,7 +17,6 @@ import numpy as np
 
 from brachis.common.arrays import interpolate_columns
 from brachis.errors import UnreachableError
-from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point, worst_time_scaling_ratio
 from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
@@ -25,6 +24,7 @@ from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.path.legs import Leg
 from brachis.problem.problem import Problem
+from brachis.search.stages import InitialGuess
 from brachis.timing import JointPath, PhasePlane
 
 _STATIONS = 401

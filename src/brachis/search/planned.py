@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from brachis.common.arrays import clear_rounding
 from brachis.common.summary import Summary
 from brachis.optimise.backends import SolverReport
-from brachis.optimise.candidate import Candidate
-from brachis.optimise.least_motion import LeastMotion
 from brachis.robot.from_task import in_use
 from brachis.robot.plausibility import Issue
+from brachis.search.least_motion import LeastMotion
+from brachis.search.stages import Candidate, FinishedCandidate
 from brachis.task import FitReport, Task
 from brachis.timing import TimingGap
 from brachis.trajectory import Samples, Trajectory
@@ -47,7 +47,7 @@ class PlannedMotion(Summary):
     trajectory: Trajectory
     verification: Verification
     family: str
-    candidate: Candidate
+    candidate: FinishedCandidate
     least_motion: LeastMotion | None = None
     timing: dict[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()

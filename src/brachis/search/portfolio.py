@@ -15,7 +15,7 @@ import contextlib
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,9 +25,8 @@ from brachis.common.progress import Listener, ignore
 from brachis.common.words import name_first, write_count
 from brachis.errors import BrachisError, UnreachableError
 from brachis.optimise.backends import SolveStatus
-from brachis.optimise.candidate import Candidate
 from brachis.problem.problem import Decomposition, Problem
-from brachis.search import candidates
+from brachis.search import pipeline
 from brachis.search.failure import explain_first_failures, explain_no_motion
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.holding import explain_holding, explain_postures
@@ -35,15 +34,41 @@ from brachis.search.hopeless import explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, NO_TIME, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
-from brachis.timing import TimingGap, find_timing_gap
+from brachis.search.stages import (
+    Candidate,
+    FinishedCandidate,
+    InitialGuess,
+    SolvedCandidate,
+    begin_candidate,
+)
 from brachis.trajectory import Trajectory
 
 _GAINS_MORE = 0.998
-"""Factor by which another candidate may gain more by better knots than those so far."""
+"""Factor by which another candidate may gain more, where it gets better knots, than those so far."""
 _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
+
+
+@dataclass(frozen=True)
+class SearchOutcome:
+    """What came of a search that found a motion; see `Search`.
+
+    Attributes
+    ----------
+    best : FinishedCandidate
+    candidates : tuple of Candidate
+        All that was looked at, the fastest verified one first.
+    interrupted : bool
+    not_completed : tuple of str
+        In plain words.
+    """
+
+    best: FinishedCandidate
+    candidates: tuple[Candidate, ...]
+    interrupted: bool
+    not_completed: tuple[str, ...]
 
 
 class Search:
@@ -62,7 +87,9 @@ class Search:
     ----------
     candidates : list of Candidate
         All that was looked at.
-    best : Candidate or None
+    starts : list of InitialGuess
+        All that was begun with.
+    best : FinishedCandidate or None
         The fastest verified one, or the one nearest to the limits.
     interrupted : bool
         Whether Ctrl-C or the time limit ended the search.
@@ -76,7 +103,8 @@ class Search:
         listener: Listener,
     ) -> None:
         self.candidates: list[Candidate] = []
-        self.best: Candidate | None = None
+        self.starts: list[InitialGuess] = []
+        self.best: FinishedCandidate | None = None
         self.interrupted = False
         self._problem = problem
         self._decompositions = decompositions
@@ -85,20 +113,18 @@ class Search:
         self._dead_ends: dict[str, DeadEnd] = {}
         self._unfinished_lattices: dict[str, None] = {}
         self._given_motion = ""
-        self._solved: dict[int, Candidate] = {}
+        self._solved: dict[int, SolvedCandidate] = {}
         self._waiting: list[int] = []
         self._gain = 1.0
         self._to_beat = np.inf
-        self._gap: tuple[Candidate, TimingGap | None] | None = None
 
     @property
     def is_satisfied(self) -> bool:
         """Whether a verified motion is known; without refinement any motion will do."""
         return self.best is not None and self._merit(self.best)[0] == -np.inf
 
-    def _merit(self, candidate: Candidate) -> tuple[float, float]:
+    def _merit(self, candidate: FinishedCandidate) -> tuple[float, float]:
         """By what motions are compared: violation of a limit, -inf for a motion that will do, and end time, s."""
-        assert candidate.verification is not None
         if candidate.is_settled or not self._problem.task.refinement.max_rounds:
             return -np.inf, candidate.t_end
         return candidate.verification.worst_ratio - 1.0, candidate.t_end
@@ -106,7 +132,7 @@ class Search:
     def run(
         self,
         given: Trajectory | None = None,
-        exact: Candidate | None = None,
+        exact: FinishedCandidate | None = None,
         most: int | None = None,
     ) -> None:
         """Find starts, solve, refine and verify, batch by batch.
@@ -115,7 +141,7 @@ class Search:
         ----------
         given : Trajectory, optional
             A motion that is tried alone at first; nothing else is if it leads to a verified motion.
-        exact : Candidate, optional
+        exact : FinishedCandidate, optional
             A verified plan of the same task without tolerances. It is the plan unless a faster one is found, first near
             it, and, if there is none or the search is exhaustive, elsewhere.
         most : int, optional
@@ -136,7 +162,7 @@ class Search:
         self.interrupted |= self._deadline.passed
 
     def _find_starts(
-        self, given: Trajectory | None, exact: Candidate | None
+        self, given: Trajectory | None, exact: FinishedCandidate | None
     ) -> Iterator[Batch]:
         """Yield batches of initial guesses while they are worth solving."""
         if given is not None:
@@ -144,7 +170,6 @@ class Search:
         elif exact is not None:
             self.candidates.append(exact)
             self._keep(exact)
-            assert exact.trajectory is not None
             yield from self._start_from(exact.trajectory, EXACT)
         goes_on = given is None and self._problem.task.search.effort == "exhaustive"
         if self.is_satisfied and self.best is not exact and not goes_on:
@@ -167,14 +192,6 @@ class Search:
                 self._refuse_what_is_out_of_reach()
             yield batch
 
-    def find_gap_of_best(self) -> TimingGap | None:
-        """Compare the best motion with the fastest timing of its own joint path; kept for as long as it is the best."""
-        assert self.best is not None and self.best.trajectory is not None
-        if self._gap is None or self._gap[0] is not self.best:
-            found = find_timing_gap(self.best.trajectory, self._problem.limits)
-            self._gap = (self.best, found)
-        return self._gap[1]
-
     def _start_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:
         """Yield the guess from a known motion, if it can be used; put down why a given one led to nothing."""
         outcome = "it led to no verified plan"
@@ -193,7 +210,7 @@ class Search:
         if not self.is_satisfied:
             limit = limit.part(_COARSE_SHARE)
         work = run_in_processes(
-            candidates.solve_candidate,
+            pipeline.solve_candidate,
             batch.starts,
             limit,
             jobs=self._problem.task.search.jobs,
@@ -202,9 +219,9 @@ class Search:
         with closing(work) as outcomes:
             for number, candidate in enumerate(outcomes, first):
                 self.candidates[number] = candidate
-                if candidate.status == candidates.NOT_TRIED:
+                if candidate.status == pipeline.NOT_TRIED:
                     self.interrupted = True
-                if candidate.usable:
+                if isinstance(candidate, SolvedCandidate):
                     self._solved[number] = candidate
         self._waiting = self._by_end_time(first)
 
@@ -216,10 +233,10 @@ class Search:
         left = batch.refined
         while self._waiting and self._goes_on(left):
             numbers = self._waiting[:jobs]
-            waiting = [self._solved[number] for number in numbers]
             work = run_in_processes(
-                candidates.finish_candidate,
-                [replace(each, to_beat=self._to_beat) for each in waiting],
+                pipeline.finish_candidate,
+                [self._solved[number] for number in numbers],
+                self._to_beat,
                 self._latest,
                 jobs=jobs,
                 listener=self._listener,
@@ -235,7 +252,7 @@ class Search:
                         candidate = replace(
                             self._solved[number],
                             adapted=outcome.adapted,
-                            status=candidates.SLOW,
+                            status=pipeline.SLOW,
                         )
                     self._finish(number, candidate)
                     self._listener(candidate.describe())
@@ -261,18 +278,25 @@ class Search:
             for number in self._by_end_time()[:3]:
                 if self.best is None:
                     solved = self._solved[number]
-                    self._finish(
-                        number,
-                        candidates.finish_candidate(solved, Deadline(0.0), ignore),
+                    candidate = pipeline.finish_candidate(
+                        solved, np.inf, Deadline(0.0), ignore
                     )
+                    self._finish(number, candidate)
         if is_pressed and not self.is_satisfied:
             raise KeyboardInterrupt(self._describe_best())
 
+    def outcome(self) -> SearchOutcome:
+        """Return what came of the search; raise what explains that no motion was found."""
+        if self.best is None:
+            raise self.explain()
+        return SearchOutcome(
+            self.best, self.in_order(), self.interrupted, self.not_completed()
+        )
+
     def explain(self) -> BrachisError:
         """Return the error that tells why no motion was found."""
-        starts = [each.start for each in self.candidates if each.start is not None]
-        failure = explain_holding(starts) or explain_postures(starts)
-        failure = failure or explain_speeds(starts, are_tried=True)
+        failure = explain_holding(self.starts) or explain_postures(self.starts)
+        failure = failure or explain_speeds(self.starts, are_tried=True)
         if failure is not None:
             return failure
         # The time for the search may have ended every solve, of which each has a time limit of its own.
@@ -306,7 +330,7 @@ class Search:
         if self._unfinished_lattices:
             names = name_first(list(self._unfinished_lattices), " | ")
             parts.append(f"the lattice of {names} was not searched completely")
-        unsolved = sum(each.status == candidates.NOT_TRIED for each in self.candidates)
+        unsolved = sum(each.status == pipeline.NOT_TRIED for each in self.candidates)
         counts = {"planned": unsolved, "refined": len(self._waiting)}
         left = [f"{n} not {what}" for what, n in counts.items() if n]
         if left:
@@ -322,7 +346,7 @@ class Search:
             return (not candidate.verified, *map(round_end_time, times))
 
         ordered = sorted(self.candidates, key=rank)
-        return tuple(candidate.without_programs() for candidate in ordered)
+        return tuple(candidate.without_program() for candidate in ordered)
 
     @property
     def _latest(self) -> Deadline:
@@ -339,8 +363,9 @@ class Search:
     def _add_starts(self, batch: Batch) -> int:
         """Add guesses as candidates that were not tried yet; return the number of the first one."""
         first = len(self.candidates)
+        self.starts += batch.starts
         self.candidates += [
-            Candidate.of(start, candidates.NOT_TRIED) for start in batch.starts
+            begin_candidate(start, pipeline.NOT_TRIED) for start in batch.starts
         ]
         return first
 
@@ -356,7 +381,14 @@ class Search:
         self._dead_ends[name] = dead_end
         joints = () if decomposition is None else decomposition.match.redundant_joints
         self.candidates.append(
-            Candidate(joints, "", "lattice", "", np.inf, str(dead_end))
+            Candidate(
+                redundant_joints=joints,
+                branch="",
+                origin="lattice",
+                solver="",
+                estimate=np.inf,
+                status=str(dead_end),
+            )
         )
 
     def _refuse_what_is_out_of_reach(self) -> None:
@@ -378,20 +410,14 @@ class Search:
             return False
         return True
 
-    def _may_win(self, candidate: Candidate) -> bool:
+    def _may_win(self, candidate: SolvedCandidate) -> bool:
         """Tell whether a candidate may be faster than the best motion."""
-        best = self.best
-        if best is None or not self.is_satisfied:
+        if self.best is None or not self.is_satisfied:
             return True
-        if self._has_same_time(candidate, best):
-            return False
-        if all(each.keeps_knots and each.in_chart for each in (candidate, best)):
-            # What one gains by other coordinates, both gain.
-            gain = min(best.adapted / best.coarse, 1.0)
-            return candidate.coarse * gain < self._to_beat
-        return candidate.coarse * self._gain < (1.0 - tolerances.GAIN) * best.t_end
+        is_mirrored = self._has_same_time(candidate, self.best)
+        return not is_mirrored and candidate.coarse * self._gain < self._to_beat
 
-    def _keep(self, candidate: Candidate) -> None:
+    def _keep(self, candidate: FinishedCandidate) -> None:
         """Take a candidate as the best one, which others have to beat over all knots once it is verified."""
         self.best = candidate
         if self.is_satisfied:
@@ -400,9 +426,9 @@ class Search:
             least = min(max(candidate.adapted, usual), candidate.t_end)
             self._to_beat = min(self._to_beat, (1.0 - tolerances.GAIN) * least)
 
-    def _has_same_time(self, first: Candidate, second: Candidate) -> bool:
+    def _has_same_time(self, first: SolvedCandidate, second: Candidate) -> bool:
         """Tell whether candidates in the same joints have the same coarse end time; so have mirror images."""
-        if first.in_chart or first.redundant_joints != second.redundant_joints:
+        if first.guess.in_chart or first.redundant_joints != second.redundant_joints:
             return False
         given = self._problem.given_time
         gap = abs(first.coarse - second.coarse)
@@ -413,18 +439,18 @@ class Search:
         if number in self._waiting:
             self._waiting.remove(number)
         self.candidates[number] = candidate
-        if candidate.trajectory is None:
+        if not isinstance(candidate, FinishedCandidate):
             return
-        if not candidate.keeps_knots:
-            # Better knots shorten a motion: others may gain a little more by them than any one so far.
-            gain = _GAINS_MORE * candidate.t_end / candidate.coarse
-            self._gain = min(self._gain, gain)
+        # Other coordinates, and better knots, shorten a motion: others may gain a little more by these.
+        gain = min(candidate.adapted, candidate.t_end) / candidate.coarse
+        factor = 1.0 if self._solved[number].keeps_knots else _GAINS_MORE
+        self._gain = min(self._gain, factor * gain)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self._keep(candidate)
 
     def _describe_best(self) -> str:
         """Say how far the best motion is from a plan; empty without one."""
-        if self.best is None or self.best.verification is None:
+        if self.best is None:
             return ""
         over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)
         return f"the best motion so far takes {self.best.t_end:.4f} s, and exceeds a limit by {over:.2g} % (unverified)"

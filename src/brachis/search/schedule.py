@@ -15,13 +15,13 @@ from functools import partial
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.processes import run_in_processes
+from brachis.search.stages import InitialGuess
 from brachis.search.starts import (
     SEARCH_LEVELS,
     SearchLevel,

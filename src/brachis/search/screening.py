@@ -18,13 +18,13 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverOptions, solver_for_large, solvers_for
-from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
 from brachis.optimise.transcription import program_of
 from brachis.search.lattice import farthest
 from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import run_in_processes
+from brachis.search.stages import InitialGuess
 
 _NEAR_LEAST = 1.01
 """Factor on the least time up to which others are as fast, about: plans from there may end in either order."""

@@ -20,7 +20,6 @@ from brachis.errors import PathError, UnreachableError
 from brachis.kernel import Spline, collocation
 from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
 from brachis.limits import Role
-from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
@@ -32,6 +31,7 @@ from brachis.search.lattice import LARGEST_STEP
 from brachis.search.phase_plane import fastest_times, least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screen
+from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
 
 SCREENED = 4

@@ -8,11 +8,11 @@ import numpy as np
 
 from brachis.common.arguments import check_array, check_finite
 from brachis.errors import PathError
-from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.extraction import extract_trajectory
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
 from brachis.search.phase_plane import initial_guess
+from brachis.search.stages import InitialGuess
 from brachis.trajectory import Trajectory
 
 

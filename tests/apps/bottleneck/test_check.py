@@ -11,7 +11,6 @@ import pytest
 import brachis
 from brachis.apps.bottleneck import check, check_sensitivities
 from brachis.apps.bottleneck.sensitivities import sensitivities
-from brachis.errors import InputError
 from brachis.optimise.backends import solvers_for
 from support.effort import QUICK
 
@@ -91,15 +90,6 @@ def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
         )
         np.testing.assert_array_equal(theirs[torque.stop :], mine[torque.stop :])
     assert program.upper[torque].max() == 1.0, "the program itself keeps its limits"
-
-
-def test_report_needs_the_solved_problem(scara):
-    result = scara("j3")
-    bare = dataclasses.replace(
-        result, candidate=dataclasses.replace(result.candidate, refined=None)
-    )
-    with pytest.raises(InputError, match="no solved optimisation problem"):
-        brachis.bottleneck.report(bare)
 
 
 def test_another_limit_that_takes_over_within_the_step(slide):

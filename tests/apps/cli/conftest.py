@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from brachis.optimise import candidate
+from brachis.search import verified
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, VerifyOptions
 from support.command_line import code_of, interrupts_kept
@@ -49,14 +49,14 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 @pytest.fixture
 def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
     """A verification that passes nothing, and after which the time for further attempts is up."""
-    honest, now = candidate.verify_trajectory, [0.0]
+    honest, now = verified.verify_trajectory, [0.0]
     strict = VerifyOptions(ratio_tolerance=-0.5)
 
     def refusing(trajectory: Trajectory, **more: object) -> Verification:
         now[0] += 90.0
         return honest(trajectory, strict, **more)
 
-    monkeypatch.setattr(candidate, "verify_trajectory", refusing)
+    monkeypatch.setattr(verified, "verify_trajectory", refusing)
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
 
 

@@ -21,8 +21,8 @@ from brachis.apps import plots
 from brachis.apps.cli import folder, main
 from brachis.apps.plots.style import figure_class
 from brachis.errors import InputError
-from brachis.optimise import candidate
-from brachis.search import candidates
+from brachis.search import pipeline, verified
+from brachis.search.stages import describe_coordinates
 from brachis.trajectory import Trajectory
 
 from .conftest import ROOT, SCARA
@@ -237,14 +237,14 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 
 
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
-    honest = candidate.verify_trajectory
+    honest = verified.verify_trajectory
 
     def endless(trajectory, **more):
         return replace(
             honest(trajectory, **more), worst_ratio=math.inf, path_error=math.nan
         )
 
-    monkeypatch.setattr(candidate, "verify_trajectory", endless)
+    monkeypatch.setattr(verified, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     for text in (outcome.out, (tmp_path / "out/result.json").read_text()):
         data = json.loads(text, parse_constant=pytest.fail)
@@ -307,20 +307,20 @@ def test_candidates_are_listed(run, task, write, case):
 
 def test_coordinates_are_described_without_the_name_of_a_chart_alone(planned):
     trajectory = Trajectory.load(planned.out / "result.npz")
-    assert candidate.describe_coordinates(trajectory) == "j3"
+    assert describe_coordinates(trajectory) == "j3"
     in_chart = replace(trajectory, redundant_joints=(), branch="chart")
-    assert candidate.describe_coordinates(in_chart) == (
+    assert describe_coordinates(in_chart) == (
         "no joint is chosen; a chart measures the self-motion of all joints by 1 coordinate"
     )
     only_s = replace(in_chart, control_points=trajectory.control_points[:1])
-    assert candidate.describe_coordinates(only_s) == "none"
+    assert describe_coordinates(only_s) == "none"
 
 
 def test_interrupt(run, task, write, tmp_path, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(candidates, "solve_candidate", interrupt)
+    monkeypatch.setattr(pipeline, "solve_candidate", interrupt)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 130
     assert "interrupted" in outcome.err
@@ -328,14 +328,14 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
 
 
 def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
-    honest, now = candidates.solve_candidate, [0.0]
+    honest, now = pipeline.solve_candidate, [0.0]
 
     def slow(*arguments):
         made = honest(*arguments)
         now[0] += 90.0
         return made
 
-    monkeypatch.setattr(candidates, "solve_candidate", slow)
+    monkeypatch.setattr(pipeline, "solve_candidate", slow)
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
     task |= {
         "spline": {"intervals": 10, "points_per_interval": 1},

@@ -8,7 +8,7 @@ import pytest
 
 from brachis.apps.plots import plot_candidates
 from brachis.errors import InputError
-from brachis.optimise.candidate import Candidate
+from brachis.search.stages import Candidate
 
 
 def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
@@ -18,7 +18,15 @@ def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"
         pass
 
     Made.t_end, Made.verified = property(lambda _: t_end), property(lambda _: verified)
-    return Made((joint,), "elbow_up", "lattice 1", "uno", 1.0, status, coarse=coarse)
+    return Made(
+        redundant_joints=(joint,),
+        branch="elbow_up",
+        origin="lattice 1",
+        solver="uno",
+        estimate=1.0,
+        status=status,
+        coarse=coarse,
+    )
 
 
 def drawn(candidates):

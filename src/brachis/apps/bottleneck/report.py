@@ -199,12 +199,6 @@ def report(
     refined = None
     if not isinstance(motion, Trajectory):
         refined = motion.candidate.refined
-        if refined is None:
-            raise InputError(
-                "the result contains no solved optimisation problem",
-                where="result",
-                allowed="a result of brachis.plan",
-            )
     if refined is not None and not (
         refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r
     ):

@@ -126,8 +126,8 @@ def _plan_task(
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
     from brachis.kinematics import CHART
-    from brachis.optimise.candidate import describe_coordinates
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
+    from brachis.search.stages import describe_coordinates
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
@@ -207,8 +207,8 @@ def bottleneck(
     --------
     brachis bottleneck task.yaml --set search.effort=single
     """
-    from brachis.optimise.candidate import describe_coordinates
     from brachis.search.planned import describe_motion
+    from brachis.search.stages import describe_coordinates
 
     result = None
     with output_folder(out, _BOTTLENECK, (task, urdf)), show_progress() as listener:

@@ -11,7 +11,7 @@ import numpy as np
 from brachis.apps.plots import style
 from brachis.common.arguments import check_list
 from brachis.errors import InputError
-from brachis.optimise.candidate import Candidate, coordinates
+from brachis.search.stages import Candidate, coordinates
 from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:

@@ -19,10 +19,10 @@ from brachis.apps.bottleneck.saturation import (
 from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of
 from brachis.errors import BrachisError
 from brachis.limits import Limit, describe_guarantees, limits_of
-from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
 from brachis.robot.plausibility import Issue
 from brachis.search.planned import PlannedMotion
+from brachis.search.stages import Candidate
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
 
@@ -87,8 +87,7 @@ def reported_motion(
     else:
         trajectory = motion.trajectory
         known = _describe_plan(motion)
-        if motion.candidate.refined is not None:
-            limits = limits_in(motion.candidate.refined.program)
+        limits = limits_in(motion.candidate.refined.program)
     limits = limits or limits_of(trajectory.robot, trajectory.task)
     ratios = limit_ratios(trajectory, limits)
     found = saturations(ratios)

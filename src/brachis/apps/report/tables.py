@@ -17,8 +17,8 @@ from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
 from brachis.apps.plots.panels import Curve, Panel, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
-from brachis.optimise.candidate import describe_coordinates
 from brachis.robot.from_task import in_use
+from brachis.search.stages import describe_coordinates
 from brachis.task import Task
 from brachis.trajectory import phase_rows
 

@@ -32,11 +32,12 @@ from brachis.optimise.backends import (
     solver_for_large,
     solvers_for,
 )
-from brachis.optimise.candidate import Candidate, refine_and_verify
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.objective import LeastAcceleration
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
+from brachis.search.stages import FinishedCandidate
+from brachis.search.verified import refine_and_verify
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
@@ -96,14 +97,13 @@ class LeastMotion(Summary):
 
 
 def find_least_motion(
-    fastest: Candidate, deadline: Deadline, listener: Listener
+    fastest: FinishedCandidate, deadline: Deadline, listener: Listener
 ) -> LeastMotion:
     """Find the calmest motion that is as fast as a candidate, or as little slower as the task allows.
 
     Parameters
     ----------
-    fastest : Candidate
-        Finished.
+    fastest : FinishedCandidate
     deadline : Deadline
     listener : callable
 
@@ -120,12 +120,12 @@ def find_least_motion(
         return _keep(fastest, "interrupted")
 
 
-def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastMotion:
+def _solve(
+    fastest: FinishedCandidate, deadline: Deadline, listener: Listener
+) -> LeastMotion:
     """Solve, refine and verify, and take the new motion if it is verified and calmer by a fraction that is worth it."""
-    start = fastest.start
     before = fastest.refined
-    assert start is not None and before is not None
-    task = start.problem.task
+    task = fastest.problem.task
     count = len(before.x)
     status = ""
     if not fastest.verified:
@@ -159,10 +159,9 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     # Rounds of refinement begin near enough, and end sooner.
     solve = replace(solve, options=replace(_OPTIONS, patience=2))
     found = refine_and_verify(fastest, program, (first,), solve, options)
-    if not found.verified:
+    if not (isinstance(found, FinishedCandidate) and found.verified):
         status = "the fastest motion is kept: a smoother one was not verified"
         return _keep(fastest, status, found.reports)
-    assert found.refined and found.trajectory and found.verification
     reduction = float(1.0 - np.sqrt(program.objective(found.refined.x)))
     if reduction < _WORTH_IT:
         return _keep(fastest, too_similar, found.reports)
@@ -183,10 +182,9 @@ def _reason(report: SolverReport) -> str:
 
 
 def _keep(
-    fastest: Candidate, status: str, reports: tuple[SolverReport, ...] = ()
+    fastest: FinishedCandidate, status: str, reports: tuple[SolverReport, ...] = ()
 ) -> LeastMotion:
     """Keep the fastest motion."""
-    assert fastest.trajectory is not None and fastest.verification is not None
     return LeastMotion(
         fastest.trajectory, fastest.verification, 0.0, 0.0, status, reports
     )

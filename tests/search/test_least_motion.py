@@ -10,8 +10,8 @@ import pytest
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
-from brachis.optimise import least_motion
 from brachis.robot.from_task import robot_for
+from brachis.search import least_motion
 from brachis.task import task_with
 from brachis.trajectory import Trajectory
 from support.starts import starting_points

@@ -1,0 +1,243 @@
+"""The program over time from a guess, or from the timings of joint paths.
+
+Its first point are splines along the timing of a joint path, slowed down until limits hold at the collocation points.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.limits.safeguards import HELD_BACK
+from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.optimise.improve import (
+    SolvedProgram,
+    SolverSession,
+    attempt_once,
+    keep_feasible,
+)
+from brachis.optimise.mesh import coarsest
+from brachis.optimise.phase_timing import PhaseTiming, time_phases
+from brachis.optimise.program import Program
+from brachis.optimise.retiming import (
+    BetterPaths,
+    begin_with_timing,
+    is_timing_all,
+    least_time,
+)
+from brachis.search.phase_plane import initial_guess
+from brachis.search.stages import (
+    Candidate,
+    InitialGuess,
+    SolvedCandidate,
+    begin_candidate,
+    facts_of,
+)
+from brachis.task import SplineSettings
+
+_ENTRIES = 500_000
+"""Variables times rows of a program over time that improves a joint path: with more an iteration takes tenths of a
+second."""
+_ITERATIONS = 80
+"""Iterations of a solve that does so: from the timing most solves take 5 to 25, one beside a singular posture 74."""
+_WIDENING = 1e-6
+"""See `SolverOptions`: along a timing hundreds of rows are at their bounds, and a solve of 0.1 s took 4 s without."""
+_NEARLY = 0.01
+"""Violation that refinement mends, where the iterations end a solve."""
+_FIRST_LOSS = 0.05
+"""Part of the time that first knots may lose, where a mesh is refined from them."""
+_FIRST_INTERVALS = 16
+"""Intervals of such a first mesh, about."""
+_FIRST_MARGIN = 0.1
+"""Branch margin of a first solve: without it a rail at 0.1 m/s took three times as long, after four motions that left
+their charts."""
+
+
+def solve_over_time(
+    guess: InitialGuess, program: Program, session: SolverSession
+) -> Candidate:
+    """Solve over time, with knots that the fastest timing needs, or those that are given: few of them at first.
+
+    Parameters
+    ----------
+    guess : InitialGuess
+    program : Program
+        Of its joint maps, over all knots that are given.
+    session : SolverSession
+
+    Returns
+    -------
+    Candidate
+        A solved one where the solve ended well.
+    """
+    program = _restrict(program, guess.legs)
+    candidate = begin_candidate(guess, "")
+    first = _first_splines(guess, program)
+    if first is None:
+        lost = "the splines through the joint path leave the branch, or the chart"
+        return replace(candidate, status=lost)
+    solved = keep_feasible(_solve_clear_first(*first, session), first[1])
+    status = solved.report.status
+    words = status.name.lower().replace("_", " ")
+    if not status.usable:
+        return replace(candidate, status=words, reports=solved.reports)
+    words = "planned" if status is SolveStatus.OPTIMAL else f"planned, {words}"
+    candidate = replace(
+        candidate, status=words, coarse=solved.t_end, reports=solved.reports
+    )
+    is_open = guess.problem.task.spline.intervals == "auto"
+    return SolvedCandidate(
+        **facts_of(candidate),
+        guess=guess,
+        program=solved.program,
+        target=solved.program if is_open else program,
+        not_completed=solved.not_completed,
+    )
+
+
+def _first_splines(
+    guess: InitialGuess, program: Program
+) -> tuple[Program, np.ndarray] | None:
+    """Return a program over few knots, and splines to begin with, (v,); None where these leave the joint map."""
+    task = guess.problem.task
+    has_laws = any(guess.problem.time_laws)
+    is_open = task.spline.intervals == "auto" and not task.boundary.periodic
+    if is_open and not has_laws:
+        # Close together where the fastest timing of the joint path needs them.
+        points = task.spline.points_per_interval
+        with contextlib.suppress(UnreachableError):
+            pairs = zip(program.phases, guess.legs, strict=True)
+            timings = [PhaseTiming.through(*pair) for pair in pairs]
+            first = begin_with_timing(
+                program, timings, _FIRST_LOSS, _FIRST_INTERVALS, points
+            )
+            if first is not None:
+                return first
+    is_near = guess.joint_map.r <= 1 and is_timing_all(program)
+    # At a given speed motions leave their charts between few points.
+    even = program if is_near or has_laws else coarsest(program)
+    x = initial_guess(even, guess)
+    return None if x is None else (even, x)
+
+
+def _solve_clear_first(
+    program: Program, x: np.ndarray, session: SolverSession
+) -> SolvedProgram:
+    """Solve from x, (v,), clear of branch boundaries; near them too if that is how the motion is held back.
+
+    Where many motions are equally fast, as at a given speed, they drift to the boundary, and leave the branch between
+    the collocation points.
+    """
+    clear = attempt_once(session, program.with_margin(_FIRST_MARGIN), x)
+    is_late = clear.report.status is SolveStatus.TIME_LIMIT
+    is_free = clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK
+    if is_late or is_free:
+        return clear
+    near = attempt_once(session, program, clear.x if clear.usable else x)
+    if near.usable or not clear.usable:
+        return replace(near, reports=clear.reports + near.reports)
+    return replace(clear, reports=near.reports + clear.reports)
+
+
+@dataclass(frozen=True)
+class BetterTimings:
+    """What the program over time made of joint paths.
+
+    Attributes
+    ----------
+    program : Program
+        With all limits; over any knots.
+    timings : sequence of PhaseTiming or None
+        The fastest ones known, one for each phase of the program.
+    solved : SolvedProgram or None
+        The motion over time; None where there is none.
+    """
+
+    program: Program
+    timings: Sequence[PhaseTiming | None]
+    solved: SolvedProgram | None = None
+
+    @property
+    def t_end(self) -> float:
+        """Time of all phases, s; infinite where one has no timing."""
+        return least_time(self.timings)
+
+    @property
+    def reports(self) -> tuple[SolverReport, ...]:
+        """Reports of the solves."""
+        return () if self.solved is None else self.solved.reports
+
+
+def limit_along_timing(session: SolverSession) -> SolverSession:
+    """Bound the effort of solves that begin with the fastest timing."""
+    iterations = min(_ITERATIONS, session.options.max_iterations)
+    options = replace(session.options, max_iterations=iterations, widening=_WIDENING)
+    return replace(session, options=options)
+
+
+def improve_timings(
+    guess: InitialGuess, program: Program, paths: BetterPaths, session: SolverSession
+) -> BetterTimings:
+    """Solve over time from splines along timings, and time the joint path of the answer.
+
+    Parameters
+    ----------
+    guess : InitialGuess
+    program : Program
+        Over any knots.
+    paths : BetterPaths
+        Joint paths of the program's phases.
+    session : SolverSession
+
+    Returns
+    -------
+    BetterTimings
+        Those given, where no joint is redundant, no time is left, or no motion comes out.
+    """
+    as_given = BetterTimings(program, paths.timings)
+    if not guess.joint_map.r or session.deadline.passed:
+        return as_given
+    restricted = _restrict(program, paths.curves)
+    spline = guess.problem.task.spline
+    solved = _solve_from_timings(restricted, paths.timings, session, spline)
+    if solved is None:
+        return as_given
+    pairs = zip(solved.program.phases, program.phases, strict=True)
+    unrestricted = solved.program.with_phases(
+        phase.with_limits(original.limits) for phase, original in pairs
+    )
+    timings = time_phases(unrestricted, solved.x)
+    if least_time(timings) < paths.t_end:
+        return BetterTimings(unrestricted, timings, solved)
+    return replace(as_given, solved=solved)
+
+
+def _solve_from_timings(
+    program: Program,
+    timings: Sequence[PhaseTiming | None],
+    session: SolverSession,
+    spline: SplineSettings,
+) -> SolvedProgram | None:
+    """Solve over time from splines along the timings of all phases; None where that gives no motion."""
+    r = program.phases[0].joint_map.r
+    # Variables times rows grow with the square of the intervals.
+    rows = (1 + r) * len(program.lower) / program.intervals
+    intervals = int(np.sqrt(_ENTRIES / rows))
+    begun = begin_with_timing(
+        program, timings, spline.tolerance, intervals, spline.points_per_interval
+    )
+    if begun is None:
+        return None
+    session = replace(session, acceptable=_NEARLY)
+    solved = attempt_once(session, *begun, accept_early_end=True)
+    return solved if solved.usable else None
+
+
+def _restrict(program: Program, curves: Sequence[np.ndarray]) -> Program:
+    """Return a program with the limits that are near along the curves of its phases, (S, c) each."""
+    pairs = zip(program.phases, curves, strict=True)
+    return program.with_phases(phase.restrict_to(own) for phase, own in pairs)

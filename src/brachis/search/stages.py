@@ -1,0 +1,325 @@
+"""The stages of a search, a frozen type each: initial guess, candidate, solved candidate, finished candidate.
+
+An `InitialGuess` is a joint path. Whatever is tried from one is a `Candidate`, even if nothing comes of it. One whose
+solve ends well is a `SolvedCandidate`; one with a motion that was refined and verified, or fails at that, a
+`FinishedCandidate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from brachis.common.arrays import cut, interpolate_columns
+from brachis.common.summary import Summary
+from brachis.common.words import write_count
+from brachis.errors import UnreachableError
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointMap, JointSpaceMap
+from brachis.optimise.backends import SolverReport
+from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.program import Program
+from brachis.optimise.transcription import maps_by_leg
+from brachis.problem.problem import Problem
+from brachis.trajectory import Trajectory
+from brachis.verify import Verification
+
+PathMap = ClosedFormMap | ChartMap | JointSpaceMap
+"""Joint maps along a path."""
+
+
+def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
+    """Name the coordinates in which a motion is planned, s apart: redundant joints, a chart's own, or none."""
+    return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
+
+
+def describe_coordinates(trajectory: Trajectory) -> str:
+    """Say in which coordinates a motion is planned, s apart, in words that do not need the name of a chart."""
+    joints = trajectory.redundant_joints
+    count = len(trajectory.control_points) - 1
+    if joints or trajectory.branch != CHART:
+        return coordinates(joints, trajectory.branch)
+    if count == 0:
+        return "none"
+    return f"no joint is chosen; a chart measures the self-motion of all joints by {write_count(count, 'coordinate')}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InitialGuess(Summary):
+    """A joint path from which a plan is begun.
+
+    Attributes
+    ----------
+    problem : Problem
+    joint_map : ClosedFormMap, ChartMap or JointSpaceMap
+        Robot, path and coordinates put together, for a motion that begins at, or near, its start posture.
+    joint_path : (S, 1 + r) ndarray
+        Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
+    estimate : float
+        Least time along the joint path from the phase plane, s; infinite where nobody knows.
+    origin : str
+        Where it is from, in plain words, for example ``lattice 2``.
+    family : str
+        Family of the closed form; ``chart`` or ``path of joints`` without one.
+    solver : str
+        The solver that plans from it; empty while none is chosen.
+    durations : tuple of float or None
+        Of every leg, s, where the joint path's values are those of a motion: for one leg after the other equally many,
+        at even times. None where they are not.
+    is_improved : bool
+        Whether the joint path is the best one next to it, roughly, for the limits that the phase plane knows.
+    """
+
+    problem: Problem
+    joint_map: PathMap
+    joint_path: np.ndarray
+    estimate: float
+    origin: str
+    family: str
+    solver: str = ""
+    durations: tuple[float, ...] | None = None
+    is_improved: bool = False
+
+    @property
+    def legs(self) -> list[np.ndarray]:
+        """The part of the joint path on every leg, (S, 1 + r) each."""
+        legs = self.problem.legs
+        if self.durations is not None or len(legs) == 1:
+            return np.split(self.joint_path, len(legs))
+        s = self.joint_path[:, 0]
+        parts = []
+        for leg in legs:
+            own = cut(s, leg.begin, leg.end)
+            parts.append(interpolate_columns(own, s, self.joint_path))
+        return parts
+
+    def maps_by_leg(self) -> list[JointMap]:
+        """Take the joint map leg by leg; raise UnreachableError where the joint path leaves it."""
+        parts = self.legs
+        if len(parts) == 1:
+            return [self.joint_map]
+        q = self.joint_map.postures(np.concatenate(parts))
+        begins = np.cumsum([0, *(len(part) for part in parts[:-1])])
+        if not np.isfinite(q).all():
+            raise UnreachableError("the joint path leaves the branch, or the chart")
+        return maps_by_leg(self.problem, self.joint_map, q[begins])
+
+    def postures_at(self, s: np.ndarray) -> np.ndarray:
+        """Take postures, (S, n), at path coordinates, (S,); NaN where there are none."""
+        path = self.joint_path
+        return self.joint_map.postures(interpolate_columns(s, path[:, 0], path))
+
+    @property
+    def in_chart(self) -> bool:
+        """Whether the coordinates are a chart's."""
+        return isinstance(self.joint_map, ChartMap)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Candidate(Summary):
+    """What was tried, and what came of it.
+
+    Attributes
+    ----------
+    redundant_joints : tuple of str
+        None where the coordinates are a chart's.
+    branch : str
+        Label of the branch, or ``chart``; empty where no joint path was found.
+    origin : str
+        See `InitialGuess`.
+    solver : str
+        Empty where nothing was solved.
+    estimate : float
+        See `InitialGuess`; a rough one.
+    status : str
+        In plain words.
+    coarse : float
+        End time at the first collocation points, s; infinite without a motion.
+    adapted : float
+        End time over all knots, before refinement, s; infinite where there was no such program.
+    reports : tuple of SolverReport
+        Of all solves: near the branch boundary or clear of it, on ever finer meshes, then of the refinement rounds.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.candidates[0].status
+    'verified'
+    """
+
+    redundant_joints: tuple[str, ...]
+    branch: str
+    origin: str
+    solver: str
+    estimate: float
+    status: str
+    coarse: float = np.inf
+    adapted: float = np.inf
+    reports: tuple[SolverReport, ...] = ()
+
+    @property
+    def t_end(self) -> float:
+        """End time of the trajectory, s; infinite without one."""
+        return np.inf
+
+    @property
+    def verified(self) -> bool:
+        """Whether there is a trajectory that passed every check."""
+        return False
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether it is verified, or fails only at what the task wants checked and not kept."""
+        return False
+
+    def describe(self) -> str:
+        """Say in a line what came of it, and how long its motion takes if there is one."""
+        time = f"t_E = {self.t_end:.4f} s, " if np.isfinite(self.t_end) else ""
+        return f"{self.solver}: {time}{self.status}"
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown: what was tried and what came of it."""
+        joints = coordinates(self.redundant_joints, self.branch)
+        shown = {"joints": joints, "origin": self.origin}
+        if np.isfinite(self.t_end):
+            shown["t_end"] = f"{self.t_end:.4f} s"
+        return {**shown, "status": self.status}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        names = ("branch", "origin", "solver", "estimate", "coarse", "t_end", "status")
+        plain = {name: getattr(self, name) for name in (*names, "verified")}
+        return {"redundant_joints": list(self.redundant_joints), **plain}
+
+    def without_program(self) -> Candidate:
+        """Return what is said of it, without what only the search needs."""
+        return Candidate(**facts_of(self))
+
+
+def facts_of(candidate: Candidate) -> dict[str, Any]:
+    """Return the fields that all candidates have, to be carried over from stage to stage."""
+    names = (field.name for field in fields(Candidate))
+    return {name: getattr(candidate, name) for name in names}
+
+
+def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
+    """Begin with an initial guess."""
+    return Candidate(
+        redundant_joints=guess.joint_map.redundant_joints,
+        branch=guess.joint_map.branch_label,
+        origin=guess.origin,
+        solver=guess.solver,
+        estimate=guess.estimate,
+        status=status,
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SolvedCandidate(Candidate):
+    """A candidate whose program was solved, so that it can be finished.
+
+    Attributes
+    ----------
+    guess : InitialGuess
+        Over the path its joint path is the answer, and its estimate the end time.
+    program : Program
+        The first one that was solved; over the path, the one whose joint path was improved.
+    target : Program
+        The program over all its knots.
+    is_over_path : bool
+        Whether it was solved over the path, and not over time.
+    not_completed : str
+        What the time, or a solve that failed, left undone, in words; empty where nothing.
+    """
+
+    guess: InitialGuess
+    program: Program
+    target: Program
+    is_over_path: bool = False
+    not_completed: str = ""
+
+    @property
+    def problem(self) -> Problem:
+        """What is planned."""
+        return self.guess.problem
+
+    @property
+    def family(self) -> str:
+        """Family of the closed form."""
+        return self.guess.family
+
+    @property
+    def keeps_knots(self) -> bool:
+        """True where the finished plan has the same knots, so that its end time cannot be shorter."""
+        spline = self.problem.task.spline
+        is_given = spline.knots != "free" and spline.intervals != "auto"
+        return is_given and self.program.intervals == self.target.intervals
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FinishedCandidate(Candidate):
+    """A candidate with a motion, which the verification looked at.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was planned: the task, or a simpler one (see `widen_plan`).
+    family : str
+        Family of the closed form.
+    refined : SolvedProgram
+        The last program, its answer and its multipliers.
+    trajectory : Trajectory
+    verification : Verification
+        Of the trajectory.
+    not_completed : str
+        See `SolvedCandidate`.
+    """
+
+    problem: Problem
+    family: str
+    refined: SolvedProgram
+    trajectory: Trajectory
+    verification: Verification
+    not_completed: str = ""
+
+    @property
+    def t_end(self) -> float:
+        """End time of the trajectory, s."""
+        return self.trajectory.t_end
+
+    @property
+    def verified(self) -> bool:
+        """Whether the trajectory passed every check."""
+        return self.verification.passed
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether it is verified, or fails only at what the task wants checked and not kept."""
+        return all(each.passed or not each.is_kept for each in self.verification.checks)
+
+    @property
+    def refinement_rounds(self) -> int:
+        """How many of the solves were refinement rounds."""
+        return len(self.refined.reports) - 1
+
+    @property
+    def violation(self) -> float:
+        """Largest violation of a limit on the dense grid, as a fraction."""
+        return self.refined.violation
+
+    @property
+    def time_scaled(self) -> float:
+        """Factor by which the end time was lengthened at the very end."""
+        return self.refined.time_scaled
+
+    @property
+    def collocation_points(self) -> int:
+        """Number of collocation points of the last program."""
+        return self.refined.program.collocation_points
+
+    def without_program(self) -> FinishedCandidate:
+        """Return the candidate as it is: its program is the answer."""
+        return self

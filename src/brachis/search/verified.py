@@ -1,0 +1,118 @@
+"""From a solved program to a verified motion."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from brachis.common.words import write_count
+from brachis.errors import UnreachableError
+from brachis.optimise.backends import SolverReport
+from brachis.optimise.extraction import extract_trajectory
+from brachis.optimise.improve import Solve, SolvedProgram
+from brachis.optimise.program import Program
+from brachis.optimise.refine import RefinementOptions, refine
+from brachis.search.stages import (
+    Candidate,
+    FinishedCandidate,
+    SolvedCandidate,
+    facts_of,
+)
+from brachis.verify import Verification, verify_trajectory
+
+
+def refine_and_verify(
+    candidate: SolvedCandidate | FinishedCandidate,
+    program: Program,
+    reports: tuple[SolverReport, ...],
+    solve: Solve,
+    options: RefinementOptions,
+) -> Candidate:
+    """Refine and verify; only verify where the time is up.
+
+    Parameters
+    ----------
+    candidate : SolvedCandidate or FinishedCandidate
+        Of which the program is made.
+    program : Program
+    reports : tuple of SolverReport
+        Of all solves so far; the last one is the program's.
+    solve : callable
+        ``solve(program, x)`` returns a `SolverReport`.
+    options : RefinementOptions
+
+    Returns
+    -------
+    Candidate
+        See `verify`.
+    """
+    refined = refine(program, reports[-1], solve, options)
+    return verify(candidate, reports[:-1], refined)
+
+
+def verify(
+    candidate: SolvedCandidate | FinishedCandidate,
+    before: tuple[SolverReport, ...],
+    refined: SolvedProgram,
+) -> Candidate:
+    """Make the trajectory of a refined program and verify it.
+
+    Parameters
+    ----------
+    candidate : SolvedCandidate or FinishedCandidate
+    before : tuple of SolverReport
+        Of earlier solves.
+    refined : SolvedProgram
+
+    Returns
+    -------
+    Candidate
+        A finished one, unless there is no trajectory.
+    """
+    problem = candidate.problem
+    verification = None
+    if refined.converged and np.isfinite(refined.violation):
+        with contextlib.suppress(UnreachableError):
+            trajectory = extract_trajectory(problem.task, refined.program, refined.x)
+            verification = verify_trajectory(trajectory, own_limits=problem.user_limits)
+    joint_map = refined.program.phases[0].joint_map
+    tolerance = problem.task.refinement.tolerance
+    known = facts_of(candidate) | {
+        "redundant_joints": joint_map.redundant_joints,
+        "branch": joint_map.branch_label,
+        "status": _in_words(refined, verification, tolerance),
+        "reports": (*before, *refined.reports),
+    }
+    if verification is None:
+        return Candidate(**known)
+    return FinishedCandidate(
+        **known,
+        problem=problem,
+        family=candidate.family,
+        refined=refined,
+        trajectory=trajectory,
+        verification=verification,
+        not_completed=candidate.not_completed,
+    )
+
+
+def _in_words(
+    refined: SolvedProgram, verification: Verification | None, tolerance: float
+) -> str:
+    """Say what became of a refined program, whose limits may be exceeded by a fraction `tolerance`."""
+    last = refined.report
+    if verification is not None and verification.passed:
+        return "verified"
+    if not refined.converged:
+        return f"{last.solver}: {last.status.value}"
+    if not np.isfinite(refined.violation):
+        return f"{last.solver}: the motion leaves the branch, or the chart, between collocation points"
+    if refined.violation > tolerance:
+        found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
+    elif verification is None:
+        found = "too sharp for a trajectory"
+    else:
+        found = "the verification fails"
+    rounds = write_count(len(refined.reports) - 1, "refinement round")
+    return f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"
