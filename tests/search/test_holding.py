@@ -57,7 +57,7 @@ def test_a_mean_force_below_the_weight_is_named_with_one_that_is_enough(monkeypa
 def test_no_plan_is_tried_where_no_posture_can_be_held(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     monkeypatch.setattr(
-        "brachis.search.pipeline.solve_candidate",
+        "brachis.search.pipeline.rank_candidate",
         lambda *_: pytest.fail("a plan was tried"),
     )
     with pytest.raises(brachis.PlanningError, match="too low to hold the arm"):

@@ -42,7 +42,7 @@ def rms(trajectory: Trajectory) -> np.ndarray:
 
 
 def free_roll() -> brachis.Task:
-    return task_with(brachis.examples.free_roll, effort="single", intervals=12)
+    return task_with(brachis.examples.free_roll, effort="single", intervals=16)
 
 
 def seven_joints() -> brachis.Task:

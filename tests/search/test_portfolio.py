@@ -28,7 +28,7 @@ from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.stages import Candidate, facts_of
+from brachis.search.stages import RANKED, Candidate, facts_of
 from brachis.search.starts import SEARCH_LEVELS
 from brachis.task import load_task
 
@@ -108,14 +108,15 @@ def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choice
     ) == len(result.candidates)
     finished = [candidate for candidate in result.candidates if candidate.verified]
     assert result.t_end == min(candidate.t_end for candidate in finished)
-    # Refinement only adds rows: what was left unfinished was no faster at the same points.
     unfinished = [
         candidate.coarse
         for candidate in result.candidates
-        if candidate.status.startswith("planned")
+        if candidate.status == RANKED
     ]
     assert unfinished
-    assert min(unfinished) >= first.coarse * (1.0 - 2e-4)
+    assert min(unfinished) >= first.coarse * (1.0 - 2e-3), (
+        "what was left unfinished could gain no more by its knots"
+    )
     assert len(plot_candidates(result.candidates).axes) == 1
 
 
@@ -270,7 +271,7 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
 
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
     honest, finished, calls = (
-        pipeline.solve_candidate,
+        pipeline.rank_candidate,
         pipeline.finish_candidate,
         [],
     )
@@ -286,7 +287,7 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
         calls.extend(["verified"] * done.verified)
         return done
 
-    monkeypatch.setattr(pipeline, "solve_candidate", interrupted)
+    monkeypatch.setattr(pipeline, "rank_candidate", interrupted)
     monkeypatch.setattr(pipeline, "finish_candidate", noted)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.interrupted
@@ -332,7 +333,21 @@ def ctrl_c_before_refinement(monkeypatch):
     monkeypatch.setattr(pipeline, "finish_candidate", interrupted)
 
 
-@pytest.mark.usefixtures("ctrl_c_before_refinement")
+@pytest.fixture
+def splines_are_too_fast(monkeypatch):
+    """A solve over time ends faster than the limits allow."""
+    honest = pipeline.solve_over_time
+
+    def hurry(*arguments: Any) -> Any:
+        solved = honest(*arguments)
+        x = solved.program.with_time_scaled(solved.x, 0.6)
+        report = dataclasses.replace(solved.report, x=x)
+        return dataclasses.replace(solved, reports=(report,))
+
+    monkeypatch.setattr(pipeline, "solve_over_time", hurry)
+
+
+@pytest.mark.usefixtures("ctrl_c_before_refinement", "splines_are_too_fast")
 def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
     robot, monkeypatch
 ):
@@ -344,12 +359,12 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
         brachis.plan(robot, task(spline={**FEW_POINTS, "intervals": 5}))
 
 
-@pytest.mark.usefixtures("ctrl_c_before_refinement")
+@pytest.mark.usefixtures("ctrl_c_before_refinement", "splines_are_too_fast")
 def test_ctrl_c_before_refinement_lengthens_the_best_motion(robot):
     result = brachis.plan(robot, task(spline=FEW_POINTS))
     assert result.interrupted
     assert result.verified
-    assert 1.01 < result.candidate.time_scaled <= 1.1
+    assert 1.1 < result.candidate.time_scaled <= 2.0
 
 
 class Clock:
@@ -399,12 +414,13 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
         (BRANCH, 2, "of 8 candidates 6 not planned, 1 not refined"),
     ],
 )
+@pytest.mark.usefixtures("splines_are_too_fast")
 def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     robot, clock, monkeypatch, asked, solved, left
 ):
     monkeypatch.setattr(schedule, "_SIZE", 4)
     monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
-    clock.jump(pipeline, "solve_candidate", at=solved)
+    clock.jump(pipeline, "rank_candidate", at=solved)
     result = brachis.plan(robot, task(spline=FEW_POINTS, **asked))
     assert result.interrupted
     assert not result.verified
@@ -524,7 +540,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     honest = uno.call_uno
 
     def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
-        return time.sleep(1e6) if len(x) > 60 else honest(watch, x, *rest)
+        return time.sleep(1e6) if len(x) > 80 else honest(watch, x, *rest)
 
     monkeypatch.setattr(uno, "call_uno", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)

@@ -129,7 +129,7 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
         )
 
     monkeypatch.setattr(screening, "_improve", quickly)
-    monkeypatch.setattr(screening, "_is_same", lambda *_starts: False)
+    monkeypatch.setattr(screening, "is_same", lambda *_starts: False)
     kept = screening.screen(starts, MOST, NEVER, quiet)
     assert len(looked_at) == 6
     assert [start.estimate for start in kept] == [1.0, 1.001]

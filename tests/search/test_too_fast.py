@@ -154,7 +154,7 @@ def test_of_two_legs_that_are_too_short_the_worse_one_is_named(monkeypatch):
 def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     """25 N brake 25 kg from 0.32 m/s in 0.05 m, and with 10 N of friction from 0.37 m/s."""
 
-    monkeypatch.setattr("brachis.search.pipeline.solve_candidate", refuse)
+    monkeypatch.setattr("brachis.search.pipeline.rank_candidate", refuse)
     limits = {"acceleration": None, "torque": 25.0}
     with pytest.raises(TriedError):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits, friction={"coulomb": 10.0}))
@@ -264,7 +264,7 @@ def test_a_speed_that_is_slightly_too_high_is_named_after_plans_failed(monkeypat
     few = {"spline": {"intervals": 6}, "search": {"effort": "single"}}
     content = slide(0.305, (0.3, 0.6), limits=limits, **few)
     with monkeypatch.context() as patch:
-        patch.setattr("brachis.search.pipeline.solve_candidate", refuse)
+        patch.setattr("brachis.search.pipeline.rank_candidate", refuse)
         with pytest.raises(TriedError):
             brachis.plan(content)
     with pytest.raises(

@@ -172,13 +172,13 @@ class Phase:
         restricted = [limit.restrict_to(q) for limit in self.limits]
         return [limit for limit in restricted if limit is not None]
 
-    def restrict_to(self, curves: np.ndarray) -> Phase:
+    def restrict_to(self, curves: np.ndarray, *, is_followed: bool = False) -> Phase:
         """Return the same phase with `limits_near` curves, (S, c).
 
-        Where postures are free, limits on them are narrowed by their inset: splines are laid along the motion later.
+        If splines are laid along the motion later, and postures are free, limits on these are narrowed by their inset.
         """
         limits = self.limits_near(curves)
-        if self.joint_map.r:
+        if is_followed and self.joint_map.r:
             ends = self.joint_map.postures(curves[[0, -1]])
             limits = [
                 limit.keep_inside(ends) if limit.is_of_postures else limit

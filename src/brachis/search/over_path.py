@@ -17,7 +17,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, Newton, chart_around, transversality
-from brachis.optimise.backends import SolverReport
+from brachis.optimise.backends import SolverReport, solvers_for
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
@@ -27,6 +27,7 @@ from brachis.optimise.retiming import (
     BetterPaths,
     PathEffort,
     improve_joint_paths,
+    is_timing_all,
     lay_splines,
 )
 from brachis.optimise.transcription import program_over
@@ -34,9 +35,8 @@ from brachis.search.stages import (
     Candidate,
     FinishedCandidate,
     InitialGuess,
-    SolvedCandidate,
-    begin_candidate,
-    facts_of,
+    RankedCandidate,
+    rank,
 )
 from brachis.search.verified import verify
 
@@ -186,47 +186,40 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
     return replace(better.start, joint_map=moved, joint_path=moved.curves(s, q))
 
 
-def solve_over_path(
+def is_timing_plan(guess: InitialGuess, program: Program) -> bool:
+    """Tell whether the fastest timing may be the plan: the phase plane knows all limits, and the knots are open.
+
+    As a fallback other solvers solve over time.
+    """
+    task = guess.problem.task
+    is_first = guess.solver == solvers_for(task.solver.name)[0].name
+    is_open = task.spline.intervals == "auto"
+    return is_open and is_first and guess.is_improved and is_timing_all(program)
+
+
+def improve_over_path(
     guess: InitialGuess, program: Program, session: SolverSession
-) -> SolvedCandidate | None:
-    """Solve from a guess over the path.
+) -> RankedCandidate:
+    """Improve a guess so far that its time ranks it.
 
     Parameters
     ----------
     guess : InitialGuess
     program : Program
-        Of its joint maps, over any knots; the phase plane knows all its limits.
+        Of its joint maps, over any knots.
     session : SolverSession
 
-    Returns
-    -------
-    SolvedCandidate or None
-        None where the limits allow no timing.
+    Raises
+    ------
+    UnreachableError
+        The joint path leaves its joint map.
     """
-    reports: tuple[SolverReport, ...] = ()
-    if not guess.is_improved:
-        try:
-            better = improve_guess(guess, program, session, ROUGH)
-        except UnreachableError:
-            return None
-        guess, program = better.start, better.program
-        reports = better.found.reports
-    if not guess.is_improved:
-        return None
-    candidate = replace(
-        begin_candidate(guess, "planned"), coarse=guess.estimate, reports=reports
-    )
-    return SolvedCandidate(
-        **facts_of(candidate),
-        guess=guess,
-        program=program,
-        target=program,
-        is_over_path=True,
-    )
+    better = improve_guess(guess, program, session, ROUGH)
+    return rank(better.start, better.program, better.found.reports)
 
 
 def plan_timing(
-    candidate: SolvedCandidate,
+    candidate: RankedCandidate,
     program: Program,
     timings: Sequence[PhaseTiming | None],
     reports: tuple[SolverReport, ...],
@@ -238,7 +231,7 @@ def plan_timing(
 
     Parameters
     ----------
-    candidate : SolvedCandidate
+    candidate : RankedCandidate
     program : Program
         Over any knots.
     timings : sequence of PhaseTiming or None

@@ -30,13 +30,7 @@ from brachis.optimise.retiming import (
     least_time,
 )
 from brachis.search.phase_plane import initial_guess
-from brachis.search.stages import (
-    Candidate,
-    InitialGuess,
-    SolvedCandidate,
-    begin_candidate,
-    facts_of,
-)
+from brachis.search.stages import InitialGuess
 from brachis.task import SplineSettings
 
 _ENTRIES = 500_000
@@ -59,7 +53,7 @@ their charts."""
 
 def solve_over_time(
     guess: InitialGuess, program: Program, session: SolverSession
-) -> Candidate:
+) -> SolvedProgram:
     """Solve over time, with knots that the fastest timing needs, or those that are given: few of them at first.
 
     Parameters
@@ -71,38 +65,19 @@ def solve_over_time(
 
     Returns
     -------
-    Candidate
-        A solved one where the solve ended well.
+    SolvedProgram
+
+    Raises
+    ------
+    UnreachableError
+        The first splines leave the joint map.
     """
-    program = _restrict(program, guess.legs)
-    candidate = begin_candidate(guess, "")
-    first = _first_splines(guess, program)
-    if first is None:
-        lost = "the splines through the joint path leave the branch, or the chart"
-        return replace(candidate, status=lost)
-    solved = keep_feasible(_solve_clear_first(*first, session), first[1])
-    status = solved.report.status
-    words = status.name.lower().replace("_", " ")
-    if not status.usable:
-        return replace(candidate, status=words, reports=solved.reports)
-    words = "planned" if status is SolveStatus.OPTIMAL else f"planned, {words}"
-    candidate = replace(
-        candidate, status=words, coarse=solved.t_end, reports=solved.reports
-    )
-    is_open = guess.problem.task.spline.intervals == "auto"
-    return SolvedCandidate(
-        **facts_of(candidate),
-        guess=guess,
-        program=solved.program,
-        target=solved.program if is_open else program,
-        not_completed=solved.not_completed,
-    )
+    first, x = _first_splines(guess, program)
+    return keep_feasible(_solve_clear_first(first, x, session), x)
 
 
-def _first_splines(
-    guess: InitialGuess, program: Program
-) -> tuple[Program, np.ndarray] | None:
-    """Return a program over few knots, and splines to begin with, (v,); None where these leave the joint map."""
+def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.ndarray]:
+    """Return a program over few knots, and splines to begin with, (v,); raise UnreachableError where these leave it."""
     task = guess.problem.task
     has_laws = any(guess.problem.time_laws)
     is_open = task.spline.intervals == "auto" and not task.boundary.periodic
@@ -121,7 +96,11 @@ def _first_splines(
     # At a given speed motions leave their charts between few points.
     even = program if is_near or has_laws else coarsest(program)
     x = initial_guess(even, guess)
-    return None if x is None else (even, x)
+    if x is None:
+        raise UnreachableError(
+            "the splines through the joint path leave the branch, or the chart"
+        )
+    return even, x
 
 
 def _solve_clear_first(
@@ -133,9 +112,9 @@ def _solve_clear_first(
     the collocation points.
     """
     clear = attempt_once(session, program.with_margin(_FIRST_MARGIN), x)
-    is_late = clear.report.status is SolveStatus.TIME_LIMIT
-    is_free = clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK
-    if is_late or is_free:
+    if clear.report.status is SolveStatus.TIME_LIMIT:
+        return replace(clear, program=program)
+    if clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK:
         return clear
     near = attempt_once(session, program, clear.x if clear.usable else x)
     if near.usable or not clear.usable:
@@ -201,7 +180,10 @@ def improve_timings(
     as_given = BetterTimings(program, paths.timings)
     if not guess.joint_map.r or session.deadline.passed:
         return as_given
-    restricted = _restrict(program, paths.curves)
+    followed = zip(program.phases, paths.curves, strict=True)
+    restricted = program.with_phases(
+        phase.restrict_to(curves, is_followed=True) for phase, curves in followed
+    )
     spline = guess.problem.task.spline
     solved = _solve_from_timings(restricted, paths.timings, session, spline)
     if solved is None:
@@ -235,9 +217,3 @@ def _solve_from_timings(
     session = replace(session, acceptable=_NEARLY)
     solved = attempt_once(session, *begun, accept_early_end=True)
     return solved if solved.usable else None
-
-
-def _restrict(program: Program, curves: Sequence[np.ndarray]) -> Program:
-    """Return a program with the limits that are near along the curves of its phases, (S, c) each."""
-    pairs = zip(program.phases, curves, strict=True)
-    return program.with_phases(phase.restrict_to(own) for phase, own in pairs)

@@ -9,10 +9,9 @@
     refinement      collocation points where limits are exceeded between others         `refine`
     verification    from URDF, path and limits alone                                    `verified`
 
-`solve_candidate` goes as far as candidates have to be ranked by their end times; `finish_candidate` goes on from there
-with those that may be the fastest. Where the phase plane knows all limits and the knots are open, the timing ranks, and
-the program over time improves the joint path; splines along its timing are the answer where they are faster. Everywhere
-else the program over time, over few knots at first, ranks.
+`rank_candidate` goes as far as the timing, whose time ranks candidates. `finish_candidate` goes on from there with
+those that may be the fastest. Where the phase plane knows all limits, and the knots are open, the program over time
+improves the joint path, and splines along the timing of this are the answer where they are faster.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from brachis.common.deadline import Deadline
-from brachis.common.progress import Listener
+from brachis.common.progress import Listener, ignore
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import solvers_for
 from brachis.optimise.improve import SolvedProgram, SolverSession
@@ -29,7 +28,7 @@ from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import FINE, improve_joint_paths, is_timing_all
 from brachis.optimise.transcription import program_of
 from brachis.search.joint_choice import best_of_joints
-from brachis.search.over_path import plan_timing, solve_over_path
+from brachis.search.over_path import improve_over_path, is_timing_plan, plan_timing
 from brachis.search.over_time import (
     improve_timings,
     limit_along_timing,
@@ -38,8 +37,10 @@ from brachis.search.over_time import (
 from brachis.search.stages import (
     Candidate,
     InitialGuess,
-    SolvedCandidate,
+    RankedCandidate,
     begin_candidate,
+    fail,
+    rank,
 )
 from brachis.search.verified import refine_and_verify
 
@@ -53,10 +54,10 @@ NO_TIMING = "the limits allow no timing"
 """Status of a candidate whose joint path cannot be followed within the limits."""
 
 
-def solve_candidate(
-    guess: InitialGuess, deadline: Deadline, listener: Listener
+def rank_candidate(
+    guess: InitialGuess, deadline: Deadline, _listener: Listener
 ) -> Candidate:
-    """Solve from a guess as far as candidates have to be ranked, unless the time is up.
+    """Improve the joint path of a guess over the path, so that candidates can be ranked, unless the time is up.
 
     Parameters
     ----------
@@ -67,32 +68,29 @@ def solve_candidate(
     Returns
     -------
     Candidate
-        A solved one where the solve ended well.
+        A ranked one, unless the joint path leaves its joint map.
     """
     if deadline.passed:
         return begin_candidate(guess, NOT_TRIED)
+    # A motion that is given may be near the optimum for limits that the phase plane does not know.
+    is_given = guess.durations is not None
     try:
         program = program_of(guess.problem, guess.maps_by_leg())
+        if guess.is_improved or (is_given and not is_timing_all(program)):
+            return rank(guess, program)
+        return improve_over_path(guess, program, _open_session(guess, deadline, ignore))
     except UnreachableError as error:
         return begin_candidate(guess, str(error))
-    session = _open_session(guess, deadline, listener)
-    is_open = guess.problem.task.spline.intervals == "auto"
-    # As a fallback other solvers solve over time.
-    is_first = guess.solver == solvers_for(guess.problem.task.solver.name)[0].name
-    solved = None
-    if is_open and is_first and is_timing_all(program):
-        solved = solve_over_path(guess, program, session)
-    return solved or solve_over_time(guess, program, session)
 
 
 def finish_candidate(
-    candidate: SolvedCandidate, to_beat: float, deadline: Deadline, listener: Listener
+    candidate: RankedCandidate, to_beat: float, deadline: Deadline, listener: Listener
 ) -> Candidate:
     """Improve a candidate as far as the time allows, and verify it.
 
     Parameters
     ----------
-    candidate : SolvedCandidate
+    candidate : RankedCandidate
     to_beat : float
         End time over all knots, s, from which on it is not refined: another motion is as fast.
     deadline : Deadline
@@ -106,35 +104,48 @@ def finish_candidate(
     session = _open_session(candidate.guess, deadline.part(_FOR_KNOTS), listener)
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
-    finish = _finish_over_path if candidate.is_over_path else _finish_over_time
+    is_plan = is_timing_plan(candidate.guess, candidate.program)
+    finish = _finish_over_path if is_plan else _finish_over_time
     return finish(candidate, session, options, to_beat)
 
 
 def _finish_over_time(
-    candidate: SolvedCandidate,
+    candidate: RankedCandidate,
     session: SolverSession,
     options: RefinementOptions,
     to_beat: float,
 ) -> Candidate:
-    """Choose coordinates and knots, refine and verify."""
+    """Solve over time, choose coordinates and knots, refine and verify."""
     guess = candidate.guess
-    solved = SolvedProgram(candidate.program, candidate.reports)
-    target = candidate.target
+    spline = guess.problem.task.spline
+    pairs = zip(candidate.program.phases, guess.legs, strict=True)
+    program = candidate.program.with_phases(
+        phase.restrict_to(curves) for phase, curves in pairs
+    )
+    try:
+        solved = solve_over_time(guess, program, session)
+    except UnreachableError as error:
+        return fail(candidate, str(error))
+    if not solved.usable:
+        words = solved.report.status.name.lower().replace("_", " ")
+        return fail(candidate, words, solved.reports)
+    target = solved.program if spline.intervals == "auto" else program
+    is_final = spline.intervals != "auto" and spline.knots != "free"
+    has_all_knots = solved.program.intervals == target.intervals
     # The chart around a given motion is kept.
     is_free = guess.in_chart and guess.durations is None
-    if candidate.keeps_knots and is_free and not session.deadline.passed:
+    if is_final and has_all_knots and is_free and not session.deadline.passed:
         solved = best_of_joints(guess.problem, solved, session)
         target = solved.program
-    spline = guess.problem.task.spline
     soon = replace(options, deadline=session.deadline)
     adapted = adapt_mesh(solved, session, spline, soon, target=target)
-    undone = filter(None, (candidate.not_completed, adapted.not_completed))
+    undone = filter(None, (solved.not_completed, adapted.not_completed))
     candidate = replace(candidate, not_completed="; ".join(undone))
     return _refine_if_fast(candidate, adapted, session, options, to_beat)
 
 
 def _finish_over_path(
-    candidate: SolvedCandidate,
+    candidate: RankedCandidate,
     session: SolverSession,
     options: RefinementOptions,
     _to_beat: float,
@@ -172,7 +183,7 @@ def _finish_over_path(
 
 
 def _refine_if_fast(
-    candidate: SolvedCandidate,
+    candidate: RankedCandidate,
     adapted: SolvedProgram,
     session: SolverSession,
     options: RefinementOptions,

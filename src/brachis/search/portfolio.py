@@ -34,11 +34,12 @@ from brachis.search.hopeless import explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, NO_TIME, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
+from brachis.search.screening import is_same
 from brachis.search.stages import (
     Candidate,
     FinishedCandidate,
     InitialGuess,
-    SolvedCandidate,
+    RankedCandidate,
     begin_candidate,
 )
 from brachis.trajectory import Trajectory
@@ -47,8 +48,6 @@ _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more, where it gets better knots, than those so far."""
 _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
-_COARSE_SHARE = 0.6
-"""Part of the time limit after which no guess is solved while nothing is verified."""
 
 
 @dataclass(frozen=True)
@@ -113,9 +112,10 @@ class Search:
         self._dead_ends: dict[str, DeadEnd] = {}
         self._unfinished_lattices: dict[str, None] = {}
         self._given_motion = ""
-        self._solved: dict[int, SolvedCandidate] = {}
+        self._ranked: dict[int, RankedCandidate] = {}
         self._waiting: list[int] = []
-        self._gain = 1.0
+        self._finished: list[RankedCandidate] = []
+        self._gains: list[float] = []
         self._to_beat = np.inf
 
     @property
@@ -156,7 +156,7 @@ class Search:
         """
         starts = self._find_starts(given, exact)
         for batch in itertools.islice(starts, most):
-            self._solve(batch)
+            self._rank(batch)
             self._refine_and_verify(batch)
         # The last solves may have been cut short.
         self.interrupted |= self._deadline.passed
@@ -203,16 +203,13 @@ class Search:
         if origin == GIVEN:
             self._given_motion = outcome
 
-    def _solve(self, batch: Batch) -> None:
-        """Solve the guesses of a batch coarsely, and rank them."""
+    def _rank(self, batch: Batch) -> None:
+        """Improve the joint paths of a batch, and rank them by their times."""
         first = self._add_starts(batch)
-        limit = self._deadline
-        if not self.is_satisfied:
-            limit = limit.part(_COARSE_SHARE)
         work = run_in_processes(
-            pipeline.solve_candidate,
+            pipeline.rank_candidate,
             batch.starts,
-            limit,
+            self._deadline,
             jobs=self._problem.task.search.jobs,
             listener=self._listener,
         )
@@ -221,8 +218,8 @@ class Search:
                 self.candidates[number] = candidate
                 if candidate.status == pipeline.NOT_TRIED:
                     self.interrupted = True
-                if isinstance(candidate, SolvedCandidate):
-                    self._solved[number] = candidate
+                if isinstance(candidate, RankedCandidate):
+                    self._ranked[number] = candidate
         self._waiting = self._by_end_time(first)
 
     def _refine_and_verify(self, batch: Batch) -> None:
@@ -235,7 +232,7 @@ class Search:
             numbers = self._waiting[:jobs]
             work = run_in_processes(
                 pipeline.finish_candidate,
-                [self._solved[number] for number in numbers],
+                [self._ranked[number] for number in numbers],
                 self._to_beat,
                 self._latest,
                 jobs=jobs,
@@ -250,7 +247,7 @@ class Search:
                     if self._to_beat <= outcome.adapted < np.inf:
                         # Over all knots it is slower than what was verified meanwhile.
                         candidate = replace(
-                            self._solved[number],
+                            self._ranked[number],
                             adapted=outcome.adapted,
                             status=pipeline.SLOW,
                         )
@@ -277,7 +274,7 @@ class Search:
             # One of the fastest three becomes the unverified motion.
             for number in self._by_end_time()[:3]:
                 if self.best is None:
-                    solved = self._solved[number]
+                    solved = self._ranked[number]
                     candidate = pipeline.finish_candidate(
                         solved, np.inf, Deadline(0.0), ignore
                     )
@@ -356,8 +353,8 @@ class Search:
     def _by_end_time(self, first: int = 0) -> list[int]:
         """Numbers, from `first` on, of the candidates that were solved, the fastest one first."""
         return sorted(
-            (number for number in self._solved if number >= first),
-            key=lambda number: (round_end_time(self._solved[number].coarse), number),
+            (number for number in self._ranked if number >= first),
+            key=lambda number: (round_end_time(self._ranked[number].coarse), number),
         )
 
     def _add_starts(self, batch: Batch) -> int:
@@ -401,7 +398,7 @@ class Search:
 
     def _goes_on(self, left: int) -> bool:
         """Tell whether the first one of the waiting candidates is worth finishing."""
-        first = self._solved[self._waiting[0]]
+        first = self._ranked[self._waiting[0]]
         if not self._may_win(first) or (self.is_satisfied and left <= 0):
             self._waiting = []
             return False
@@ -410,12 +407,13 @@ class Search:
             return False
         return True
 
-    def _may_win(self, candidate: SolvedCandidate) -> bool:
+    def _may_win(self, candidate: RankedCandidate) -> bool:
         """Tell whether a candidate may be faster than the best motion."""
         if self.best is None or not self.is_satisfied:
             return True
-        is_mirrored = self._has_same_time(candidate, self.best)
-        return not is_mirrored and candidate.coarse * self._gain < self._to_beat
+        gain = _GAINS_MORE * min(self._gains, default=0.0)
+        is_fast = candidate.coarse * gain < self._to_beat
+        return is_fast and not self._is_known(candidate)
 
     def _keep(self, candidate: FinishedCandidate) -> None:
         """Take a candidate as the best one, which others have to beat over all knots once it is verified."""
@@ -426,13 +424,14 @@ class Search:
             least = min(max(candidate.adapted, usual), candidate.t_end)
             self._to_beat = min(self._to_beat, (1.0 - tolerances.GAIN) * least)
 
-    def _has_same_time(self, first: SolvedCandidate, second: Candidate) -> bool:
-        """Tell whether candidates in the same joints have the same coarse end time; so have mirror images."""
-        if first.guess.in_chart or first.redundant_joints != second.redundant_joints:
-            return False
-        given = self._problem.given_time
-        gap = abs(first.coarse - second.coarse)
-        return gap <= tolerances.END_TIME * (second.coarse - given)
+    def _is_known(self, candidate: RankedCandidate) -> bool:
+        """Tell whether a motion along the same joint path is known, in the same coordinates."""
+        return any(
+            candidate.redundant_joints == other.redundant_joints
+            and candidate.branch == other.branch
+            and is_same(candidate.guess, other.guess)
+            for other in self._finished
+        )
 
     def _finish(self, number: int, candidate: Candidate) -> None:
         """Put down what became of a candidate, and keep the best one."""
@@ -441,10 +440,10 @@ class Search:
         self.candidates[number] = candidate
         if not isinstance(candidate, FinishedCandidate):
             return
+        self._finished.append(self._ranked[number])
         # Other coordinates, and better knots, shorten a motion: others may gain a little more by these.
         gain = min(candidate.adapted, candidate.t_end) / candidate.coarse
-        factor = 1.0 if self._solved[number].keeps_knots else _GAINS_MORE
-        self._gain = min(self._gain, factor * gain)
+        self._gains.append(gain)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self._keep(candidate)
 

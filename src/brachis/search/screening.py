@@ -71,7 +71,7 @@ def screen(
         # Of many, those slower than the fastest one are left out, and so is the second half of equally fast ones.
         is_slow = ratio > _SLOW and is_many
         is_one_too_many = ratio <= _NEAR_LEAST and len(kept) >= alike
-        is_known = any(_is_same(start, other) for other in kept)
+        is_known = any(is_same(start, other) for other in kept)
         if not (is_slow or is_one_too_many or is_known):
             kept.append(start)
     return kept[:most]
@@ -136,7 +136,7 @@ def _count_near_least(solved: Sequence[InitialGuess], *, apart: bool) -> int:
     near: list[InitialGuess] = []
     for start in known:
         is_near = start.estimate <= _NEAR_LEAST * least
-        if is_near and not (apart and any(_is_same(start, each) for each in near)):
+        if is_near and not (apart and any(is_same(start, each) for each in near)):
             near.append(start)
     return len(near)
 
@@ -166,7 +166,7 @@ def _improve(
     return better.start
 
 
-def _is_same(first: InitialGuess, second: InitialGuess) -> bool:
+def is_same(first: InitialGuess, second: InitialGuess) -> bool:
     """Tell whether two guesses that were solved are the same joint path, nearly."""
     if not np.isfinite([first.estimate, second.estimate]).all():
         return False

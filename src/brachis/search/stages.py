@@ -1,7 +1,7 @@
-"""The stages of a search, a frozen type each: initial guess, candidate, solved candidate, finished candidate.
+"""The stages of a search, a frozen type each: initial guess, candidate, ranked candidate, finished candidate.
 
 An `InitialGuess` is a joint path. Whatever is tried from one is a `Candidate`, even if nothing comes of it. One whose
-solve ends well is a `SolvedCandidate`; one with a motion that was refined and verified, or fails at that, a
+joint path was improved is a `RankedCandidate`; one with a motion that was refined and verified, or fails at that, a
 `FinishedCandidate`.
 """
 
@@ -26,6 +26,8 @@ from brachis.problem.problem import Problem
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
+RANKED = "not finished: ranked by the time along its joint path"
+"""Status of a candidate that was not finished."""
 PathMap = ClosedFormMap | ChartMap | JointSpaceMap
 """Joint maps along a path."""
 
@@ -136,11 +138,11 @@ class Candidate(Summary):
     status : str
         In plain words.
     coarse : float
-        End time at the first collocation points, s; infinite without a motion.
+        Least time along the joint path that was improved, s; infinite where none was.
     adapted : float
         End time over all knots, before refinement, s; infinite where there was no such program.
     reports : tuple of SolverReport
-        Of all solves: near the branch boundary or clear of it, on ever finer meshes, then of the refinement rounds.
+        Of all solves: over the path, over time on ever finer meshes, then of the refinement rounds.
 
     Examples
     --------
@@ -218,27 +220,21 @@ def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class SolvedCandidate(Candidate):
-    """A candidate whose program was solved, so that it can be finished.
+class RankedCandidate(Candidate):
+    """A candidate whose joint path was improved over the path, where limits allow a timing of it.
 
     Attributes
     ----------
     guess : InitialGuess
-        Over the path its joint path is the answer, and its estimate the end time.
+        With the better joint path.
     program : Program
-        The first one that was solved; over the path, the one whose joint path was improved.
-    target : Program
-        The program over all its knots.
-    is_over_path : bool
-        Whether it was solved over the path, and not over time.
+        Of its joint maps, over the knots that are given.
     not_completed : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
     """
 
     guess: InitialGuess
     program: Program
-    target: Program
-    is_over_path: bool = False
     not_completed: str = ""
 
     @property
@@ -251,12 +247,23 @@ class SolvedCandidate(Candidate):
         """Family of the closed form."""
         return self.guess.family
 
-    @property
-    def keeps_knots(self) -> bool:
-        """True where the finished plan has the same knots, so that its end time cannot be shorter."""
-        spline = self.problem.task.spline
-        is_given = spline.knots != "free" and spline.intervals != "auto"
-        return is_given and self.program.intervals == self.target.intervals
+
+def rank(
+    guess: InitialGuess, program: Program, reports: tuple[SolverReport, ...] = ()
+) -> RankedCandidate:
+    """Rank a guess by its estimate."""
+    known = facts_of(begin_candidate(guess, RANKED))
+    known |= {"coarse": guess.estimate, "reports": reports}
+    return RankedCandidate(**known, guess=guess, program=program)
+
+
+def fail(
+    candidate: Candidate, status: str, reports: tuple[SolverReport, ...] = ()
+) -> Candidate:
+    """Say of which a candidate failed, after which solves more."""
+    known = facts_of(candidate)
+    known |= {"status": status, "reports": (*candidate.reports, *reports)}
+    return Candidate(**known)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -275,7 +282,7 @@ class FinishedCandidate(Candidate):
     verification : Verification
         Of the trajectory.
     not_completed : str
-        See `SolvedCandidate`.
+        See `RankedCandidate`.
     """
 
     problem: Problem

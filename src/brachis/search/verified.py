@@ -16,14 +16,14 @@ from brachis.optimise.refine import RefinementOptions, refine
 from brachis.search.stages import (
     Candidate,
     FinishedCandidate,
-    SolvedCandidate,
+    RankedCandidate,
     facts_of,
 )
 from brachis.verify import Verification, verify_trajectory
 
 
 def refine_and_verify(
-    candidate: SolvedCandidate | FinishedCandidate,
+    candidate: RankedCandidate | FinishedCandidate,
     program: Program,
     reports: tuple[SolverReport, ...],
     solve: Solve,
@@ -33,7 +33,7 @@ def refine_and_verify(
 
     Parameters
     ----------
-    candidate : SolvedCandidate or FinishedCandidate
+    candidate : RankedCandidate or FinishedCandidate
         Of which the program is made.
     program : Program
     reports : tuple of SolverReport
@@ -52,7 +52,7 @@ def refine_and_verify(
 
 
 def verify(
-    candidate: SolvedCandidate | FinishedCandidate,
+    candidate: RankedCandidate | FinishedCandidate,
     before: tuple[SolverReport, ...],
     refined: SolvedProgram,
 ) -> Candidate:
@@ -60,7 +60,7 @@ def verify(
 
     Parameters
     ----------
-    candidate : SolvedCandidate or FinishedCandidate
+    candidate : RankedCandidate or FinishedCandidate
     before : tuple of SolverReport
         Of earlier solves.
     refined : SolvedProgram

@@ -320,7 +320,7 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline, "solve_candidate", interrupt)
+    monkeypatch.setattr(pipeline, "rank_candidate", interrupt)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 130
     assert "interrupted" in outcome.err
@@ -328,14 +328,22 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
 
 
 def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
-    honest, now = pipeline.solve_candidate, [0.0]
+    honest, now = pipeline.rank_candidate, [0.0]
 
     def slow(*arguments):
         made = honest(*arguments)
         now[0] += 90.0
         return made
 
-    monkeypatch.setattr(pipeline, "solve_candidate", slow)
+    solve = pipeline.solve_over_time
+
+    def hurry(*arguments):
+        solved = solve(*arguments)
+        x = solved.program.with_time_scaled(solved.x, 0.6)
+        return replace(solved, reports=(replace(solved.report, x=x),))
+
+    monkeypatch.setattr(pipeline, "solve_over_time", hurry)
+    monkeypatch.setattr(pipeline, "rank_candidate", slow)
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
     task |= {
         "spline": {"intervals": 10, "points_per_interval": 1},
