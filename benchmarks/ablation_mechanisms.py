@@ -19,6 +19,7 @@ from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.retiming import FINE, improve_joint_paths
 from brachis.search.over_path import improve_guess, plan_timing
+from brachis.search.stages import rank
 
 IsUsed = Callable[..., bool]
 """Tells by the result of a function and by its arguments whether a call is a use of the mechanism."""
@@ -172,6 +173,11 @@ def plan_from_motion_alone(
     if known is None:
         return None
     return plan_simpler(problem, robot, task, known, *others)
+
+
+def rank_as_it_is(guess: Any, program: Any, _session: Any) -> Any:
+    """Take the place of `improve_over_path`."""
+    return rank(guess, program)
 
 
 def fit_untimed(_phase: Any, curves: Any) -> Any:
@@ -336,9 +342,8 @@ MECHANISMS = (
     ),
     Mechanism(
         "over_path",
-        "everything over time",
-        {_SEARCH + "pipeline.solve_over_path": return_none},
-        is_used=is_found,
+        "guesses are ranked by the timing of the lattice's joint path",
+        {_SEARCH + "pipeline.improve_over_path": rank_as_it_is},
     ),
     Mechanism(
         "child_process",

@@ -13,7 +13,7 @@ A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspl
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
-What comes out     Result, Trajectory, Samples, Candidate, Verification, BottleneckReport
+What comes out     Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
 Recorded motions   import_motion, from a CSV file; compare it with a plan along its path: Comparison
 To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
 What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning

@@ -31,7 +31,7 @@ class Result(PlannedMotion):
     verification : Verification
     family : str
         Family of the closed form; ``chart`` where there was none.
-    candidate : Candidate
+    candidate : FinishedCandidate
         The fastest one, with its solved program and its motion.
     least_motion : LeastMotion or None
         How the calmest motion that is as fast was found; None where it was not asked for.

@@ -283,6 +283,13 @@ class FinishedCandidate(Candidate):
         Of the trajectory.
     not_completed : str
         See `RankedCandidate`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.candidate.verified, result.candidate.branch
+    (True, 'elbow_negative')
     """
 
     problem: Problem

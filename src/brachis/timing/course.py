@@ -96,12 +96,12 @@ class TimedCourse:
             by_length = speeds * np.interp(places, course.p, rate)
         self._plane = PhasePlane(limits, self.path, by_length)
         y_dp = interpolate_columns(places, course.p, course.y_dp)
-        slopes = y_dp / np.maximum(speeds, 1e-300)[:, None]
-        for end, beside in ((0, 1), (-1, -2)):
-            if not speeds[end] > 0.0:
-                slopes[end] = slopes[beside]
+        # Where the joints stand still slopes are those of the station behind it, or before the end.
+        moving = np.flatnonzero(speeds > 0.0)
+        behind = np.searchsorted(moving, np.arange(len(speeds)))
+        beside = moving[behind.clip(max=len(moving) - 1)]
         self._y = interpolate_columns(places, course.p, course.y)
-        self._slopes = slopes
+        self._slopes = y_dp[beside] / speeds[beside, None]
 
     def solve(
         self,
