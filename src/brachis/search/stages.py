@@ -289,7 +289,7 @@ class FinishedCandidate(Candidate):
     >>> import brachis
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
     >>> result.candidate.verified, result.candidate.branch
-    (True, 'elbow_negative')
+    (True, 'elbow_positive')
     """
 
     problem: Problem
