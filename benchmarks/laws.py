@@ -59,7 +59,7 @@ COLUMNS = (
     f"above {100 * SMALL:g} %",
     f"above {100 * LARGE:g} %",
     "harder task alone planned",
-    "neither planned",
+    "not planned without the change",
 )
 Changes = Mapping[str, Any]
 
@@ -368,7 +368,7 @@ def write_tasks(pair: Pair, folder: Path) -> None:
         (folder / f"{name}-{word}.yaml").write_text(content, encoding="utf-8")
 
 
-def summarise(words: str, pairs: list[Pair], neither: int) -> tuple[str, ...]:
+def summarise(words: str, pairs: list[Pair], unknown: list[str]) -> tuple[str, ...]:
     """Return the cells of one kind of change."""
     finite = [pair.violation for pair in pairs if np.isfinite(pair.violation)]
     above = [
@@ -385,7 +385,7 @@ def summarise(words: str, pairs: list[Pair], neither: int) -> tuple[str, ...]:
         f"{len(above)} ({'; '.join(above)})" if above else "0",
         str(large),
         f"{len(lost)} ({'; '.join(lost)})" if lost else "0",
-        str(neither),
+        f"{len(unknown)} ({'; '.join(unknown)})" if unknown else "0",
     )
 
 
@@ -404,7 +404,7 @@ def main() -> None:
     print(f"task files in {folder}", flush=True)
     changes = [change for change in CHANGES if chosen.kind in change.words]
     pairs: dict[str, list[Pair]] = {change.words: [] for change in changes}
-    neither = dict.fromkeys(pairs, 0)
+    unknown: dict[str, list[str]] = {change.words: [] for change in changes}
     for index in range(chosen.count):
         change = changes[index % len(changes)]
         number = index // len(changes)
@@ -414,7 +414,7 @@ def main() -> None:
         try:
             pair = plan_pair(change, chosen.seed, number, folder)
         except BrachisError as error:
-            neither[change.words] += 1
+            unknown[change.words].append(str(error)[:100])
             print(f"{change.words} {number}: {error}", flush=True)
             continue
         pairs[change.words].append(pair)
@@ -432,7 +432,7 @@ def main() -> None:
     for pair in everything[:20]:
         print(f"{100.0 * pair.violation:+.4f} %: {pair.words}, {pair.name}")
     rows = [
-        summarise(words, entries, neither[words]) for words, entries in pairs.items()
+        summarise(words, entries, unknown[words]) for words, entries in pairs.items()
     ]
     for row in rows:
         print(" | ".join(row))
