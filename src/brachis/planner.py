@@ -172,9 +172,10 @@ def plan(
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict)
+            motion = best if smoothed is None else smoothed
             gap = None
             if not deadline.passed:
-                gap = find_timing_gap(best.trajectory, problem.limits)
+                gap = find_timing_gap(motion.trajectory, problem.limits)
             if gap is not None and not end_time:
                 is_given = asked.spline.intervals != "auto"
                 slow = gap.issues(intervals_are_given=is_given)
@@ -187,7 +188,6 @@ def plan(
             raise
         total = time.perf_counter() - began
         report(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
-        motion = best if smoothed is None else smoothed
         return Result(
             task=problem.task,
             trajectory=motion.trajectory,
