@@ -109,7 +109,7 @@ class FullSpace:
         self.t_norm = np.concatenate([[0.0][: free[0]], inner, [1.0][: free[1]]])
         self._basis = LocalBasis.of(self.phase.knots, self.phase.degree, self.t_norm)
         self._places = [
-            SparsityPattern(self._basis.columns, spline.free_part, 1)
+            SparsityPattern(self._basis.columns, spline.free_matrix, 1)
             for spline in self.phase.splines
         ]
         self._values = [

@@ -178,7 +178,7 @@ def plan(
                 gap = find_timing_gap(motion.trajectory, problem.limits)
             if gap is not None and not end_time:
                 is_given = asked.spline.intervals != "auto"
-                slow = gap.issues(intervals_are_given=is_given)
+                slow = gap.issues(has_fixed_intervals=is_given)
                 for issue in slow:
                     warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
                 remarks += slow

@@ -60,7 +60,7 @@ def test_jacobian_equals_differences(phase):
     for x in reachable_points(phase, 2):
         # Curves of torque over speed bend within 1e-3.
         exact, expected = dense(phase, x), differences(phase, x, 2e-6)
-        count = phase._layout.progress.given.shape[1]
+        count = phase._layout.progress.fixed_terms.shape[1]
         kinds = {
             limit.kind: phase.rows_of(limit).ravel()[told(phase, limit, x)]
             for limit in phase.limits
@@ -182,7 +182,7 @@ def test_periodic_splines(degree, start, jump, seed):
     free = np.random.default_rng(seed).normal(size=spline.free)
     points = spline.control_points(free, 1.0)
     np.testing.assert_allclose(
-        spline.free_part.matrix() @ free + spline.given[0],
+        spline.free_matrix.dense() @ free + spline.fixed_terms[0],
         points,
         atol=1e-12 * np.abs(points).max(),
     )

@@ -97,9 +97,9 @@ def test_given_derivatives_hold_for_any_duration(
         rounding = 1e-14 * size * (20.0 * degree / duration) ** order
         assert float(curve(place, nu=order)) == pytest.approx(wanted, abs=rounding)
     assert spline.free == len(points) - 4
-    slope = sum_powers(spline.given, duration, slope=True)
+    slope = sum_powers(spline.fixed_terms, duration, slope=True)
     by_differences = differences_of(
-        lambda x: spline.given_points(float(x[0])), np.array([duration]), 1e-3
+        lambda x: spline.fixed_points(float(x[0])), np.array([duration]), 1e-3
     )
     np.testing.assert_allclose(
         slope, by_differences[:, 0], atol=1e-9 * (1.0 + np.abs(slope).max())

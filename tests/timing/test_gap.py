@@ -76,7 +76,7 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
     assert -1e-3 < result.timing_gap.gap < 1e-3
 
 
-@pytest.mark.parametrize("intervals_are_given", [True, False])
+@pytest.mark.parametrize("has_fixed_intervals", [True, False])
 @pytest.mark.parametrize(
     ("part", "where"),
     [
@@ -84,11 +84,11 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
         ((0.0, 1.0), "along the whole path;"),
     ],
 )
-def test_the_warning_says_where_time_is_lost(part, where, intervals_are_given):
+def test_the_warning_says_where_time_is_lost(part, where, has_fixed_intervals):
     gap = TimingGap(2.0, 1.8, 100, (), part)
-    (issue,) = gap.issues(intervals_are_given=intervals_are_given)
+    (issue,) = gap.issues(has_fixed_intervals=has_fixed_intervals)
     assert where in issue.message
-    advice = "spline.intervals: auto" if intervals_are_given else "search.time_limit"
+    advice = "spline.intervals: auto" if has_fixed_intervals else "search.time_limit"
     assert advice in issue.message
 
 

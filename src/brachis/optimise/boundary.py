@@ -1,6 +1,6 @@
 """Splines whose first and last control points are fixed or tied by the boundary conditions.
 
-    control points = S free + sum of T^i given_i,    with T the duration
+    control points = S free + sum of T^i fixed_i,    with T the duration
 
 A clamped spline begins like the polynomial y0 + v t + a t^2 / 2 + ..., with its first k derivatives given, where its
 first k + 1 control points are those of the polynomial: y0 + v T b_i1 + a T^2 b_i2 + ..., with b_i1 the Greville
@@ -47,7 +47,7 @@ class EndCondition:
 
 
 @dataclass(frozen=True, eq=False)
-class FreePart:
+class FreeMatrix:
     """What free variables add to control points: the matrix S, entry by entry in the order of its rows.
 
     Attributes
@@ -66,7 +66,7 @@ class FreePart:
     shape: tuple[int, int]
 
     @classmethod
-    def of(cls, matrix: np.ndarray) -> FreePart:
+    def of(cls, matrix: np.ndarray) -> FreeMatrix:
         """Take the entries of a matrix, (N + d, free)."""
         point, variable = np.nonzero(matrix)
         return cls(point, variable, matrix[point, variable], matrix.shape)
@@ -77,15 +77,15 @@ class FreePart:
         return np.bincount(self.point, minlength=self.shape[0])
 
     def control_points(self, free: np.ndarray) -> np.ndarray:
-        """Part of the control points, (N + d,), that free variables make."""
+        """Return what free variables add to the control points, (N + d,)."""
         terms = self.weight * free[self.variable]
         return np.bincount(self.point, terms, self.shape[0])
 
-    def matrix(self) -> np.ndarray:
-        """Return S as a whole, (N + d, free)."""
-        whole = np.zeros(self.shape)
-        whole[self.point, self.variable] = self.weight
-        return whole
+    def dense(self) -> np.ndarray:
+        """Return S with its zeros, (N + d, free)."""
+        matrix = np.zeros(self.shape)
+        matrix[self.point, self.variable] = self.weight
+        return matrix
 
 
 @dataclass(frozen=True)
@@ -94,14 +94,14 @@ class BoundarySpline:
 
     Attributes
     ----------
-    free_part : FreePart
+    free_matrix : FreeMatrix
         S.
-    given : (1 + p, N + d) ndarray
-        Given terms of the control points, by powers of the duration, up to the highest one that matters, p.
+    fixed_terms : (1 + p, N + d) ndarray
+        Fixed terms of the control points, by powers of the duration, up to the highest one that matters, p.
     """
 
-    free_part: FreePart
-    given: np.ndarray
+    free_matrix: FreeMatrix
+    fixed_terms: np.ndarray
 
     @classmethod
     def between(
@@ -111,47 +111,47 @@ class BoundarySpline:
         count = len(knots) - degree - 1
         # Control points of one group are one variable; those of group -1 are fixed.
         group = np.arange(count)
-        numbers = [1 + len(own.derivatives) for own in (start, end)]
-        given = np.zeros((max(numbers), count))
+        numbers = [1 + len(condition.derivatives) for condition in (start, end)]
+        terms = np.zeros((max(numbers), count))
         first = slice(None, numbers[0])
         last = slice(count - numbers[1], None)
         sides = ((start, 0, first, last), (end, count - 1, last, first))
-        for condition, anchor, own, other in sides:
-            group[own] = anchor if np.isnan(condition.value) else -1
-            given[0, own] = np.nan_to_num(condition.value)
+        for condition, anchor, near, far in sides:
+            group[near] = anchor if np.isnan(condition.value) else -1
+            terms[0, near] = np.nan_to_num(condition.value)
             blossoms = _blossoms(knots, degree, anchor, len(condition.derivatives))
             for power, derivative in enumerate(condition.derivatives, 1):
                 fading = blossoms[power] * (1.0 - np.abs(blossoms[1])) ** 2
-                fading[own] = blossoms[power][own]
-                fading[other] = 0.0
-                given[power] += derivative * fading
+                fading[near] = blossoms[power][near]
+                fading[far] = 0.0
+                terms[power] += derivative * fading
         points = np.flatnonzero(group >= 0)
         variables = np.unique(group[points], return_inverse=True)[1]
         shape = (count, int(variables.max(initial=-1)) + 1)
-        free_part = FreePart(points, variables, np.ones(len(points)), shape)
-        powers = np.flatnonzero(given[1:].any(axis=1)) + 1
-        return cls(free_part, given[: 1 + powers.max(initial=0)])
+        matrix = FreeMatrix(points, variables, np.ones(len(points)), shape)
+        powers = np.flatnonzero(terms[1:].any(axis=1)) + 1
+        return cls(matrix, terms[: 1 + powers.max(initial=0)])
 
     @property
     def free(self) -> int:
         """Number of free variables."""
-        return self.free_part.shape[1]
+        return self.free_matrix.shape[1]
 
-    def given_points(self, duration: float) -> np.ndarray:
-        """Return the given part of the control points, (N + d,)."""
-        return sum_powers(self.given, duration)
+    def fixed_points(self, duration: float) -> np.ndarray:
+        """Return what the boundary conditions alone make of the control points, (N + d,)."""
+        return sum_powers(self.fixed_terms, duration)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
-        return self.free_part.control_points(free) + self.given_points(duration)
+        return self.free_matrix.control_points(free) + self.fixed_points(duration)
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
         """Free variables that come nearest to given control points: means over those that are one variable each."""
-        own_part = control_points - self.given_points(duration)
-        part = self.free_part
-        is_alone = (part.counts[part.point] == 1) & (part.weight == 1.0)
-        variable = part.variable[is_alone]
-        sums = np.bincount(variable, own_part[part.point[is_alone]], self.free)
+        free_points = control_points - self.fixed_points(duration)
+        matrix = self.free_matrix
+        is_alone = (matrix.counts[matrix.point] == 1) & (matrix.weight == 1.0)
+        variable = matrix.variable[is_alone]
+        sums = np.bincount(variable, free_points[matrix.point[is_alone]], self.free)
         return sums / np.bincount(variable, minlength=self.free)
 
 
@@ -160,7 +160,7 @@ def stack_splines(
     slices: Sequence[slice],
     count: int,
     variables: int,
-) -> tuple[FreePart, np.ndarray]:
+) -> tuple[FreeMatrix, np.ndarray]:
     """Put splines over the same knots together: the control points of one follow those of the one before.
 
     Parameters
@@ -173,29 +173,29 @@ def stack_splines(
 
     Returns
     -------
-    free_part : FreePart
+    stacked : FreeMatrix
         By all variables.
-    given : (1 + k, all control points) ndarray
+    terms : (1 + k, all control points) ndarray
         By powers of the duration.
     """
-    most = max((len(spline.given) for spline in splines), default=1)
-    given = np.zeros((most, len(splines), count))
+    powers = max((len(spline.fixed_terms) for spline in splines), default=1)
+    terms = np.zeros((powers, len(splines), count))
     points = [np.empty(0, dtype=int)]
     columns = [np.empty(0, dtype=int)]
     weights = [np.empty(0)]
-    for number, (spline, own) in enumerate(zip(splines, slices, strict=True)):
-        part = spline.free_part
-        given[: len(spline.given), number] = spline.given
-        points.append(number * count + part.point)
-        columns.append(own.start + part.variable)
-        weights.append(part.weight)
-    free_part = FreePart(
+    for number, (spline, block) in enumerate(zip(splines, slices, strict=True)):
+        matrix = spline.free_matrix
+        terms[: len(spline.fixed_terms), number] = spline.fixed_terms
+        points.append(number * count + matrix.point)
+        columns.append(block.start + matrix.variable)
+        weights.append(matrix.weight)
+    stacked = FreeMatrix(
         np.concatenate(points),
         np.concatenate(columns),
         np.concatenate(weights),
         (len(splines) * count, variables),
     )
-    return free_part, given.reshape(most, -1)
+    return stacked, terms.reshape(powers, -1)
 
 
 def sum_powers(
@@ -213,23 +213,23 @@ def sum_powers(
     return duration**powers @ terms
 
 
-def _blossoms(knots: np.ndarray, degree: int, anchor: int, most: int) -> np.ndarray:
-    """Control points of t^j / j!, for j up to `most`, with t from the end of control point `anchor` on.
+def _blossoms(knots: np.ndarray, degree: int, anchor: int, highest: int) -> np.ndarray:
+    """Control points of t^j / j!, for j up to `highest`, with t from the end of control point `anchor` on.
 
     The blossom of t^j / j! is the elementary symmetric polynomial e_j of a control point's d knots, over d! / (d - j)!.
 
     Returns
     -------
-    (1 + most or 2, N + d) ndarray
+    (1 + highest or 2, N + d) ndarray
     """
     abscissae = greville(knots, degree)
-    own = sliding_window_view(knots[1:-1], degree)
-    own = own - abscissae[anchor]
-    symmetric = np.zeros((degree + 1, len(own)))
+    windows = sliding_window_view(knots[1:-1], degree)
+    windows = windows - abscissae[anchor]
+    symmetric = np.zeros((degree + 1, len(windows)))
     symmetric[0] = 1.0
-    for column in own.T:
+    for column in windows.T:
         symmetric[1:] += column * symmetric[:-1]
-    blossoms = np.empty((max(most, 1) + 1, len(own)))
+    blossoms = np.empty((max(highest, 1) + 1, len(windows)))
     size = 1.0
     for j in range(len(blossoms)):
         blossoms[j] = symmetric[j] / size
@@ -264,12 +264,12 @@ def periodic(
     matrix = np.eye(free + orders, free)
     matrix[free:, :orders] = np.linalg.solve(last, first)
     matrix[-1] = np.eye(free)[0]  # the value itself, without rounding
-    given = np.zeros((1, len(matrix)))
-    given[0, free:] = jump
+    terms = np.zeros((1, len(matrix)))
+    terms[0, free:] = jump
     if not np.isnan(start):
-        given[0] += start * matrix[:, 0]
+        terms[0] += start * matrix[:, 0]
         matrix = matrix[:, 1:]
-    return BoundarySpline(FreePart.of(matrix), given)
+    return BoundarySpline(FreeMatrix.of(matrix), terms)
 
 
 @dataclass(frozen=True)
@@ -302,9 +302,9 @@ class Boundary:
         periodic: bool = False,
     ) -> Boundary:
         """Give values, (c,), NaN where free, with as many vanishing derivatives at both ends."""
-        rest = np.zeros(derivatives)
+        zeros = np.zeros(derivatives)
         sides = [
-            tuple(EndCondition(float(value), rest) for value in values)
+            tuple(EndCondition(float(value), zeros) for value in values)
             for values in (start, end)
         ]
         return cls(sides[0], sides[1], periodic)
@@ -312,14 +312,17 @@ class Boundary:
     def up_to_velocity(self) -> Boundary:
         """Return the conditions without derivatives above the first."""
         sides = [
-            tuple(replace(own, derivatives=own.derivatives[:1]) for own in side)
+            tuple(
+                replace(condition, derivatives=condition.derivatives[:1])
+                for condition in side
+            )
             for side in (self.start, self.end)
         ]
         return replace(self, start=sides[0], end=sides[1])
 
     @property
-    def given(self) -> int:
-        """Number of curves that are given and have no spline: 1 with a time law, else 0."""
+    def law_curves(self) -> int:
+        """Number of curves that the time law gives, and that have no spline: 1 or 0."""
         return int(self.time_law is not None)
 
     @property
@@ -338,9 +341,12 @@ class Boundary:
         if self.periodic:
             jumps = zip(self.start, self.ahead, strict=True)
             return tuple(
-                periodic(knots, degree, own.value, jump) for own, jump in jumps
+                periodic(knots, degree, condition.value, jump)
+                for condition, jump in jumps
             )
-        pairs = zip(self.start[self.given :], self.end[self.given :], strict=True)
+        pairs = zip(
+            self.start[self.law_curves :], self.end[self.law_curves :], strict=True
+        )
         return tuple(BoundarySpline.between(knots, degree, *pair) for pair in pairs)
 
 
@@ -390,7 +396,7 @@ class SparsityPattern:
     ----------
     columns : (K, d + 1) int ndarray
         Control points of a spline that matter at each time; see `LocalBasis`.
-    part : FreePart
+    matrix : FreeMatrix
         Of splines over the same knots, stacked.
     curves : int
         Number of these.
@@ -401,25 +407,25 @@ class SparsityPattern:
         Numbers of the spline, of the time, and of the variable.
     """
 
-    def __init__(self, columns: np.ndarray, part: FreePart, curves: int) -> None:
-        begins = np.cumsum(part.counts) - part.counts
+    def __init__(self, columns: np.ndarray, matrix: FreeMatrix, curves: int) -> None:
+        begins = np.cumsum(matrix.counts) - matrix.counts
         count, width = columns.shape
-        firsts = np.arange(curves) * (part.shape[0] // max(curves, 1))
+        firsts = np.arange(curves) * (matrix.shape[0] // max(curves, 1))
         points = (firsts[:, None, None] + columns).ravel()
-        counts = part.counts[points]
+        counts = matrix.counts[points]
         term = np.repeat(np.arange(len(points)), counts)
         within = count_each(counts)
         entry = begins[points][term] + within
-        self._weight = part.weight[entry]
+        self._weight = matrix.weight[entry]
         row, function = np.divmod(term, width)
         self._terms = (row % count, function)
-        numbers = row * part.shape[1] + part.variable[entry]
+        numbers = row * matrix.shape[1] + matrix.variable[entry]
         unique, self._place = np.unique(numbers, return_inverse=True)
-        own_row, self.variable = np.divmod(unique, part.shape[1])
-        self.curve, self.point = np.divmod(own_row, count)
+        unique_row, self.variable = np.divmod(unique, matrix.shape[1])
+        self.curve, self.point = np.divmod(unique_row, count)
 
     def entries(self, values: np.ndarray) -> np.ndarray:
         """Differentiate value and three derivatives by the free variables, (4, z); `values` are (4, K, d + 1)."""
         terms = self._weight * values[:, *self._terms]
         count = len(self.point)
-        return np.array([np.bincount(self._place, own, count) for own in terms])
+        return np.array([np.bincount(self._place, order, count) for order in terms])

@@ -79,22 +79,22 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     """
     degree = (lengths.shape[-1] + 1) // 2
     middle = degree - 1
-    own = lengths[..., middle : middle + 1]
-    part = fraction[..., None] * own
+    interval = lengths[..., middle : middle + 1]
+    offset = fraction[..., None] * interval
     # left[m]: from the m-th knot before the point to the point; right[m]: from it to the m-th knot behind.
     before = lengths[..., :middle][..., ::-1]
     behind = lengths[..., middle + 1 :]
-    left = np.cumsum(np.concatenate([part, before], axis=-1), axis=-1)
-    right = np.cumsum(np.concatenate([own - part, behind], axis=-1), axis=-1)
-    value = [np.ones_like(part)]
+    left = np.cumsum(np.concatenate([offset, before], axis=-1), axis=-1)
+    right = np.cumsum(np.concatenate([interval - offset, behind], axis=-1), axis=-1)
+    value = [np.ones_like(offset)]
     for p in range(1, degree + 1):
         value.append(_raise_degree(value[-1], left, right, p))
     orders = [value[degree]]
     for order in range(1, ORDERS):
-        part = value[degree - order] if order <= degree else np.zeros_like(value[0])
+        values = value[degree - order] if order <= degree else np.zeros_like(value[0])
         for p in range(max(degree - order, 0) + 1, degree + 1):
-            part = _slope(part, left, right, p)
-        orders.append(part)
+            values = _slope(values, left, right, p)
+        orders.append(values)
     return np.array(orders)
 
 
@@ -194,6 +194,6 @@ def insert_knots(
     (c, N' + d) ndarray
     """
     new = np.arange(len(finer) - degree - 1)
-    piece = np.searchsorted(knots, finer[new], side="right") - 1
+    interval = np.searchsorted(knots, finer[new], side="right") - 1
     arguments = [finer[new + level] for level in range(1, degree + 1)]
-    return blossom(knots, control_points.T, piece, arguments).T
+    return blossom(knots, control_points.T, interval, arguments).T

@@ -96,10 +96,10 @@ class Evaluation:
     def by_limit(self) -> tuple[np.ndarray, ...]:
         """Values of every limit, (K, its own c)."""
         motion = self.motion
-        found = motion.values_of(self.groups)
+        values = motion.values_of(self.groups)
         for number in self.groups.with_partials:
-            found[number] = self.limits[number].values(motion)
-        return tuple(found)
+            values[number] = self.limits[number].values(motion)
+        return tuple(values)
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -118,8 +118,8 @@ class Evaluation:
         entries : (z, c) ndarray
             Of the Jacobian by the variables, if these are given.
         """
-        others = (self.limits[number] for number in self.groups.with_partials)
-        partials = [limit.partials(self.motion) for limit in others]
+        limits = (self.limits[number] for number in self.groups.with_partials)
+        partials = [limit.partials(self.motion) for limit in limits]
         return self._differentiate(self.groups, partials, variables)
 
     def chain(self, partials: Partials) -> np.ndarray:
@@ -135,14 +135,18 @@ class Evaluation:
         """Differentiate the values of groups; `partials` are those of the groups that have partials."""
         motion = self.motion
         slopes = motion.slopes
-        if groups.has_jerk or any(own.qdddot is not None for own in partials):
+        if groups.has_jerk or any(
+            derivatives.qdddot is not None for derivatives in partials
+        ):
             slopes = replace(slopes, qdddot_y=motion.qdddot_y)
         states = (motion.q, motion.qdot, motion.qddot)
-        given = [(own.by_joints, own.s) for own in partials]
-        return differentiate(groups, slopes, states, given, variables)
+        arrays = [(derivatives.by_joints, derivatives.s) for derivatives in partials]
+        return differentiate(groups, slopes, states, arrays, variables)
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
         """How far the limits that count are violated, (K, their c); negative inside."""
         pairs = zip(self.limits, self.by_limit, strict=True)
-        own = [limit.violation(values) for limit, values in pairs if counts(limit)]
-        return np.concatenate([np.empty((len(self.motion.y), 0)), *own], axis=1)
+        violations = [
+            limit.violation(values) for limit, values in pairs if counts(limit)
+        ]
+        return np.concatenate([np.empty((len(self.motion.y), 0)), *violations], axis=1)

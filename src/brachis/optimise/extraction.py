@@ -33,13 +33,13 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    parts: list[_Part] = []
+    sections: list[_Section] = []
     for phase, motion in zip(program.phases, _join(program, x), strict=True):
-        before = parts[-1] if parts else None
+        before = sections[-1] if sections else None
         if before is not None and before.pause:
-            parts.append(before.wait())
-        parts.append(_Part.of(phase, motion, before))
-    splines = [part.spline for part in parts]
+            sections.append(before.wait())
+        sections.append(_Section.of(phase, motion, before))
+    splines = [section.spline for section in sections]
     knots, control_points = join_splines(splines)
     joint_map = program.phases[0].joint_map
     rows = np.empty((0, 0, 0))
@@ -47,9 +47,11 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
     if isinstance(joint_map, ChartMap):
         rows = joint_map.rows.coefficients
         chart_knots = joint_map.rows.knots
-    nodes = join_nodes([part.nodes for part in parts])
+    nodes = join_nodes([section.nodes for section in sections])
     limits = program.phases[0].limits
-    own = [limit.name for limit in limits if limit.origin.startswith("own_limits")]
+    user_limits = [
+        limit.name for limit in limits if limit.origin.startswith("own_limits")
+    ]
     return Trajectory(
         task=task,
         urdf=joint_map.robot.urdf,
@@ -64,15 +66,15 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
         knots=knots,
         degree=splines[0].degree,
         control_points=control_points,
-        phase_ends=np.cumsum([part.nodes.times[-1] for part in parts]),
+        phase_ends=np.cumsum([section.nodes.times[-1] for section in sections]),
         chart_rows=rows,
         chart_knots=chart_knots,
-        own_limits=tuple(own),
+        own_limits=tuple(user_limits),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _Section:
     """A phase of a trajectory: its curves, its nodes, and how long the arm waits after it, s."""
 
     spline: PhaseSpline
@@ -80,8 +82,8 @@ class _Part:
     pause: float = 0.0
 
     @classmethod
-    def of(cls, phase: Phase, motion: Motion, before: _Part | None) -> _Part:
-        """Extract the motion of a phase that begins in the posture in which the part before it ends."""
+    def of(cls, phase: Phase, motion: Motion, before: _Section | None) -> _Section:
+        """Extract the motion of a phase that begins in the posture in which the section before it ends."""
         joint_map = phase.joint_map
         path = joint_map.path
         assert path is not None
@@ -95,13 +97,13 @@ class _Part:
         nodes = interpolate(joint_map, motion.at, breaks, jumps=jumps)
         return cls(motion.as_spline(), nodes, phase.pause)
 
-    def wait(self) -> _Part:
-        """Wait at rest where this part ends."""
+    def wait(self) -> _Section:
+        """Wait at rest where this section ends."""
         q = np.tile(self.nodes.q[-1], (2, 1))
         still = np.zeros_like(q)
         times = np.array([0.0, self.pause])
         nodes = Nodes(times, q, still, still, still)
-        return _Part(self.spline.wait(self.pause), nodes)
+        return _Section(self.spline.wait(self.pause), nodes)
 
 
 def _join(program: Program, x: np.ndarray) -> list[Motion]:
@@ -118,10 +120,10 @@ def _join(program: Program, x: np.ndarray) -> list[Motion]:
 
 def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
     """Return a motion that begins with the curves and derivatives that a link takes from `last`, (4, c)."""
-    own = np.array(motion.at(np.zeros(1)))[:, 0]
-    given = len(phase.boundary.start[-1].derivatives)
+    orders = np.array(motion.at(np.zeros(1)))[:, 0]
+    fixed_orders = len(phase.boundary.start[-1].derivatives)
     joined = np.ix_(link.orders, link.curves)
-    own[joined] = last[joined]
-    count = 1 + max(given, *link.orders)
-    curves = [curve - phase.boundary.given for curve in link.curves]
-    return motion.with_start(own[:count, list(link.curves)], curves)
+    orders[joined] = last[joined]
+    count = 1 + max(fixed_orders, *link.orders)
+    curves = [curve - phase.boundary.law_curves for curve in link.curves]
+    return motion.with_start(orders[:count, list(link.curves)], curves)

@@ -61,7 +61,7 @@ _MORE = 1.5
 
 
 @dataclass(frozen=True)
-class Laid:
+class SplineFit:
     """Splines over some knots.
 
     Attributes
@@ -86,17 +86,17 @@ class Laid:
     @property
     def rank(self) -> tuple[float, float]:
         """Less for those that exceed limits on postures less, or where both keep them, are faster."""
-        return max(self.outside, _ENOUGH), self.needed
+        return max(self.outside, _ENOUGH), self.needed_time
 
     @property
-    def needed(self) -> float:
+    def needed_time(self) -> float:
         """Time in which the limits would hold, about, s."""
         return self.motion.t_end * (1.0 + self.violation)
 
 
 def follow(
     phase: Phase,
-    own: PhaseTiming,
+    phase_timing: PhaseTiming,
     tolerance: float,
     points: int,
     deadline: Deadline = NEVER,
@@ -107,7 +107,7 @@ def follow(
     ----------
     phase : Phase
         With another grid.
-    own : PhaseTiming
+    phase_timing : PhaseTiming
     tolerance : float
         Part of the time by which they should not be slower.
     points : int
@@ -124,7 +124,7 @@ def follow(
     violation : float
         Largest one of a limit, as a part of it; infinite if it is not known.
     """
-    timing = own.timing
+    timing = phase_timing.timing
     if timing is None:
         return None
     best = None
@@ -132,7 +132,7 @@ def follow(
     lost = _FIRST_LOSS * aim
     breaks = np.empty(0)
     for number in range(1, _MESHES + 1):
-        needed = _knots(phase, own, timing, lost, _WAITS * aim)
+        needed = _knots(phase, phase_timing, timing, lost, _WAITS * aim)
         breaks = even_out(np.union1d(breaks, needed))
         if len(breaks) > _MOST_INTERVALS:
             break
@@ -141,18 +141,18 @@ def follow(
         is_fine = 2 * len(breaks) > len(timing.times)
         is_last = number == _MESHES or is_fine or deadline.passed
         allowed = np.inf if is_last else tolerance
-        laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
-        laid = _look_at_postures(phase, laid)
-        if best is None or laid.rank < best.rank:
-            best = laid
-        is_fast = laid.slower < (aim if number < _FOR_AIM else tolerance)
-        if is_last or (is_fast and laid.outside <= _ENOUGH):
+        fit = _hold_limits(phase, phase_timing, timing, breaks, allowed, deadline)
+        fit = _look_at_postures(phase, fit)
+        if best is None or fit.rank < best.rank:
+            best = fit
+        is_fast = fit.slower < (aim if number < _FOR_AIM else tolerance)
+        if is_last or (is_fast and fit.outside <= _ENOUGH):
             break
-        lost *= np.clip(_AIM * aim / max(laid.slower, aim), *_FINER)
-        if len(laid.beyond):
-            most = _AIM * aim / len(laid.beyond)
+        lost *= np.clip(_AIM * aim / max(fit.slower, aim), *_FINER)
+        if len(fit.beyond):
+            share = _AIM * aim / len(fit.beyond)
             steps = np.diff(breaks)
-            is_over = (steps * laid.beyond > most) & (steps > 0.25 / len(timing.times))
+            is_over = (steps * fit.beyond > share) & (steps > 0.25 / len(timing.times))
             breaks = np.union1d(breaks, halfway(breaks)[is_over])
     if best is None:
         return None
@@ -161,17 +161,17 @@ def follow(
 
 
 def begin(
-    phase: Phase, own: PhaseTiming, lost: float, most: int, points: int
+    phase: Phase, phase_timing: PhaseTiming, lost: float, intervals: int, points: int
 ) -> tuple[Phase, np.ndarray] | None:
     """Lay splines along the fastest timing over few intervals; limits may be exceeded.
 
     Parameters
     ----------
-    phase, own, points
+    phase, phase_timing, points
         As of `follow`.
     lost : float
         Part of the time that the intervals may lose together.
-    most : int
+    intervals : int
         Intervals, about.
 
     Returns
@@ -180,26 +180,28 @@ def begin(
     x : (v,) ndarray
         None where the limits allow no timing.
     """
-    if own.timing is None:
+    if phase_timing.timing is None:
         return None
-    breaks = _knots(phase, own, own.timing, lost, _FIRST_WAIT, most)
-    motion, _ = _lay_splines(phase, own, own.timing, breaks)
+    breaks = _knots(
+        phase, phase_timing, phase_timing.timing, lost, _FIRST_WAIT, intervals
+    )
+    motion, _ = _lay_splines(phase, phase_timing, phase_timing.timing, breaks)
     return _as_phase(phase, motion, points)
 
 
 def _knots(
     phase: Phase,
-    own: PhaseTiming,
+    phase_timing: PhaseTiming,
     timing: Timing,
     lost: float,
     shortest: float,
-    most: int = _MOST_INTERVALS + 1,
+    max_intervals: int = _MOST_INTERVALS + 1,
 ) -> np.ndarray:
     """Choose knots, (N + 1,), over which splines follow a timing, the first and last intervals short; see `breaks_for`.
 
     The timing waits as long where accelerations vanish.
     """
-    breaks = breaks_for(own.course, timing, lost, most)
+    breaks = breaks_for(phase_timing.course, timing, lost, max_intervals)
     if max(_vanishing(phase)) > 0:
         breaks = even_out(np.union1d(breaks, [shortest, 1.0 - shortest]))
     return breaks
@@ -213,7 +215,7 @@ def _vanishing(phase: Phase) -> tuple[int, int]:
 
 
 def _lay_splines(
-    phase: Phase, own: PhaseTiming, timing: Timing, breaks: np.ndarray
+    phase: Phase, phase_timing: PhaseTiming, timing: Timing, breaks: np.ndarray
 ) -> tuple[Motion, float]:
     """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`.
 
@@ -233,7 +235,7 @@ def _lay_splines(
     moved = before + np.concatenate([ahead - before, breaks, 1.0 + behind])
     delays = (before * timing.t_end, (moved[-1] - before - 1.0) * timing.t_end)
     knots = clamped_knots(phase.degree, moved / moved[-1])
-    motion = splines_along(own.course, timing, knots, phase.degree, delays)
+    motion = splines_along(phase_timing.course, timing, knots, phase.degree, delays)
     splines = phase.boundary.splines(knots, phase.degree)
     t_end = motion.t_end
     points = [
@@ -253,28 +255,28 @@ def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndar
     return finer, finer.variables_from(motion)
 
 
-def _look_at_postures(phase: Phase, laid: Laid) -> Laid:
+def _look_at_postures(phase: Phase, fit: SplineFit) -> SplineFit:
     """Find out how far splines are outside of limits on postures, where their other limits are known."""
-    if not np.isfinite(laid.violation):
-        return laid
-    motion = laid.motion
+    if not np.isfinite(fit.violation):
+        return fit
+    motion = fit.motion
     t = spread(np.unique(motion.knots), _LOOKS[-1]) * motion.t_end
     try:
         state = phase.joint_map.state(*motion.at(t), t=t)
     except UnreachableError:
-        return replace(laid, outside=np.inf)
+        return replace(fit, outside=np.inf)
     outside = phase.posture_violation(Moments.at_rest(state.q))
-    return replace(laid, outside=outside)
+    return replace(fit, outside=outside)
 
 
 def _hold_limits(
     phase: Phase,
-    own: PhaseTiming,
+    phase_timing: PhaseTiming,
     fastest: Timing,
     breaks: np.ndarray,
     allowed: float,
     deadline: Deadline,
-) -> Laid:
+) -> SplineFit:
     """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
     limits = [
         limit
@@ -282,8 +284,8 @@ def _hold_limits(
         if limit.is_checked_at_points and limit.longer_time == "relieves"
     ]
     timing = fastest
-    motion, delay = _lay_splines(phase, own, timing, breaks)
-    best = Laid(motion)
+    motion, delay = _lay_splines(phase, phase_timing, timing, breaks)
+    best = SplineFit(motion)
     idle = 0
     looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
@@ -301,17 +303,17 @@ def _hold_limits(
         beyond = {
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }
-        largest = [each.max(axis=1) for each in beyond.values()]
+        largest = [violations.max(axis=1) for violations in beyond.values()]
         worst = np.max([np.zeros(len(t)), *largest], axis=0)
         violation = float(worst.max())
         t_timing = ((t - delay) / timing.t_end).clip(0.0, 1.0)
         if not narrower and looks < closer:
-            most = np.zeros(len(breaks) - 1)
-            _raise_to(most, locate(breaks, t_timing)[0], worst)
-        laid = Laid(motion, violation, beyond=most)
-        idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1
-        if laid.needed < best.needed:
-            best = laid
+            by_interval = np.zeros(len(breaks) - 1)
+            _raise_to(by_interval, locate(breaks, t_timing)[0], worst)
+        fit = SplineFit(motion, violation, beyond=by_interval)
+        idle = 0 if fit.needed_time < best.needed_time * (1.0 - _ENOUGH) else idle + 1
+        if fit.needed_time < best.needed_time:
+            best = fit
         slower = motion.t_end / fastest.t_end - 1.0
         if slower > allowed:
             return replace(best, slower=slower)
@@ -323,17 +325,17 @@ def _hold_limits(
             break
         factor = _MORE if narrower else 1.0
         for limit in limits:
-            more = np.where(beyond[limit] < _SMALL, factor, 1.0)
-            excess = more * beyond[limit] / limit.violation_scale
+            factors = np.where(beyond[limit] < _SMALL, factor, 1.0)
+            excess = factors * beyond[limit] / limit.violation_scale
             added = _between_stations(excess, t_timing, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
-        next_timing = own.course.solve(own.rates, narrower)
+        next_timing = phase_timing.course.solve(phase_timing.rates, narrower)
         if next_timing is None:
             return best
         breaks = _move(breaks, timing, next_timing)
         timing = next_timing
-        motion, delay = _lay_splines(phase, own, timing, breaks)
-    return replace(best, slower=best.needed / fastest.t_end - 1.0)
+        motion, delay = _lay_splines(phase, phase_timing, timing, breaks)
+    return replace(best, slower=best.needed_time / fastest.t_end - 1.0)
 
 
 def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
@@ -347,22 +349,22 @@ def _between_stations(
     values: np.ndarray, t_norm: np.ndarray, breaks: np.ndarray, timing: Timing
 ) -> np.ndarray:
     """Lay lines above values, (K, c), over the knot intervals, and take them between stations, (P - 1, c)."""
-    most = np.zeros((len(breaks) + 1, values.shape[1]))
-    _raise_to(most, np.searchsorted(breaks, t_norm, side="left"), values)
-    _raise_to(most, np.searchsorted(breaks, t_norm, side="right"), values)
-    at_breaks = np.maximum(most[1:], most[:-1])
+    by_interval = np.zeros((len(breaks) + 1, values.shape[1]))
+    _raise_to(by_interval, np.searchsorted(breaks, t_norm, side="left"), values)
+    _raise_to(by_interval, np.searchsorted(breaks, t_norm, side="right"), values)
+    at_breaks = np.maximum(by_interval[1:], by_interval[:-1])
     t = timing.times / timing.t_end
     first, fraction = locate(breaks, t)
-    part = fraction[:, None]
-    lines = (1.0 - part) * at_breaks[first] + part * at_breaks[first + 1]
-    found = np.maximum(lines[1:], lines[:-1])
-    station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(found) - 1)
-    _raise_to(found, station, at_breaks)
-    return found
+    share = fraction[:, None]
+    lines = (1.0 - share) * at_breaks[first] + share * at_breaks[first + 1]
+    between = np.maximum(lines[1:], lines[:-1])
+    station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(between) - 1)
+    _raise_to(between, station, at_breaks)
+    return between
 
 
-def _raise_to(most: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+def _raise_to(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
     """Raise rows of a table, (R, c), to the largest of the values, (K, c), that belong to them; rows, (K,), ascend."""
     first = np.flatnonzero(np.diff(rows, prepend=-1))
     largest = np.maximum.reduceat(values, first)
-    most[rows[first]] = np.maximum(most[rows[first]], largest)
+    table[rows[first]] = np.maximum(table[rows[first]], largest)

@@ -38,11 +38,11 @@ def _spaced_places(u: np.ndarray) -> list[int]:
     if len(u) == 1:
         return [0]
     least = 0.5 * float(np.median(np.diff(u)))
-    kept = [0]
+    numbers = [0]
     for number in range(1, len(u) - 1):
-        if u[number] - u[kept[-1]] >= least and u[-1] - u[number] >= least:
-            kept.append(number)
-    return [*kept, len(u) - 1]
+        if u[number] - u[numbers[-1]] >= least and u[-1] - u[number] >= least:
+            numbers.append(number)
+    return [*numbers, len(u) - 1]
 
 
 def _weights(u: np.ndarray) -> np.ndarray:
@@ -139,8 +139,8 @@ class FixedGrid:
             if self.degree < 3 and high < self.breaks[-1]:
                 inside = inside[:-1]
             u = (self.t_norm[inside] - low) / (high - low)
-            kept = _spaced_places(u)
-            row[inside[kept]] = _weights(u[kept])
+            chosen = _spaced_places(u)
+            row[inside[chosen]] = _weights(u[chosen])
         return weights
 
     def mean_weights(self, _h: np.ndarray) -> np.ndarray:

@@ -60,15 +60,15 @@ def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.
     """Take control points from the joint path."""
     t_norm = greville(phase.knots, phase.degree)
     t_end, points = _motion_along(phase, joint_path, duration, t_norm)
-    own = points[:, phase.boundary.given :]
-    return phase.variables_from(Motion(t_end, phase.knots, phase.degree, own.T))
+    values = points[:, phase.boundary.law_curves :]
+    return phase.variables_from(Motion(t_end, phase.knots, phase.degree, values.T))
 
 
 def _follow(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
     """Fit curves to the joint path."""
     t_norm = spread(phase.breaks, 4)
-    t_end, wanted = _motion_along(phase, joint_path, duration, t_norm)
-    return fit_curves(phase, t_end, t_norm, wanted)
+    t_end, targets = _motion_along(phase, joint_path, duration, t_norm)
+    return fit_curves(phase, t_end, t_norm, targets)
 
 
 def _motion_along(
@@ -92,18 +92,18 @@ def _motion_along(
         joint_path = joint_path + grid[:, None] * missing
     first, last = boundary.rates
     total = first + last
-    way = float(joint_path[-1, 0] - joint_path[0, 0])
-    part = t_norm
+    distance = float(joint_path[-1, 0] - joint_path[0, 0])
+    fraction = t_norm
     if duration is None and total == 0.0:
-        part = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+        fraction = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
     elif duration is None:
-        part = t_norm * (2.0 * first + (last - first) * t_norm) / total
-    values = interpolate_columns(part, grid, joint_path)
-    return duration or (2.0 * way / total if total else 1.0), values
+        fraction = t_norm * (2.0 * first + (last - first) * t_norm) / total
+    values = interpolate_columns(fraction, grid, joint_path)
+    return duration or (2.0 * distance / total if total else 1.0), values
 
 
 def fit_curves(
-    phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
+    phase: Phase, duration: float, t_norm: np.ndarray, targets: np.ndarray
 ) -> np.ndarray:
     """Point x whose curves come nearest to given values, by least squares; exact where the splines contain them.
 
@@ -114,7 +114,7 @@ def fit_curves(
         s.
     t_norm : (K,) ndarray
         Normalised times.
-    wanted : (K, c) ndarray
+    targets : (K, c) ndarray
         Values of the curves there; that of a curve that is given does not count.
 
     Returns
@@ -123,10 +123,10 @@ def fit_curves(
     """
     basis = basis_matrix(phase.knots, phase.degree, t_norm)
     parts = [np.array([duration])]
-    own = wanted[:, phase.boundary.given :]
-    for spline, values in zip(phase.splines, own.T, strict=True):
-        missing = values - basis @ spline.given_points(duration)
-        free = basis @ spline.free_part.matrix()
+    spline_targets = targets[:, phase.boundary.law_curves :]
+    for spline, values in zip(phase.splines, spline_targets.T, strict=True):
+        missing = values - basis @ spline.fixed_points(duration)
+        free = basis @ spline.free_matrix.dense()
         parts.append(np.linalg.lstsq(free, missing, rcond=None)[0])
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
@@ -146,8 +146,8 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     """
     return np.concatenate(
         [
-            _scale_time(phase, part, program.held_orders(number))
-            for number, (phase, part) in enumerate(program.split(x))
+            _scale_time(phase, x_of_phase, program.held_orders(number))
+            for number, (phase, x_of_phase) in enumerate(program.split(x))
         ]
     )
 
@@ -188,4 +188,7 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
 
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves, such as those of velocity, acceleration and torque."""
-    return max(phase.worst_time_scaling_ratio(part) for phase, part in program.split(x))
+    return max(
+        phase.worst_time_scaling_ratio(x_of_phase)
+        for phase, x_of_phase in program.split(x)
+    )

@@ -132,11 +132,11 @@ def improve(
         What was kept, with the reports of all solves, the one of its own last.
     """
     judge = judge or _objective
-    kept = first
-    best = judge(kept)
+    incumbent = first
+    best = judge(incumbent)
     not_completed = ""
     for change in changes:
-        proposal = None if deadline.passed else change(kept)
+        proposal = None if deadline.passed else change(incumbent)
         if proposal is None:
             break
         if isinstance(proposal, str):
@@ -145,16 +145,16 @@ def improve(
         tried = attempt(*proposal)
         value = judge(tried)
         gain = 1.0 - value / best  # not a number where neither is a motion
-        reports = (*kept.reports, *tried.reports)
-        was_usable = kept.usable
+        reports = (*incumbent.reports, *tried.reports)
+        was_usable = incumbent.usable
         if gain > least_gain or not was_usable:
-            kept = replace(tried, reports=reports)
+            incumbent = replace(tried, reports=reports)
             best = value
         else:
-            kept = replace(kept, reports=with_last(kept.report, reports))
+            incumbent = replace(incumbent, reports=with_last(incumbent.report, reports))
         if was_usable and go_on_above is not None and not gain > go_on_above:
             break
-    return replace(kept, not_completed=not_completed)
+    return replace(incumbent, not_completed=not_completed)
 
 
 def _objective(solved: SolvedProgram) -> float:
@@ -214,14 +214,14 @@ def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
         violation=residual(program, x),
         multipliers=np.zeros_like(report.multipliers),
     )
-    feasible = [own for own in (report, begun) if own.feasible]
+    feasible = [candidate for candidate in (report, begun) if candidate.feasible]
     if not feasible:
         return solved
-    fastest = min(feasible, key=lambda own: own.objective)
-    kept = replace(fastest, status=SolveStatus.ACCEPTABLE)
+    fastest = min(feasible, key=lambda candidate: candidate.objective)
+    accepted = replace(fastest, status=SolveStatus.ACCEPTABLE)
     return replace(
         solved,
-        reports=(*solved.reports[:-1], kept),
+        reports=(*solved.reports[:-1], accepted),
         not_completed="a solve ran out of time, and its motion may be far from the fastest",
     )
 
@@ -307,16 +307,16 @@ class SolverSession:
     def over_path(self, options: SolverOptions) -> SolverSession:
         """Return the session for programs over the path, under other options.
 
-        Of iterations and time the task may only allow less. Their tolerance is no matter of the task's.
+        Of iterations and time the task may only allow less. The task does not set their tolerance.
         """
         task = self.options
-        own = replace(
+        path_options = replace(
             options,
             max_iterations=min(options.max_iterations, task.max_iterations),
             time_limit=min(options.time_limit, task.time_limit),
             apart=task.apart,
         )
-        return replace(self, options=own, acceptable=1e-2)
+        return replace(self, options=path_options, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
@@ -336,13 +336,13 @@ class SolverSession:
         ) -> SolverReport:
             """Solve in the time that is left."""
             nonlocal learnt
-            own = _NEAR_OPTIONS if isinstance(problem, NearRows) else {}
+            near_options = _NEAR_OPTIONS if isinstance(problem, NearRows) else {}
             options = replace(
                 self.options,
                 time_limit=until.left,
                 progress=progress,
                 learnt=learnt,
-                **own,
+                **near_options,
             )
             report = backend.solve(problem, x, options, self.progress)
             if report.learnt is not None:

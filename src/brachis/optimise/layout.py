@@ -28,7 +28,7 @@ from brachis.limits import Limit
 from brachis.optimise.boundary import (
     Boundary,
     BoundarySpline,
-    FreePart,
+    FreeMatrix,
     SparsityPattern,
     stack_splines,
     sum_powers,
@@ -45,65 +45,65 @@ class Progress:
 
     Attributes
     ----------
-    given : (1 + k, p) ndarray
-        Given terms of the rows, by powers of the duration.
-    part : FreePart
+    fixed_terms : (1 + k, p) ndarray
+        Fixed terms of the rows, by powers of the duration.
+    matrix : FreeMatrix
         What variables of the phase add to the rows, each place once; the duration, variable 0, adds nothing.
     """
 
-    given: np.ndarray
-    part: FreePart
+    fixed_terms: np.ndarray
+    matrix: FreeMatrix
 
     @classmethod
     def none(cls) -> Progress:
         """Make no rows."""
-        return cls(np.empty((1, 0)), FreePart.of(np.empty((0, 1))))
+        return cls(np.empty((1, 0)), FreeMatrix.of(np.empty((0, 1))))
 
     @classmethod
     def of(cls, spline: BoundarySpline) -> Progress:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
-        given = np.diff(spline.given, axis=1)
-        row, variable, weight = _differences(spline.free_part)
-        by_duration = np.flatnonzero(given[1:].any(axis=0))
+        terms = np.diff(spline.fixed_terms, axis=1)
+        row, variable, weight = _differences(spline.free_matrix)
+        by_duration = np.flatnonzero(terms[1:].any(axis=0))
         none = np.zeros_like(by_duration)
         row = np.concatenate([by_duration, row])
         variable = np.concatenate([none, 1 + variable])
         weight = np.concatenate([none, weight])
-        several = np.bincount(row, minlength=given.shape[1]) > 1
-        several |= given[2:].any(axis=0)
+        several = np.bincount(row, minlength=terms.shape[1]) > 1
+        several |= terms[2:].any(axis=0)
         order = np.lexsort((variable, row))
         order = order[several[row[order]]]
         number = np.cumsum(several) - 1
         shape = (int(several.sum()), 1 + spline.free)
-        part = FreePart(number[row[order]], variable[order], weight[order], shape)
-        return cls(given[:, several], part)
+        matrix = FreeMatrix(number[row[order]], variable[order], weight[order], shape)
+        return cls(terms[:, several], matrix)
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""
-        return sum_powers(self.given, x[0]) + self.part.control_points(x)
+        return sum_powers(self.fixed_terms, x[0]) + self.matrix.control_points(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian, (z,); not to be written to."""
-        part = self.part
-        if len(self.given) == 1:
-            return part.weight
-        by_duration = sum_powers(self.given, x[0], slope=True)
-        return np.where(part.variable == 0, by_duration[part.point], part.weight)
+        matrix = self.matrix
+        if len(self.fixed_terms) == 1:
+            return matrix.weight
+        by_duration = sum_powers(self.fixed_terms, x[0], slope=True)
+        return np.where(matrix.variable == 0, by_duration[matrix.point], matrix.weight)
 
 
-def _differences(part: FreePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _differences(matrix: FreeMatrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Subtract from each row of a matrix the row before it; return row, column and value of what is not zero."""
-    rows, columns = part.shape
-    row = np.concatenate([part.point - 1, part.point])
-    column = np.tile(part.variable, 2)
-    weight = np.concatenate([part.weight, -part.weight])
+    rows, columns = matrix.shape
+    row = np.concatenate([matrix.point - 1, matrix.point])
+    column = np.tile(matrix.variable, 2)
+    weight = np.concatenate([matrix.weight, -matrix.weight])
     inside = (row >= 0) & (row < rows - 1)
     numbers = row[inside] * columns + column[inside]
     places, place = np.unique(numbers, return_inverse=True)
     values = np.bincount(place, weight[inside], len(places))
-    kept = values != 0.0
-    row, column = np.divmod(places[kept], max(columns, 1))
-    return row, column, values[kept]
+    is_entry = values != 0.0
+    row, column = np.divmod(places[is_entry], max(columns, 1))
+    return row, column, values[is_entry]
 
 
 class VariableLayout:
@@ -126,10 +126,10 @@ class VariableLayout:
         Variables of each curve.
     lengths : slice
         Variables h; empty where the knots are fixed.
-    free_part : FreePart
+    free_matrix : FreeMatrix
         Of all curves, by all variables; see `stack_splines`.
-    given : (1 + p, c (N + d)) ndarray
-        Given terms of all control points, by powers of the duration.
+    fixed_terms : (1 + p, c (N + d)) ndarray
+        Fixed terms of all control points, by powers of the duration.
     sparsity : SparsityPattern
         Where the variables of the curves matter.
     point, variable : (z,) int ndarray
@@ -164,25 +164,25 @@ class VariableLayout:
             self.x_upper[0] = time_law.duration
         elif has_path:
             self.progress = Progress.of(splines[0])
-            given, *others = splines[0].given
-            if not np.any(others):
-                self.x_lower[self.slices[0]] = given.min()
-                self.x_upper[self.slices[0]] = given.max()
+            constant, *by_powers = splines[0].fixed_terms
+            if not np.any(by_powers):
+                self.x_lower[self.slices[0]] = constant.min()
+                self.x_upper[self.slices[0]] = constant.max()
 
         points = len(grid.breaks) - 1 + grid.degree
         stacked = stack_splines(splines, self.slices, points, len(self.x_lower))
-        self.free_part, self.given = stacked
+        self.free_matrix, self.fixed_terms = stacked
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
-        own = SparsityPattern(columns, self.free_part, len(splines))
-        self.sparsity = own
+        sparsity = SparsityPattern(columns, self.free_matrix, len(splines))
+        self.sparsity = sparsity
         count = len(grid.t_norm)
         of_time = np.zeros(count, dtype=int)
         of_lengths = grid.variable + self.lengths.start
-        self.point = np.concatenate([np.arange(count), own.point, grid.point])
-        self.variable = np.concatenate([of_time, own.variable, of_lengths])
-        curve = boundary.given + own.curve
-        width = boundary.given + len(splines)
-        self.pattern = CurvePattern(own.point, curve, count, width)
+        self.point = np.concatenate([np.arange(count), sparsity.point, grid.point])
+        self.variable = np.concatenate([of_time, sparsity.variable, of_lengths])
+        curve = boundary.law_curves + sparsity.curve
+        width = boundary.law_curves + len(splines)
+        self.pattern = CurvePattern(sparsity.point, curve, count, width)
 
     def names(self, curves: Sequence[str]) -> list[str]:
         """Name the variables: ``t_end`` is the duration, ``s[3]`` control point 3 of s, ``h[0]`` a length.
@@ -196,9 +196,9 @@ class VariableLayout:
         """
         names = ["t_end"]
         for curve, spline in zip(curves, self.splines, strict=True):
-            part = spline.free_part
-            first = np.unique(part.variable, return_index=True)[1]
-            names += [f"{curve}[{point}]" for point in part.point[first]]
+            matrix = spline.free_matrix
+            first = np.unique(matrix.variable, return_index=True)[1]
+            names += [f"{curve}[{point}]" for point in matrix.point[first]]
         count = len(self.x_lower) - len(names)
         return [*names, *(f"h[{number}]" for number in range(count))]
 
@@ -235,7 +235,7 @@ class RowLayout:
             rows = first + np.arange(len(lower[-1]))
             self.of_limits.append(rows.reshape(times, len(limit.lower)))
             first += len(rows)
-        steps = variables.progress.given.shape[1]
+        steps = variables.progress.fixed_terms.shape[1]
         self.lower = np.concatenate([*lower, np.zeros(steps), grid.total])
         self.upper = np.concatenate([*upper, np.full(steps, np.inf), grid.total])
 
@@ -249,9 +249,9 @@ class RowLayout:
         pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
         h = np.arange(variables.lengths.start, variables.lengths.stop)
         first = pointwise.size
-        last = first + progress.given.shape[1]
+        last = first + progress.fixed_terms.shape[1]
         of_points = pointwise[variables.point].ravel()
         by_points = np.repeat(variables.variable, pointwise.shape[1])
-        rows = (of_points, first + progress.part.point, np.full(len(h), last))
-        columns = (by_points, progress.part.variable, h)
+        rows = (of_points, first + progress.matrix.point, np.full(len(h), last))
+        columns = (by_points, progress.matrix.variable, h)
         return np.concatenate(rows), np.concatenate(columns)

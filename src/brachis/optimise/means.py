@@ -66,11 +66,11 @@ class Means:
         total = self.values(parts)
         columns = []
         for phase, x in parts:
-            own = x[0] * _mean_slopes_of(phase, x)
-            own[:, 0] += _means_of(phase, x) - total
+            slopes = x[0] * _mean_slopes_of(phase, x)
+            slopes[:, 0] += _means_of(phase, x) - total
             if phase.pause:
-                own += phase.pause * self._slopes_at_rest(phase, x)
-            columns.append(own)
+                slopes += phase.pause * self._slopes_at_rest(phase, x)
+            columns.append(slopes)
         return np.hstack(columns) / _end_time(parts)
 
     def curvature(self, parts: Parts, weights: np.ndarray) -> np.ndarray:
@@ -81,9 +81,9 @@ class Means:
         ends = np.cumsum([0, *(len(x) for _, x in parts)])
         total = np.zeros((ends[-1], ends[-1]))
         for (phase, x), first in zip(parts, ends, strict=False):
-            own = slice(first, first + len(x))
+            block = slice(first, first + len(x))
             share = x[0] / _end_time(parts)
-            total[own, own] = share * _curvature_of(phase, x, weights)
+            total[block, block] = share * _curvature_of(phase, x, weights)
         return total
 
     def violation(self, parts: Parts) -> float:
@@ -91,8 +91,8 @@ class Means:
         ends = np.cumsum([len(limit.lower) for limit in self.limits])
         values = np.split(self.values(parts), ends[:-1])
         pairs = zip(self.limits, values, strict=False)
-        found = [limit.violation(own[None]).max() for limit, own in pairs]
-        return float(max(found, default=-np.inf))
+        violations = [limit.violation(means[None]).max() for limit, means in pairs]
+        return float(max(violations, default=-np.inf))
 
     def _values_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Values while the arm waits at the phase's end, (m,)."""

@@ -73,7 +73,7 @@ def solve_by_levels(
         """Write a motion over the knots of a level."""
         pairs = zip(solved.program.phases, level.phases, strict=True)
         # The solved program may have another branch margin.
-        phases = [own.with_knots(fine.knots, fine.t_norm) for own, fine in pairs]
+        phases = [phase.with_knots(fine.knots, fine.t_norm) for phase, fine in pairs]
         return _transfer(solved, phases)
 
     finer = (
@@ -102,12 +102,12 @@ def _transfer(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    counts = [own.intervals / _FEW_INTERVALS for own in program.phases]
+    counts = [phase.intervals / _FEW_INTERVALS for phase in program.phases]
     halvings = [int(np.log2(max(count, 1.0))) for count in counts]
     for k in range(max(halvings), 0, -1):
         pairs = zip(program.phases, halvings, strict=True)
         yield program.with_phases(
-            _thin_out(own, 2 ** min(k, most)) for own, most in pairs
+            _thin_out(phase, 2 ** min(k, max_halvings)) for phase, max_halvings in pairs
         )
     yield program
 
@@ -170,7 +170,7 @@ def refine_mesh(
             return None
         if deadline.passed:
             return _COARSER
-        allowed = [np.diff(own.breaks) >= 2.0 * shortest for own in program.phases]
+        allowed = [np.diff(phase.breaks) >= 2.0 * shortest for phase in program.phases]
         chosen = allowed if is_settled else _choose_intervals(solved, allowed)
         pairs = zip(program.phases, chosen, strict=True)
         points = spline.points_per_interval
@@ -195,10 +195,10 @@ def _choose_intervals(
     mask = np.concatenate(allowed)
     lost = np.concatenate(losses) * mask
     order = np.argsort(-lost, kind="stable")
-    most = np.searchsorted(np.cumsum(lost[order]), 0.6 * lost.sum()) + 1
+    count = np.searchsorted(np.cumsum(lost[order]), 0.6 * lost.sum()) + 1
     chosen = np.zeros(len(lost), dtype=bool)
-    chosen[order[:most]] = True
-    ends = np.cumsum([len(own) for own in allowed])
+    chosen[order[:count]] = True
+    ends = np.cumsum([len(is_allowed) for is_allowed in allowed])
     return np.split(chosen & mask, ends[:-1])
 
 
@@ -257,8 +257,8 @@ def optimise_knots(
     SolvedProgram
         With knots fixed where they are best; the given program if moving them led to no motion within the limits.
     """
-    most = max(phase.intervals for phase in solved.program.phases)
-    shortest = max(shortest, _SHORTEST * most)
+    intervals = max(phase.intervals for phase in solved.program.phases)
+    shortest = max(shortest, _SHORTEST * intervals)
 
     def free_knots(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
         """Make the interval lengths variables."""

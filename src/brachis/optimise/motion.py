@@ -25,7 +25,7 @@ _SAMPLES = 20
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
     """Value and derivatives per second, from those per unit of normalised time."""
-    return tuple(part / t_end**order for order, part in enumerate(orders))
+    return tuple(values / t_end**order for order, values in enumerate(orders))
 
 
 def sample_law(time_law: TimeLaw, t_norm: np.ndarray) -> np.ndarray:
@@ -79,8 +79,8 @@ class Motion(PhaseSpline):
         basis = LocalBasis.of(self.knots, self.degree, t_norm)
         orders = basis.curves(self.control_points)
         if self.time_law is not None:
-            given = sample_law(self.time_law, t_norm)
-            orders = np.concatenate([given, orders], axis=2)
+            law_orders = sample_law(self.time_law, t_norm)
+            orders = np.concatenate([law_orders, orders], axis=2)
         return per_second(orders, self.t_end)
 
     def with_knots(self, knots: np.ndarray) -> Motion:
@@ -119,8 +119,8 @@ class Motion(PhaseSpline):
             return PhaseSpline(self.t_end, self.knots, self.degree, self.control_points)
         from scipy.interpolate import make_interp_spline
 
-        own = law.spline.t / self.t_end
-        breaks = np.union1d(np.unique(self.knots), np.clip(own, 0.0, 1.0))
+        law_knots = law.spline.t / self.t_end
+        breaks = np.union1d(np.unique(self.knots), np.clip(law_knots, 0.0, 1.0))
         breaks = drop_near(breaks, tolerances.PATH)
         for _ in range(12):
             knots = clamped_knots(self.degree, breaks)
@@ -129,12 +129,12 @@ class Motion(PhaseSpline):
             points = make_interp_spline(places, s, k=self.degree, t=knots).c
             t_norm = spread(breaks, _LOOKS)
             basis = LocalBasis.of(knots, self.degree, t_norm)
-            found = basis.curves(points[None])[0, :, 0]
-            miss = np.abs(found - law.at(t_norm * self.t_end)[0])
+            spline_s = basis.curves(points[None])[0, :, 0]
+            miss = np.abs(spline_s - law.at(t_norm * self.t_end)[0])
             worst = miss[:-1].reshape(-1, _LOOKS).max(axis=1)
             if worst.max() < _S_MISS:
-                others = self.with_knots(knots).control_points
-                both = np.vstack([points, others])
+                other_points = self.with_knots(knots).control_points
+                both = np.vstack([points, other_points])
                 return PhaseSpline(self.t_end, knots, self.degree, both)
             middles = 0.5 * (breaks[:-1] + breaks[1:])
             breaks = np.union1d(breaks, middles[worst >= _S_MISS])

@@ -50,28 +50,30 @@ class NearRows:
     Parameters
     ----------
     program : Problem
-    kept : (c',) int ndarray
+    numbers : (c',) int ndarray
         Indices of the rows to keep, ascending.
     """
 
-    def __init__(self, program: Problem, kept: np.ndarray) -> None:
+    def __init__(self, program: Problem, numbers: np.ndarray) -> None:
         self._program = program
-        self._kept = kept
-        is_kept = np.zeros(len(program.lower), dtype=bool)
-        is_kept[kept] = True
-        self._entries = np.flatnonzero(is_kept[program.jacobian_rows])
+        self._numbers = numbers
+        is_near = np.zeros(len(program.lower), dtype=bool)
+        is_near[numbers] = True
+        self._entries = np.flatnonzero(is_near[program.jacobian_rows])
         self.x_lower = program.x_lower
         self.x_upper = program.x_upper
-        self.lower = program.lower[kept]
-        self.upper = program.upper[kept]
-        self.jacobian_rows = np.searchsorted(kept, program.jacobian_rows[self._entries])
+        self.lower = program.lower[numbers]
+        self.upper = program.upper[numbers]
+        self.jacobian_rows = np.searchsorted(
+            numbers, program.jacobian_rows[self._entries]
+        )
         self.jacobian_columns = program.jacobian_columns[self._entries]
         self.objective = program.objective
         self.gradient = program.gradient
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows that are left."""
-        return self._program.rows(x)[self._kept]
+        return self._program.rows(x)[self._numbers]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian that are left."""
@@ -79,19 +81,19 @@ class NearRows:
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
         """Return what the program knows of its Hessian; multipliers of the rows that are left out are zero."""
-        whole = self._program.curvature(x)
-        if whole is None:
+        curvature = self._program.curvature(x)
+        if curvature is None:
             return None
 
         def find_hessian(
             x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
         ) -> np.ndarray:
             """Return the known part by the multipliers of the rows that are left."""
-            every = np.zeros_like(whole.multipliers)
-            every[self._kept] = multipliers
-            return whole.hessian(x, objective_multiplier, every)
+            every = np.zeros_like(curvature.multipliers)
+            every[self._numbers] = multipliers
+            return curvature.hessian(x, objective_multiplier, every)
 
-        return Curvature(find_hessian, whole.multipliers[self._kept])
+        return Curvature(find_hessian, curvature.multipliers[self._numbers])
 
 
 def solve_near_rows(
@@ -119,37 +121,37 @@ def solve_near_rows(
     is_curved = program.curvature(x) is not None
     needed = _ROWS_IF_CURVED if is_curved else _ROWS_A_VARIABLE
     holding = np.count_nonzero(slack < _AT_BOUND)
-    kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
-    if holding < needed * len(x) or len(kept) > _MOST_KEPT * len(slack):
+    numbers = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
+    if holding < needed * len(x) or len(numbers) > _MOST_KEPT * len(slack):
         return solve(program, x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
-        report = solve(NearRows(program, kept), x)
+        report = solve(NearRows(program, numbers), x)
         reports.append(report)
         slack = row_slack(program, report.x)
-        missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
+        missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), numbers)
         # With all rows the solve would use up time and iterations too.
         is_over = report.status in _FINAL
         if is_over or (report.status.usable and not len(missing)):
-            return _complete(program, kept, reports)
+            return _complete(program, numbers, reports)
         if not report.status.usable or slack.min() < -_LAST_VIOLATION:
             break
-        kept = np.union1d(kept, np.flatnonzero(slack < _NEAR))
+        numbers = np.union1d(numbers, np.flatnonzero(slack < _NEAR))
         x = report.x
     return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
 
 
 def _complete(
-    program: Problem, kept: np.ndarray, reports: Sequence[SolverReport]
+    program: Problem, numbers: np.ndarray, reports: Sequence[SolverReport]
 ) -> SolverReport:
-    """Combine the reports; the last solve had the rows `kept`."""
+    """Combine the reports; the last solve had the rows with these numbers."""
     last = reports[-1]
     multipliers = np.zeros(len(program.lower))
-    multipliers[kept] = last.multipliers
+    multipliers[numbers] = last.multipliers
     return replace(
         last,
         violation=residual(program, last.x),
         multipliers=multipliers,
-        iterations=sum(own.iterations for own in reports),
-        wall_time=sum(own.wall_time for own in reports),
+        iterations=sum(report.iterations for report in reports),
+        wall_time=sum(report.wall_time for report in reports),
     )

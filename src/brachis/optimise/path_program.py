@@ -61,7 +61,7 @@ def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
 
 
 def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
-    """Stand still in postures along curves, (S, c); raise UnreachableError where there is none."""
+    """Stand still in postures along curves, (S, c); raise UnreachableError where the joint map has no posture."""
     q = phase.joint_map.postures(curves)
     if not np.isfinite(q).all():
         raise UnreachableError("the joint path leaves the joint map")
@@ -75,7 +75,7 @@ class PathPhase:
     ----------
     phase : Phase
         Along a path, with limits up to the second order.
-    own : PhaseTiming
+    phase_timing : PhaseTiming
         From which the solve begins.
     intervals, stations : int
         Of the splines, and between the stations; both are as long in time.
@@ -96,22 +96,22 @@ class PathPhase:
     def __init__(
         self,
         phase: Phase,
-        own: PhaseTiming,
+        phase_timing: PhaseTiming,
         intervals: int,
         stations: int,
     ) -> None:
-        timing = own.timing
+        timing = phase_timing.timing
         assert timing is not None and phase.joint_map.path is not None
         self.phase = phase
         t = np.linspace(0.0, timing.t_end, _SAMPLES * intervals + 1)
-        curves = own.course.curves(timing, t)[0]
+        curves = phase_timing.course.curves(timing, t)[0]
         ascends = np.append(True, np.diff(curves[:, 0]) > _SHORTEST)
         t = t[ascends]
         curves = curves[ascends]
-        along = curves[:, 0]
+        s = curves[:, 0]
         evenly = np.linspace(0.0, timing.t_end, stations + 1)
-        s = np.interp(evenly, t, along)
-        self._s = _with_pieces(s, phase.joint_map.path.breaks)
+        even_s = np.interp(evenly, t, s)
+        self._s = _with_pieces(even_s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
         # Where limits hold: the interval between stations, and the part of it that is ahead.
         inner = np.full(len(self._steps), 0.5)
@@ -120,15 +120,15 @@ class PathPhase:
         behind = self._ahead[:, 0] * self._steps[self._number]
         self._places = self._s[self._number + 1] - behind
         law = phase.time_law
-        rates = own.course.curves(timing, np.interp(self._s, along, t))[1][:, 0]
+        rates = phase_timing.course.curves(timing, np.interp(self._s, s, t))[1][:, 0]
         squares = (rates if law is None else follow_law(law, self._s)[1]) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
         edges = np.linspace(0.0, timing.t_end, intervals + 1)
-        self.breaks = np.interp(edges, t, along)
+        self.breaks = np.interp(edges, t, s)
         self._knots = np.pad(self.breaks, _DEGREE, mode="edge")
         self._basis = self._basis_at(self._places)
         self._count = intervals + _DEGREE
-        matrix = basis_matrix(self._knots, _DEGREE, along)
+        matrix = basis_matrix(self._knots, _DEGREE, s)
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
         self.curves_count = len(points)
         self.ends = float(self.breaks[0]), float(self.breaks[-1])
@@ -154,8 +154,8 @@ class PathPhase:
         of_curves = (len(self._s) + curves * self._count)[:, None, None] + columns
         variable = np.concatenate([self._number, self._number + 1, of_curves.ravel()])
         every = np.arange(places)
-        of_each = np.repeat(every, columns.shape[1])
-        points = np.tile(of_each, self.curves_count)
+        place = np.repeat(every, columns.shape[1])
+        points = np.tile(place, self.curves_count)
         of_curve = np.repeat(curves + 1, columns.size)
         self._pattern = CurvePattern(points, of_curve, places, 1 + self.curves_count)
         rows = np.arange(places * values).reshape(places, values)
@@ -176,21 +176,21 @@ class PathPhase:
         """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
         count = len(self._s)
         self.start = np.concatenate([squares / self._units, points.ravel()])
-        is_given = np.zeros(len(self.start), dtype=bool)
-        is_given[[0, count - 1]] = True
+        is_fixed = np.zeros(len(self.start), dtype=bool)
+        is_fixed[[0, count - 1]] = True
         boundary = self.phase.boundary
         if boundary.time_law is not None:
-            is_given[:count] = True
+            is_fixed[:count] = True
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
             for j, condition in enumerate(conditions[1:]):
                 if np.isfinite(condition.value):
                     place = self.place_of(j, end)
                     self.start[place] = condition.value
-                    is_given[place] = True
+                    is_fixed[place] = True
         lower = np.full(len(self.start), -np.inf)
         lower[:count] = _SLOWEST
-        self.x_lower = np.where(is_given, self.start, lower)
-        self.x_upper = np.where(is_given, self.start, np.inf)
+        self.x_lower = np.where(is_fixed, self.start, lower)
+        self.x_upper = np.where(is_fixed, self.start, np.inf)
 
     def _begin_within_limits(self) -> None:
         """Begin with the fastest timing of the splines over these stations, if there is one."""
@@ -207,8 +207,8 @@ class PathPhase:
         if timing is None:
             return
         y, rates = timed.curves(timing, timing.times)
-        found = np.interp(self._s, y[:, 0], rates[:, 0] ** 2) / self._units
-        inner = np.maximum(found[1:-1], _SLOWEST)
+        timed_squares = np.interp(self._s, y[:, 0], rates[:, 0] ** 2) / self._units
+        inner = np.maximum(timed_squares[1:-1], _SLOWEST)
         self.start[1 : len(self._s) - 1] = inner
 
     def place_of(self, curve: int, end: int) -> int:
@@ -228,8 +228,8 @@ class PathPhase:
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Curves and two derivatives by s, (3, L, c), and X and u, (L, 1), at the L places where limits hold."""
         squares, points = self._split(x)
-        own = self._basis.curves(points)[:3]
-        curves = np.concatenate([self._of_s, own], axis=2)
+        redundant = self._basis.curves(points)[:3]
+        curves = np.concatenate([self._of_s, redundant], axis=2)
         number = self._number
         square = squares[number + 1, None]
         square = square + self._ahead * (squares[number, None] - square)
@@ -237,7 +237,7 @@ class PathPhase:
         return curves, square, u[:, None]
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Joint motion and limits where these hold; raises UnreachableError where there is none."""
+        """Joint motion and limits where these hold; raises UnreachableError where the joint map has no posture."""
         return self._evaluate(x)[1]
 
     def _evaluate_anew(self, x: np.ndarray) -> _Evaluated:
@@ -261,8 +261,8 @@ class PathPhase:
         for columns, limit in self._posture_limits():
             violation = limit.violation(limit.values(motion)).max(axis=0)
             worst = max(worst, float(violation.max()))
-            more = np.where(violation > _SMALL, _MORE * violation, 0.0)
-            self._narrow(columns, more / limit.violation_scale)
+            excess = np.where(violation > _SMALL, _MORE * violation, 0.0)
+            self._narrow(columns, excess / limit.violation_scale)
         return worst
 
     def _posture_limits(self) -> Iterator[tuple[slice, Limit]]:
@@ -278,12 +278,12 @@ class PathPhase:
         """Move both bounds of some values inwards, (c,), beside an end with a given posture by less."""
         number = np.arange(float(len(self._places)))
         ends = self.phase.boundary.start, self.phase.boundary.end
-        part = np.ones_like(number)
+        share = np.ones_like(number)
         for away, conditions in zip((number, number[::-1]), ends, strict=True):
             if any(np.isfinite(condition.value) for condition in conditions[1:]):
-                part = np.minimum(part, away / _RAMP)
-        self._bounds[0, :, columns] += part[:, None] * by
-        self._bounds[1, :, columns] -= part[:, None] * by
+                share = np.minimum(share, away / _RAMP)
+        self._bounds[0, :, columns] += share[:, None] * by
+        self._bounds[1, :, columns] -= share[:, None] * by
 
     @property
     def lower(self) -> np.ndarray:
@@ -324,8 +324,8 @@ class PathPhase:
         by_squares[:, 2] = self._by_square * y_dds + self._by_step * y_ds
         value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
-        own = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
-        variables = VariableSlopes(by_squares, self._pattern, own)
+        by_points = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
+        variables = VariableSlopes(by_squares, self._pattern, by_points)
         return evaluation.differentiate(variables)[1].ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
@@ -377,10 +377,10 @@ class PathProgram(PhaseSequence[PathPhase]):
         row = 0
         rows = []
         columns = []
-        for own, column in zip(self.phases, first, strict=True):
-            rows.append(own.jacobian_rows + row)
-            columns.append(own.jacobian_columns + column)
-            row += len(own.lower)
+        for phase, column in zip(self.phases, first, strict=True):
+            rows.append(phase.jacobian_rows + row)
+            columns.append(phase.jacobian_columns + column)
+            row += len(phase.lower)
         numbers = row + np.arange(len(self._pairs))
         self.jacobian_rows = np.concatenate([*rows, np.repeat(numbers, 2)])
         self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
@@ -389,54 +389,61 @@ class PathProgram(PhaseSequence[PathPhase]):
     def lower(self) -> np.ndarray:
         """Lower bounds of the rows, (c,)."""
         joined = np.zeros(len(self._pairs))
-        return np.concatenate([*(own.lower for own in self.phases), joined])
+        return np.concatenate([*(phase.lower for phase in self.phases), joined])
 
     @property
     def upper(self) -> np.ndarray:
         """Upper bounds of the rows, (c,)."""
         joined = np.zeros(len(self._pairs))
-        return np.concatenate([*(own.upper for own in self.phases), joined])
+        return np.concatenate([*(phase.upper for phase in self.phases), joined])
 
     def narrow(self, x: np.ndarray) -> float:
         """Narrow limits on postures of all phases; see `PathPhase.narrow`."""
-        return max(own.narrow(part) for own, part in self.split(x))
+        return max(phase.narrow(x_of_phase) for phase, x_of_phase in self.split(x))
 
     def objective(self, x: np.ndarray) -> float:
         """Time of all phases, s."""
-        return sum(phase.time(part) for phase, part in self.split(x))
+        return sum(phase.time(x_of_phase) for phase, x_of_phase in self.split(x))
 
     end_time = objective
     free_time = objective
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the time, (v,)."""
-        return np.concatenate([own.gradient(part) for own, part in self.split(x)])
+        return np.concatenate(
+            [phase.gradient(x_of_phase) for phase, x_of_phase in self.split(x)]
+        )
 
     def curvature(self, _x: np.ndarray) -> None:
         """Nothing of the Hessian is known."""
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows, (c,); raises UnreachableError where there are none."""
+        """Values of the rows, (c,); raises UnreachableError where the joint map has no posture."""
         before, after = x[self._pairs].T
-        rows = [own.rows(part) for own, part in self.split(x)]
+        rows = [phase.rows(x_of_phase) for phase, x_of_phase in self.split(x)]
         return np.concatenate([*rows, before - after])
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,); raises as `rows` does."""
-        entries = [own.jacobian(part) for own, part in self.split(x)]
+        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in self.split(x)]
         return np.concatenate([*entries, np.tile([1.0, -1.0], len(self._pairs))])
 
     def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Take s and the redundant curves of all phases at many places, (S, c) each."""
-        return tuple(own.curves(part) for own, part in self.split(x))
+        return tuple(phase.curves(x_of_phase) for phase, x_of_phase in self.split(x))
 
     def timings(
         self, x: np.ndarray, places: int, *, is_rough: bool
     ) -> tuple[PhaseTiming, ...]:
         """Time the joint paths of all phases anew, as `PhaseTiming.along` does."""
-        courses = [partial(own.course, part) for own, part in self.split(x)]
+        courses = [
+            partial(path_phase.course, x_of_phase)
+            for path_phase, x_of_phase in self.split(x)
+        ]
         pairs = zip(self.phases, courses, strict=True)
         return tuple(
-            PhaseTiming.along(own.phase, course, own.ends, places, is_rough=is_rough)
-            for own, course in pairs
+            PhaseTiming.along(
+                path_phase.phase, course, path_phase.ends, places, is_rough=is_rough
+            )
+            for path_phase, course in pairs
         )

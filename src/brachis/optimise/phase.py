@@ -131,8 +131,8 @@ class Phase:
         boundary = boundary or self.boundary
         has_path = self.joint_map.path is not None
         layout = VariableLayout(grid, boundary, has_path=has_path, splines=splines)
-        given = (self.joint_map, self.limits, grid, boundary)
-        return Phase(*given, margin=None, pause=self.pause, layout=layout)
+        arguments = (self.joint_map, self.limits, grid, boundary)
+        return Phase(*arguments, margin=None, pause=self.pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
@@ -163,8 +163,8 @@ class Phase:
 
     def with_limits(self, limits: Sequence[Limit]) -> Phase:
         """Return the same phase with other limits, safeguards included; x keeps its meaning."""
-        given = (self.joint_map, limits, self.grid, self.boundary)
-        return Phase(*given, margin=None, pause=self.pause, layout=self._layout)
+        arguments = (self.joint_map, limits, self.grid, self.boundary)
+        return Phase(*arguments, margin=None, pause=self.pause, layout=self._layout)
 
     def limits_near(self, curves: np.ndarray) -> list[Limit]:
         """Return what matters of the limits while the motion stays close to curves, (S, c); see `Limit.restrict_to`."""
@@ -188,8 +188,10 @@ class Phase:
 
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""
-        own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
-        return self.with_limits([*own, *build_branch_margins(self.joint_map, margin)])
+        limits = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
+        return self.with_limits(
+            [*limits, *build_branch_margins(self.joint_map, margin)]
+        )
 
     @property
     def jacobian_rows(self) -> np.ndarray:
@@ -204,7 +206,9 @@ class Phase:
     @property
     def names(self) -> list[str]:
         """Names of the variables; see `VariableLayout.names`."""
-        return self._layout.names(self.joint_map.curve_names[self.boundary.given :])
+        return self._layout.names(
+            self.joint_map.curve_names[self.boundary.law_curves :]
+        )
 
     @property
     def lengths(self) -> slice:
@@ -233,8 +237,8 @@ class Phase:
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
         layout = self._layout
-        free = layout.free_part.control_points(x)
-        points = free + sum_powers(layout.given, x[0])
+        free = layout.free_matrix.control_points(x)
+        points = free + sum_powers(layout.fixed_terms, x[0])
         return points.reshape(self._points_shape)
 
     def _orders(
@@ -245,12 +249,12 @@ class Phase:
         With `is_slope` the control points are those of slopes, and that of a curve that is given is zero.
         """
         h = self._h(x)
-        own = self.grid.basis(h).curves(control_points)
+        orders = self.grid.basis(h).curves(control_points)
         if self.time_law is None:
-            return own
-        given = sample_law(self.time_law, self.grid.t_norm_at(h))
+            return orders
+        law_orders = sample_law(self.time_law, self.grid.t_norm_at(h))
         factor = 0.0 if is_slope else 1.0
-        return np.concatenate([factor * given, own], axis=2)
+        return np.concatenate([factor * law_orders, orders], axis=2)
 
     def with_time_scaled(
         self, x: np.ndarray, factor: float, held: tuple[int, int] = (0, 0)
@@ -281,7 +285,7 @@ class Phase:
                 for end, order in enumerate(held)
             ]
             change = BoundarySpline.between(motion.knots, self.degree, *sides)
-            points[j] += change.given_points(motion.t_end)
+            points[j] += change.fixed_points(motion.t_end)
         return self.variables_from(replace(motion, control_points=points))
 
     def variables_from(self, motion: Motion) -> np.ndarray:
@@ -314,17 +318,23 @@ class Phase:
         """Values of the rows, (c,); raises UnreachableError as `evaluate` does."""
         evaluation = self.evaluate(x)
         pairs = zip(self.limits, evaluation.by_limit, strict=True)
-        values = [own.ravel() for limit, own in pairs if not limit.guarantee.is_mean]
+        values = [
+            limit_values.ravel()
+            for limit, limit_values in pairs
+            if not limit.guarantee.is_mean
+        ]
         totals = np.full(len(self.grid.total), self._h(x).sum())
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
-        return any(own is limit for own in self.limits)
+        return any(candidate is limit for candidate in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c); none, (0, c), where its means are held."""
-        number = next(i for i, own in enumerate(self.limits) if own is limit)
+        number = next(
+            i for i, candidate in enumerate(self.limits) if candidate is limit
+        )
         return self._rows.of_limits[number]
 
     def mean_weights(self, x: np.ndarray) -> np.ndarray:
@@ -369,9 +379,9 @@ class Phase:
 
     def posture_violation(self, motion: JointStates) -> float:
         """Largest violation of the limits on postures alone, along a motion; 0 without such limits."""
-        own = [limit for limit in self.limits if limit.is_of_postures]
-        found = [limit.violation(limit.values(motion)).max() for limit in own]
-        return float(max(found, default=0.0))
+        limits = [limit for limit in self.limits if limit.is_of_postures]
+        violations = [limit.violation(limit.values(motion)).max() for limit in limits]
+        return float(max(violations, default=0.0))
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
@@ -379,8 +389,8 @@ class Phase:
         is_mean = self.evaluator.is_mean
         if is_mean.any():
             slopes = slopes[:, ~is_mean]
-        rest = (self._layout.progress.jacobian(x), np.ones(len(self.grid.lower)))
-        return np.concatenate([slopes.ravel(), *rest])
+        entries = (self._layout.progress.jacobian(x), np.ones(len(self.grid.lower)))
+        return np.concatenate([slopes.ravel(), *entries])
 
     def limit_slopes(self, x: np.ndarray) -> np.ndarray:
         """Slopes of all limits' values by the variables, (z, c); kept, and raises, as `evaluate`."""
@@ -465,7 +475,7 @@ class Phase:
         if not len(self.grid.point):
             return entries
         by_h = self.grid.slopes(self._h(x), self._control_points(x))[:orders]
-        together = np.concatenate(by[..., self.boundary.given :], axis=2)
+        together = np.concatenate(by[..., self.boundary.law_curves :], axis=2)
         of_lengths = (
             together[self.grid.point] @ np.hstack(per_second(by_h, x[0]))[:, :, None]
         )
@@ -475,10 +485,10 @@ class Phase:
         """Slopes of the curves and their time derivatives by T, (4, K, c): a longer time slows them down."""
         rates = -_EACH_ORDER / x[0]
         slower = np.array(self.state(x).curves) * rates[:, None, None]
-        given = self._layout.given
-        if len(given) == 1:
+        terms = self._layout.fixed_terms
+        if len(terms) == 1:
             return slower
-        points = sum_powers(given, x[0], slope=True).reshape(self._points_shape)
+        points = sum_powers(terms, x[0], slope=True).reshape(self._points_shape)
         moving = per_second(self._orders(x, points, is_slope=True), x[0])
         return np.array(moving) + slower
 

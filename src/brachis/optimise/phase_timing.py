@@ -47,21 +47,21 @@ class PhaseTiming:
         Of the path's length at both ends, 1/s.
     timing : Timing or None
         None where the limits allow none, not even the motion's own, within rounding.
-    given : float or None
+    fixed_duration : float or None
         Duration where it is given, s.
     """
 
     course: TimedCourse
     rates: tuple[float, float]
     timing: Timing | None
-    given: float | None = None
+    fixed_duration: float | None = None
 
     @property
     def t_end(self) -> float:
         """Duration, s; infinite without a timing."""
         if self.timing is None:
             return np.inf
-        return self.timing.t_end if self.given is None else self.given
+        return self.timing.t_end if self.fixed_duration is None else self.fixed_duration
 
     @classmethod
     def of(cls, phase: Phase, x: np.ndarray) -> PhaseTiming | None:
@@ -133,9 +133,9 @@ class PhaseTiming:
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
         timing = course.solve(by_length, agreement=_ROUGH_AGREEMENT)
         law = phase.time_law
-        given = None if law is None else law.duration
+        duration = None if law is None else law.duration
         if timing is None or is_rough:
-            return cls(course, by_length, timing, given)
+            return cls(course, by_length, timing, duration)
         # Stations where the motion takes its time.
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
@@ -146,7 +146,7 @@ class PhaseTiming:
         def time_at(s: np.ndarray) -> PhaseTiming:
             """Time the course at path coordinates, (S,)."""
             course, by_length = lay(s, (passed, ydot[:, 0]))
-            return cls(course, by_length, course.solve(by_length), given)
+            return cls(course, by_length, course.solve(by_length), duration)
 
         return _resolve_ramps(time_at, s)
 
@@ -171,20 +171,20 @@ def _resolve_ramps(
 ) -> PhaseTiming:
     """Time a joint path at stations, (P,), and at others where the timing switches within a step."""
     for _ in range(_TIMINGS):
-        own = time_at(stations)
-        timing = own.timing
+        phase_timing = time_at(stations)
+        timing = phase_timing.timing
         if timing is None:
             break
         jumps = np.pad(np.abs(np.diff(timing.acceleration)), 1)
         change = np.maximum(jumps[1:], jumps[:-1])
         fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
         lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
-        most = _LOSS_OF_SWITCHES / len(lost)
-        if lost.sum() <= most:
+        allowed = _LOSS_OF_SWITCHES / len(lost)
+        if lost.sum() <= allowed:
             break
-        parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * most))).clip(1, _MOST_PARTS)
-        stations = spread(own.course.places, parts.astype(int))
-    return own
+        parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * allowed))).clip(1, _MOST_PARTS)
+        stations = spread(phase_timing.course.places, parts.astype(int))
+    return phase_timing
 
 
 def _lay_finely(

@@ -102,7 +102,7 @@ class Link:
 
 def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
     """Value and time derivatives of all curves at a collocation point, (4, c)."""
-    return np.array([own[point] for own in phase.state(x).curves])
+    return np.array([curves[point] for curves in phase.state(x).curves])
 
 
 class _HasVariables(Protocol):
@@ -136,16 +136,16 @@ class PhaseSequence(Generic[_Phase]):
 
     def __init__(self, phases: Iterable[_Phase]) -> None:
         self.phases = tuple(phases)
-        first = np.cumsum([0, *(len(own.x_lower) for own in self.phases)]).tolist()
+        first = np.cumsum([0, *(len(phase.x_lower) for phase in self.phases)]).tolist()
         self.first_variables = first[:-1]
-        self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
+        self._blocks = [slice(a, b) for a, b in itertools.pairwise(first)]
         self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
 
     def split(self, x: np.ndarray) -> list[tuple[_Phase, np.ndarray]]:
         """Every phase, and its part of x."""
-        pairs = zip(self.phases, self._parts, strict=True)
-        return [(phase, x[part]) for phase, part in pairs]
+        pairs = zip(self.phases, self._blocks, strict=True)
+        return [(phase, x[block]) for phase, block in pairs]
 
     def safeguard_slack(self, x: np.ndarray) -> float:
         """Smallest distance of a safeguard from its bound; infinite without safeguards.
@@ -155,9 +155,9 @@ class PhaseSequence(Generic[_Phase]):
         UnreachableError
             A collocation point is out of the branch's reach.
         """
-        states = [phase.evaluate(part) for phase, part in self.split(x)]
+        states = [phase.evaluate(x_of_phase) for phase, x_of_phase in self.split(x)]
         violations = [state.violation(is_safeguard) for state in states]
-        return -float(max(own.max(initial=-np.inf) for own in violations))
+        return -float(max(violation.max(initial=-np.inf) for violation in violations))
 
 
 class Program(PhaseSequence[Phase], Summary):
@@ -208,9 +208,9 @@ class Program(PhaseSequence[Phase], Summary):
         blocks: tuple[Phase | Means, ...] = (*self.phases, self.means)
         sizes = [link.size for link in self.links]
         joined = np.zeros(sum(sizes))
-        self.lower = np.concatenate([*(own.lower for own in blocks), joined])
-        self.upper = np.concatenate([*(own.upper for own in blocks), joined])
-        heights = [*(len(own.lower) for own in blocks), *sizes]
+        self.lower = np.concatenate([*(block.lower for block in blocks), joined])
+        self.upper = np.concatenate([*(block.upper for block in blocks), joined])
+        heights = [*(len(block.lower) for block in blocks), *sizes]
         self._first_rows = np.cumsum([0, *heights]).tolist()
         first_mean = self._first_rows[len(self.phases)]
         self._mean_rows = slice(first_mean, first_mean + len(self.means))
@@ -275,15 +275,19 @@ class Program(PhaseSequence[Phase], Summary):
     def free_time(self, x: np.ndarray) -> float:
         """Sum of the durations that are not given, s."""
         return float(
-            sum(part[0] for phase, part in self.split(x) if phase.time_law is None)
+            sum(
+                x_of_phase[0]
+                for phase, x_of_phase in self.split(x)
+                if phase.time_law is None
+            )
         )
 
     def with_time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
         """Return the same motion, every phase longer by a factor whose duration is not given."""
         return np.concatenate(
             [
-                phase.with_time_scaled(part, factor, self.held_orders(number))
-                for number, (phase, part) in enumerate(self.split(x))
+                phase.with_time_scaled(x_of_phase, factor, self.held_orders(number))
+                for number, (phase, x_of_phase) in enumerate(self.split(x))
             ]
         )
 
@@ -301,13 +305,19 @@ class Program(PhaseSequence[Phase], Summary):
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""
         return float(
-            sum(self.minimised.value(phase, part) for phase, part in self.split(x))
+            sum(
+                self.minimised.value(phase, x_of_phase)
+                for phase, x_of_phase in self.split(x)
+            )
         )
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the objective, (v,); raises as `objective` does."""
         return np.concatenate(
-            [self.minimised.gradient(phase, part) for phase, part in self.split(x)]
+            [
+                self.minimised.gradient(phase, x_of_phase)
+                for phase, x_of_phase in self.split(x)
+            ]
         )
 
     def with_objective(self, objective: Objective) -> Program:
@@ -322,12 +332,12 @@ class Program(PhaseSequence[Phase], Summary):
         UnreachableError
             A collocation point is out of the branch's reach.
         """
-        return [phase.state(part) for phase, part in self.split(x)]
+        return [phase.state(x_of_phase) for phase, x_of_phase in self.split(x)]
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError as `states` does."""
         parts = self.split(x)
-        rows = [phase.rows(part) for phase, part in parts]
+        rows = [phase.rows(x_of_phase) for phase, x_of_phase in parts]
         rows.append(self.means.values(parts))
         rows += [link.rows(parts) for link in self.links]
         return np.concatenate(rows)
@@ -335,7 +345,7 @@ class Program(PhaseSequence[Phase], Summary):
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `states` does."""
         parts = self.split(x)
-        entries = [phase.jacobian(part) for phase, part in parts]
+        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in parts]
         entries.append(self.means.slopes(parts).ravel())
         entries += [link.jacobian(parts) for link in self.links]
         return np.concatenate(entries)
@@ -357,17 +367,17 @@ class Program(PhaseSequence[Phase], Summary):
         """Return that Gauss-Newton part by the multipliers of objective and rows."""
         weights = -multipliers[self._mean_rows].clip(max=0.0)
         hessian = self.means.curvature(self.split(x), weights)
-        for (phase, part), own in zip(self.split(x), self._parts, strict=True):
+        for (phase, x_of_phase), block in zip(self.split(x), self._blocks, strict=True):
             if self.minimised.is_curved(phase):
-                curved = self.minimised.curvature(phase, part)
-                hessian[own, own] += objective_multiplier * curved
+                curved = self.minimised.curvature(phase, x_of_phase)
+                hessian[block, block] += objective_multiplier * curved
         return hessian
 
     @property
     def limits(self) -> tuple[Limit, ...]:
         """The limits of all phases, safeguards included, each once."""
-        each = {id(limit): limit for phase in self.phases for limit in phase.limits}
-        return tuple(each.values())
+        limits = {id(limit): limit for phase in self.phases for limit in phase.limits}
+        return tuple(limits.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it.
@@ -376,8 +386,8 @@ class Program(PhaseSequence[Phase], Summary):
         """
         if limit.guarantee.is_mean:
             limits = self.means.limits
-            number = next(i for i, own in enumerate(limits) if own is limit)
-            before = sum(len(own.lower) for own in limits[:number])
+            number = next(i for i, candidate in enumerate(limits) if candidate is limit)
+            before = sum(len(earlier.lower) for earlier in limits[:number])
             first = self._mean_rows.start + before
             return np.arange(first, first + len(limit.lower))[None]
         # The links' rows come behind.
@@ -388,12 +398,12 @@ class Program(PhaseSequence[Phase], Summary):
 
     def motions(self, x: np.ndarray) -> list[Motion]:
         """Curves of every phase that belong to x."""
-        return [phase.motion(part) for phase, part in self.split(x)]
+        return [phase.motion(x_of_phase) for phase, x_of_phase in self.split(x)]
 
     def variables_from(self, motions: Sequence[Motion]) -> np.ndarray:
         """Point x nearest to given curves of every phase; see `Phase.variables_from`."""
         pairs = zip(self.phases, motions, strict=True)
-        return np.concatenate([phase.variables_from(own) for phase, own in pairs])
+        return np.concatenate([phase.variables_from(motion) for phase, motion in pairs])
 
     def with_phases(self, phases: Iterable[Phase]) -> Program:
         """Return the program with other phases for the present ones, all else as it is."""
@@ -402,7 +412,7 @@ class Program(PhaseSequence[Phase], Summary):
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with other collocation points of every phase; see `Phase.with_points`."""
         pairs = zip(self.phases, t_norm, strict=True)
-        return self.with_phases(phase.with_points(own) for phase, own in pairs)
+        return self.with_phases(phase.with_points(times) for phase, times in pairs)
 
     def with_free_knots(self, shortest: float) -> Program:
         """Return the same program with interval lengths as variables; see `Phase.with_free_knots`."""
@@ -412,8 +422,10 @@ class Program(PhaseSequence[Phase], Summary):
 
     def fix_knots(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
         """Return the program with its knots fixed where they are at x, and the same motion as its point x."""
-        other = self.with_phases(phase.fix_knots(part) for phase, part in self.split(x))
-        return other, other.variables_from(self.motions(x))
+        fixed = self.with_phases(
+            phase.fix_knots(x_of_phase) for phase, x_of_phase in self.split(x)
+        )
+        return fixed, fixed.variables_from(self.motions(x))
 
     def without_orders_above(self, order: int) -> Program:
         """Return the same program without limits that ask for a higher derivative; x keeps its meaning."""
@@ -428,10 +440,13 @@ class Program(PhaseSequence[Phase], Summary):
 
     def relax(self, limit: Limit, bound: Bound, amount: float) -> Program:
         """Return the same program with a figure of one of its limits giving way by `amount`, in the figure's unit."""
-        other = limit.relax(bound, amount)
+        relaxed = limit.relax(bound, amount)
         return self.with_phases(
             phase.with_limits(
-                [other if each is limit else each for each in phase.limits]
+                [
+                    relaxed if candidate is limit else candidate
+                    for candidate in phase.limits
+                ]
             )
             for phase in self.phases
         )

@@ -114,15 +114,17 @@ def violations(
 
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
-    found = [_check_phase(phase, part, goal) for phase, part in dense.split(x)]
-    largest, missing = map(list, zip(*found, strict=True))
+    checks = [
+        _check_phase(phase, x_of_phase, goal) for phase, x_of_phase in dense.split(x)
+    ]
+    largest, missing = map(list, zip(*checks, strict=True))
     violation = max(largest)
     if np.isfinite(violation):
         of_means = dense.means.violation(dense.split(x))
         violation = max(violation, of_means)
         if of_means > goal:  # too few points everywhere
-            more = [phase.t_norm[_EVERYWHERE] for phase in dense.phases]
-            pairs = zip(missing, more, strict=True)
+            extra = [phase.t_norm[_EVERYWHERE] for phase in dense.phases]
+            pairs = zip(missing, extra, strict=True)
             missing = [np.union1d(*pair) for pair in pairs]
     return violation, missing
 
@@ -349,10 +351,10 @@ def refine(
     goal = options.tolerance * _GOAL
     reports = [first]
     remaining = np.inf
-    for rounds_left in range(options.max_rounds, -1, -1):
+    for remaining_rounds in range(options.max_rounds, -1, -1):
         answer = reports[-1].x
         violation, missing = violations(dense, answer, goal)
-        if not rounds_left:
+        if not remaining_rounds:
             break
         is_near = violation < goal + _RELIEF * options.tolerance
         by = options.tolerance if is_near else 0.0
@@ -393,16 +395,16 @@ def _lengthen(
     gravity or friction add to by less, and where the time is given nothing. So this is tried, and the best is kept.
     """
     goal = options.tolerance * _GOAL
-    most = min(1.0 + by, options.longest / dense.end_time(x))
+    max_factor = min(1.0 + by, options.longest / dense.end_time(x))
     factor = 1.0
     too_short = factor
     best = (factor, violation)
-    while goal < violation and factor < most:
+    while goal < violation and factor < max_factor:
         before = violation
         too_short = factor
-        factor = min(factor * (1.0 + violation - 0.5 * goal), most)
+        factor = min(factor * (1.0 + violation - 0.5 * goal), max_factor)
         violation, _ = violations(dense, dense.with_time_scaled(x, factor), goal)
-        if violation <= goal or (violation < best[1] and factor < most):
+        if violation <= goal or (violation < best[1] and factor < max_factor):
             best = (factor, violation)
         if violation > 0.99 * before:
             break

@@ -152,7 +152,7 @@ def begin_with_timing(
     program: Program,
     timings: Sequence[PhaseTiming | None],
     lost: float,
-    most: int,
+    intervals: int,
     points: int,
 ) -> tuple[Program, np.ndarray] | None:
     """Lay splines along the timings of all phases, over few knots, close together where these need them.
@@ -164,7 +164,7 @@ def begin_with_timing(
     timings : sequence of PhaseTiming or None
     lost : float
         Part of the time that the intervals may lose together.
-    most : int
+    intervals : int
         Intervals of all phases together, about.
     points : int
         Collocation points an interval.
@@ -180,10 +180,10 @@ def begin_with_timing(
         return None
     phases = []
     parts = []
-    for phase, own in zip(program.phases, timings, strict=True):
-        assert own is not None
-        share = max(_FEWEST, int(most * own.t_end / total))
-        begun = begin(phase, own, lost, share, points)
+    for phase, phase_timing in zip(program.phases, timings, strict=True):
+        assert phase_timing is not None
+        share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
+        begun = begin(phase, phase_timing, lost, share, points)
         if begun is None:
             return None
         phases.append(begun[0])
@@ -219,7 +219,7 @@ class BetterPaths:
         Largest violation of a limit on postures.
     is_credible : bool
         Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
-        curves over the path are none.
+        no curves over the path describe the motion.
     is_held_back : bool
         Whether a branch margin is so near to its bound that it holds the motion back.
     """
@@ -273,7 +273,7 @@ def improve_joint_paths(
     """
     solve = solve.over_path(effort.options)
     program = program.with_phases(
-        phase.with_limits([own for own in phase.limits if not is_left_out(own)])
+        phase.with_limits([limit for limit in phase.limits if not is_left_out(limit)])
         for phase in program.phases
     )
 
@@ -314,11 +314,11 @@ def _better(
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
     phases = []
-    for phase, own in zip(program.phases, best.timings, strict=True):
-        share = own.t_end / best.t_end
+    for phase, phase_timing in zip(program.phases, best.timings, strict=True):
+        share = phase_timing.t_end / best.t_end
         count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
         stations = int(_PLACES_AN_INTERVAL * count)
-        phases.append(PathPhase(phase, own, count, stations))
+        phases.append(PathPhase(phase, phase_timing, count, stations))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
     reports = (*best.reports, report)
@@ -336,18 +336,18 @@ def _better(
         is_held_back = over_path.safeguard_slack(report.x) <= HELD_BACK
     except UnreachableError:
         return replace(best, reports=reports, is_credible=False)
-    found = BetterPaths(over_path.curves(report.x), timings, reports, violation)
-    missed = 1.0 - report.objective / found.t_end
+    paths = BetterPaths(over_path.curves(report.x), timings, reports, violation)
+    missed = 1.0 - report.objective / paths.t_end
     # The phase plane does not tell whether the limits allow a speed that is given.
-    has_laws = any(own.given is not None for own in timings)
-    is_given = has_laws and np.isfinite(found.t_end)
-    is_beyond = is_given and report.violation > _CREDIBLE
+    has_laws = any(timing.fixed_duration is not None for timing in timings)
+    has_timed_laws = has_laws and np.isfinite(paths.t_end)
+    is_beyond = has_timed_laws and report.violation > _CREDIBLE
     slack = effort.posture_violation
-    is_better = found.rank(slack) < best.rank(slack)
-    if is_beyond or not (is_better or is_given):
-        found = replace(best, reports=reports)
+    is_better = paths.rank(slack) < best.rank(slack)
+    if is_beyond or not (is_better or has_timed_laws):
+        paths = replace(best, reports=reports)
     return replace(
-        found,
+        paths,
         is_credible=abs(missed) < _CREDIBLE,
         is_held_back=is_held_back,
     )
@@ -355,7 +355,7 @@ def _better(
 
 def least_time(timings: Iterable[PhaseTiming | None]) -> float:
     """Return the time of all phases, s; infinite where one has no timing."""
-    return sum(np.inf if own is None else own.t_end for own in timings)
+    return sum(np.inf if timing is None else timing.t_end for timing in timings)
 
 
 def lay_splines(
@@ -386,13 +386,15 @@ def lay_splines(
         None where a joint path has no timing.
     """
     began = time.perf_counter()
-    found = []
-    for phase, own in zip(program.phases, timings, strict=True):
-        followed = own and follow(phase, own, tolerance, points, deadline)
+    followed_phases = []
+    for phase, phase_timing in zip(program.phases, timings, strict=True):
+        followed = phase_timing and follow(
+            phase, phase_timing, tolerance, points, deadline
+        )
         if followed is None:
             return None
-        found.append(followed)
-    phases, parts, violations = zip(*found, strict=True)
+        followed_phases.append(followed)
+    phases, parts, violations = zip(*followed_phases, strict=True)
     finer = program.with_phases(phases)
     seconds = time.perf_counter() - began
     report = _report(

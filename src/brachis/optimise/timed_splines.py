@@ -36,7 +36,7 @@ _ANCHORED = 100
 
 
 def breaks_for(
-    course: TimedCourse, timing: Timing, tolerance: float, most: int
+    course: TimedCourse, timing: Timing, tolerance: float, max_intervals: int
 ) -> np.ndarray:
     """Choose knots over which splines follow a timing.
 
@@ -51,7 +51,7 @@ def breaks_for(
     timing : Timing
     tolerance : float
         Part of the time that all intervals together may lose.
-    most : int
+    max_intervals : int
         Intervals with which halving ends, before those beside much shorter ones are halved too.
 
     Returns
@@ -80,7 +80,7 @@ def breaks_for(
         pieces=max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL),
         tolerance=tolerance,
         shortest=1.0 / len(timing.times),
-        most=most,
+        most=max_intervals,
     )
     return even_out(np.append(begins, 1.0))
 
@@ -166,10 +166,10 @@ def splines_along(
     count = 1 + (len(places) - degree) // _ANCHORED
     anchors = np.linspace(0.0, 1.0, count + 1)
     inner = np.clip(anchors * t_end - delays[0], 0.0, timing.t_end)
-    wanted = course.curves(timing, inner)[0]
+    targets = course.curves(timing, inner)[0]
     for _ in range(2):
         reached = Motion(t_end, knots, degree, points).at(anchors * t_end)[0]
-        points = points + _smoothly(anchors, wanted - reached, places).T
+        points = points + _smoothly(anchors, targets - reached, places).T
     return Motion(t_end, knots, degree, points)
 
 
@@ -180,5 +180,5 @@ def _smoothly(
     knots = clamped_knots(3, anchors)
     slopes = collocation(knots, 3, np.array([0.0, 1.0]), 1)
     matrix = np.vstack([collocation(knots, 3, anchors), slopes])
-    wanted = np.vstack([values, np.zeros((2, values.shape[1]))])
-    return Spline(knots, np.linalg.solve(matrix, wanted), 3)(places)
+    right_side = np.vstack([values, np.zeros((2, values.shape[1]))])
+    return Spline(knots, np.linalg.solve(matrix, right_side), 3)(places)

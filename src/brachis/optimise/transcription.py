@@ -91,16 +91,16 @@ def _boundary(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
     end = free if number < last or problem.end is None else problem.end
     y_start = joint_map.coordinates(leg.begin, start)
     y_end = joint_map.coordinates(leg.end, end)
-    rest = np.zeros(problem.task.spline.vanishing)
+    zeros = np.zeros(problem.task.spline.vanishing)
     if is_periodic and not last and problem.time_laws[0] is None:
-        return Boundary.at_rest(y_start, y_end, len(rest), periodic=True)
+        return Boundary.at_rest(y_start, y_end, len(zeros), periodic=True)
     sides = []
     for side, values in ((0, y_start), (-1, y_end)):
         s_derivatives = _derivatives_of_s(problem, number, side)
-        others = rest if _is_at_rest(problem, number, side) else np.empty(0)
+        derivatives = zeros if _is_at_rest(problem, number, side) else np.empty(0)
         first = EndCondition(float(values[0]), s_derivatives)
-        more = (EndCondition(float(value), others) for value in values[1:])
-        sides.append((first, *more))
+        redundant = (EndCondition(float(value), derivatives) for value in values[1:])
+        sides.append((first, *redundant))
     return Boundary(sides[0], sides[1], time_law=problem.time_laws[number])
 
 
@@ -141,14 +141,14 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
     in_motion = tuple(range(1 + derivatives_in_motion(problem)))
     for number, leg in enumerate(problem.legs[:-1] if redundant else ()):
         yield Link(number, number + 1, redundant, (0,) if leg.stops else in_motion)
-    is_given = problem.time_laws[0] is not None or problem.time_laws[-1] is not None
-    if not problem.task.boundary.periodic or not (last or is_given):
+    has_law = problem.time_laws[0] is not None or problem.time_laws[-1] is not None
+    if not problem.task.boundary.periodic or not (last or has_law):
         return
     if redundant:
         # A start posture that is given fixes both ends.
         orders = in_motion if problem.start is None else in_motion[1:]
         yield Link(last, 0, redundant, orders)
-    if not is_given:
+    if not has_law:
         yield Link(last, 0, (0,), in_motion[1:])
 
 

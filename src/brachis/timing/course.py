@@ -39,13 +39,13 @@ class Course:
         return cls.over_path(s, [spline(s, nu) for nu in range(3)])
 
     @classmethod
-    def over_path(cls, s: np.ndarray, others: Iterable[np.ndarray]) -> Course:
+    def over_path(cls, s: np.ndarray, other_curves: Iterable[np.ndarray]) -> Course:
         """Join path coordinates, (P,), and other curves with two derivatives by these, (3, P, c - 1)."""
-        own = (s, np.ones_like(s), np.zeros_like(s))  # s and its derivatives by s
-        return cls(s, *map(np.column_stack, zip(own, others, strict=True)))
+        s_orders = (s, np.ones_like(s), np.zeros_like(s))  # s and its derivatives by s
+        return cls(s, *map(np.column_stack, zip(s_orders, other_curves, strict=True)))
 
     def state(self, joint_map: JointMap) -> JointState:
-        """Joint motion at the stations if p is the time; raises UnreachableError where there is no posture."""
+        """Joint motion at the stations if p is the time; raises UnreachableError where the joint map has no posture."""
         still = np.zeros_like(self.y)
         t = self.p - self.p[0]
         return joint_map.state(self.y, self.y_dp, self.y_ddp, still, t=t)
@@ -122,12 +122,12 @@ class TimedCourse:
         ahead = t - timing.times[i]
         acceleration = timing.acceleration[i]
         jerk = timing.jerk[i]
-        left = np.diff(timing.times)[i] - ahead
-        rate = timing.rate[i] + (acceleration - 0.5 * jerk * left) * ahead
-        mean = 0.5 * acceleration - jerk * (left + ahead / 3.0) / 4.0
-        way = (timing.rate[i] + mean * ahead) * ahead
+        remaining = np.diff(timing.times)[i] - ahead
+        rate = timing.rate[i] + (acceleration - 0.5 * jerk * remaining) * ahead
+        mean = 0.5 * acceleration - jerk * (remaining + ahead / 3.0) / 4.0
+        distance = (timing.rate[i] + mean * ahead) * ahead
         step = np.diff(self.path.p)[i]
-        u = np.clip(way / step, 0.0, 1.0)[:, None]
+        u = np.clip(distance / step, 0.0, 1.0)[:, None]
         chord = self._y[i + 1] - self._y[i]
         first = self._slopes[i] * step[:, None] - chord
         last = self._slopes[i + 1] * step[:, None] - chord

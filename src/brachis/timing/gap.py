@@ -94,7 +94,7 @@ class TimingGap(Summary):
             f"(on a grid of {self.places} places)"
         )
 
-    def issues(self, *, intervals_are_given: bool) -> tuple[Issue, ...]:
+    def issues(self, *, has_fixed_intervals: bool) -> tuple[Issue, ...]:
         """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
@@ -104,15 +104,15 @@ class TimingGap(Summary):
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
         advice = "raise search.time_limit"
-        if intervals_are_given:
+        if has_fixed_intervals:
             advice = "set spline.intervals: auto, or a larger number"
         message = (
             f"the same joint path can be passed in {self.least_time:.4g} s, {saved:.1f} % faster; the motion loses "
             f"this time {where}; for a faster motion, {advice}"
         )
-        found = f"a motion of {self.t_end:.4g} s"
+        motion_text = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
-        return (Issue("spline.intervals", message, found, usual),)
+        return (Issue("spline.intervals", message, motion_text, usual),)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
@@ -155,14 +155,14 @@ def find_timing_gap(
         if phase.kind != "move":
             total += phase.duration
             continue
-        found = _time_phase(trajectory, phase, len(np.unique(spline.knots)) - 1, limits)
-        if found is None:
+        timed = _time_phase(trajectory, phase, len(np.unique(spline.knots)) - 1, limits)
+        if timed is None:
             return None
-        path, own, times = found
+        path, motion_times, times = timed
         total += float(times[-1])
         places += len(times)
         lost_s.append(path.s[1:])
-        lost.append(np.diff(own) - np.diff(times))
+        lost.append(np.diff(motion_times) - np.diff(times))
     left_out = sorted({limit.name for limit in limits if is_left_out(limit)})
     interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
     return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)

@@ -46,8 +46,8 @@ def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
     slower, faster = np.sort([speed[1:, 0], speed[:-1, 0]], axis=0)
     is_known = slower > 0.0
     ratio = np.divide(faster, slower, out=np.ones_like(turn), where=is_known)
-    wanted = np.maximum(np.ceil(turn / _TURN), np.round(ratio))
-    parts = np.where(is_known, wanted, 1.0).clip(1, _MOST_PARTS)
+    counts = np.maximum(np.ceil(turn / _TURN), np.round(ratio))
+    parts = np.where(is_known, counts, 1.0).clip(1, _MOST_PARTS)
     numbers = np.append(0.0, np.cumsum(parts))
     return np.interp(np.arange(numbers[-1] + 1.0), numbers, p)
 
@@ -95,25 +95,25 @@ class JointPath:
         moves = speed > _STANDING * speed.max()
         inner = moves.copy()
         inner[[0, -1]] = True
-        kept = np.flatnonzero(inner)
-        speed = speed[kept]
+        index = np.flatnonzero(inner)
+        speed = speed[index]
         with np.errstate(divide="ignore", invalid="ignore"):
-            tangent = self.q_dp[kept] / speed[:, None]
-            along = np.nan_to_num(np.sum(self.q_ddp[kept] * tangent, axis=1))
-            bend = (self.q_ddp[kept] - tangent * along[:, None]) / speed[:, None] ** 2
+            tangent = self.q_dp[index] / speed[:, None]
+            along = np.nan_to_num(np.sum(self.q_ddp[index] * tangent, axis=1))
+            bend = (self.q_ddp[index] - tangent * along[:, None]) / speed[:, None] ** 2
         for end, beside in ((0, 1), (-1, -2)):
-            if not moves[kept[end]]:
-                along[end] = np.linalg.norm(self.q_ddp[kept[end]]) * (1 + 2 * end)
+            if not moves[index[end]]:
+                along[end] = np.linalg.norm(self.q_ddp[index[end]]) * (1 + 2 * end)
                 tangent[end] = tangent[beside]
                 bend[end] = bend[beside]
         turn = np.linalg.norm(np.diff(tangent, axis=0), axis=1)
         (corners,) = np.nonzero(turn > _CORNER)
         sides = np.column_stack([corners, corners + 1])
         numbers = np.insert(
-            np.arange(len(kept)), sides[:, [1, 1]].ravel(), sides.ravel()
+            np.arange(len(index)), sides[:, [1, 1]].ravel(), sides.ravel()
         )
         stops = sides + 1 + 2 * np.arange(len(corners))[:, None]
-        places = self.p[kept][numbers]
+        places = self.p[index][numbers]
         speed = speed[numbers]
         # The speed falls to zero and rises again, both evenly.
         ends = places[stops]
@@ -203,9 +203,9 @@ class Timing:
         # The smaller slope of both sides: none beside a jump.
         slopes = np.pad(np.diff(acceleration) / halfway(durations), 1)
         smaller = np.minimum(np.abs(slopes[1:]), np.abs(slopes[:-1]))
-        most = np.abs(acceleration) / durations
+        max_jerk = np.abs(acceleration) / durations
         is_smooth = slopes[1:] * slopes[:-1] > 0.0
-        size = np.where(is_smooth, np.minimum(smaller, most), 0.0)
+        size = np.where(is_smooth, np.minimum(smaller, max_jerk), 0.0)
         jerk = np.sign(slopes[1:]) * size
         durations = durations * (1.0 + jerk * durations**2 / (12.0 * mean))
         durations = (steps + jerk * durations**3 / 12.0) / mean

@@ -61,7 +61,7 @@ Narrower = np.ndarray | float
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """A limit as rows lower <= a u + b x <= upper at every station, or as largest x where it has no acceleration.
+    """A limit as a block of rows: lower <= a u + b x <= upper at every station, or largest x if it has no acceleration.
 
     Attributes
     ----------
@@ -166,46 +166,50 @@ class PhasePlane:
         middle = _not_too_slow(halfway(rate))
         self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
-    def _linearise(self, motion: Passage, kept: Sequence[_Rows] = ()) -> None:
+    def _linearise(self, motion: Passage, agreeing: Sequence[_Rows] = ()) -> None:
         """Write the limits at a motion half-way between the stations as rows, and these as bounds.
 
         Parameters
         ----------
         motion : Passage
             Half-way between the stations.
-        kept : sequence of _Rows, optional
+        agreeing : sequence of _Rows, optional
             Those of the last linearisation that agree with the limits at the motion.
         """
-        known = {own.limit: own for own in kept}
-        found = [
+        known = {block.limit: block for block in agreeing}
+        linearised = [
             known.get(limit)
             or _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
             for limit in self._limits
         ]
-        rows = [own for own in found if own is not None]
+        rows = [block for block in linearised if block is not None]
         self._motion = motion
-        has_new_levels = any(own.by_u is None for own in rows if own not in kept)
-        if has_new_levels or not kept:
+        has_new_levels = any(
+            block.by_u is None for block in rows if block not in agreeing
+        )
+        if has_new_levels or not agreeing:
             self._levels = self._levels_at_stations(rows, motion.rate)
         self._rounds = [rows, *self._rounds[:2]]
-        older = dict.fromkeys(own for last in self._rounds[1:] for own in last)
+        older = dict.fromkeys(block for last in self._rounds[1:] for block in last)
         earlier = [
-            own for own in older if own not in rows and own.is_tangent_below(motion)
+            block
+            for block in older
+            if block not in rows and block.is_tangent_below(motion)
         ]
         self._set_bounds(
-            [own for own in (*rows, *earlier) if own.by_u is not None],
-            [own for own in rows if own.by_u is None],
+            [block for block in (*rows, *earlier) if block.by_u is not None],
+            [block for block in rows if block.by_u is None],
         )
 
     def _set_bounds(self, sloped: Sequence[_Rows], levels: Sequence[_Rows]) -> None:
         """Find the bounds on u and x that rows with and without acceleration set, `_levels` known."""
         blank = [np.empty((len(self._steps), 0))]
         self._labels = [
-            str(label) for own in (*sloped, *levels) for label in own.limit.labels
+            str(label) for block in (*sloped, *levels) for label in block.limit.labels
         ]
         a, b, low, high = (
-            np.hstack(blank + [getattr(own, part) for own in sloped])
-            for part in ("by_u", "by_x", "lower", "upper")
+            np.hstack(blank + [getattr(block, attribute) for block in sloped])
+            for attribute in ("by_u", "by_x", "lower", "upper")
         )
         self._slope, self._lower, self._upper = _as_lines(a, b, low, high)
         # Half-way x is x + step u, seen from the station before.
@@ -221,8 +225,8 @@ class PhasePlane:
         self._ceiling[self.path.stops] = 0.0
         # x + 2 step u is x at the next station.
         self._factor = 1.0 + 2.0 * step * slope
-        self._least = 2.0 * step * lower
-        self._most = 2.0 * step * upper
+        self._next_lower = 2.0 * step * lower
+        self._next_upper = 2.0 * step * upper
 
     def _levels_at_stations(
         self, rows: Sequence[_Rows], rate: np.ndarray
@@ -231,15 +235,15 @@ class PhasePlane:
         rates = np.concatenate([rate[:1], halfway(rate), rate[-1:]])
         motion = Passage(self.path, rates, np.zeros_like(rates))
         levels = [np.empty((len(self.path.p), 0))]
-        for own in rows:
-            if own.by_u is None:
+        for block in rows:
+            if block.by_u is None:
                 narrower: Narrower = 0.0
-                if own.limit in self._narrower:
-                    between = self._narrower[own.limit]
+                if block.limit in self._narrower:
+                    between = self._narrower[block.limit]
                     ends = between[..., :1, :], between, between[..., -1:, :]
                     padded = np.concatenate(ends, axis=-2)
                     narrower = np.maximum(padded[..., 1:, :], padded[..., :-1, :])
-                level = _Rows.of(own.limit, self.path, motion, narrower)
+                level = _Rows.of(block.limit, self.path, motion, narrower)
                 assert level is not None
                 levels.append(level.upper)
         return np.hstack(levels)
@@ -265,13 +269,13 @@ class PhasePlane:
         if not (narrower or self._narrower):
             return
         held = dict(narrower)
-        for own in self._rounds[0]:
-            if own.by_u is not None and own.limit in held:
-                above = own.limit.upper - own.constant
-                below = own.constant - own.limit.lower
+        for block in self._rounds[0]:
+            if block.by_u is not None and block.limit in held:
+                above = block.limit.upper - block.constant
+                below = block.constant - block.limit.lower
                 slack = np.minimum(above, below)
-                most = np.where(slack > 0.0, _HELD_BACK * slack, np.inf)
-                held[own.limit] = np.minimum(held[own.limit], most)
+                allowed = np.where(slack > 0.0, _HELD_BACK * slack, np.inf)
+                held[block.limit] = np.minimum(held[block.limit], allowed)
         self._narrower = held
         self._rounds = []
         self._linearise(self._motion)
@@ -279,12 +283,12 @@ class PhasePlane:
     @cached_property
     def weights(self) -> np.ndarray:
         """Largest part of a limit that a unit of each joint's acceleration takes on most of the path, (n,)."""
-        found = [np.zeros(self.path.q.shape[1])]
+        weights = [np.zeros(self.path.q.shape[1])]
         for limit in self._limits:
             by_qddot = limit.partials(self._motion).qddot
             if by_qddot is not None:
-                found.append(np.median(np.abs(by_qddot), axis=0).max(axis=0))
-        return np.max(found, axis=0)
+                weights.append(np.median(np.abs(by_qddot), axis=0).max(axis=0))
+        return np.max(weights, axis=0)
 
     def solve(
         self, rates: tuple[float, float] = (0.0, 0.0), agreement: float = AGREEMENT
@@ -311,7 +315,7 @@ class PhasePlane:
             change = np.inf if best is None else abs(timing.t_end / best.t_end - 1.0)
             best = timing
             motion = self._pass(timing)
-            errors = [own.error(motion) for own in self._rounds[0]]
+            errors = [block.error(motion) for block in self._rounds[0]]
             error = max(errors, default=0.0)
             has_converged = change < AGREEMENT or error < agreement
             is_close_enough = change < agreement and error < _CREDIBLE
@@ -319,7 +323,7 @@ class PhasePlane:
                 break
             factor = 1.0
             pairs = zip(self._rounds[0], errors, strict=True)
-            self._linearise(motion, [own for own, off in pairs if off < _EXACT])
+            self._linearise(motion, [block for block, off in pairs if off < _EXACT])
         return best if error < _CREDIBLE else None
 
     def _pass(self, timing: Timing) -> Passage:
@@ -336,8 +340,8 @@ class PhasePlane:
     def _is_curved(self) -> bool:
         """Whether another linearisation would give other rows."""
         motion = self._slow_down(self._motion, 0.5)
-        rows = (own for own in self._rounds[0] if own.by_u is not None)
-        return any(own.error(motion) > AGREEMENT for own in rows)
+        rows = (block for block in self._rounds[0] if block.by_u is not None)
+        return any(block.error(motion) > AGREEMENT for block in rows)
 
     def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
         """Largest dp/dt at the stations, (P,), 1/s, within the rows as they are; see `solve`."""
@@ -346,7 +350,7 @@ class PhasePlane:
             return None
         # The intervals of x from which the end can be reached.
         reach = kernel.go_backwards(
-            (self._factor, self._least, self._most),
+            (self._factor, self._next_lower, self._next_upper),
             (self._floor, self._ceiling[:-1]),
             last,
             flat=_TINY,
@@ -357,7 +361,7 @@ class PhasePlane:
         low, high = reach
         if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
             return None
-        squares = kernel.go_forwards(self._factor, self._most, reach, first)
+        squares = kernel.go_forwards(self._factor, self._next_upper, reach, first)
         if not squares.max() > 0.0:
             return None
         # Between stations nothing stops; a station where the grid says so is an artefact of its width.

@@ -98,11 +98,11 @@ class Solver:
             message = "the start or a bound is not a finite number"
             return refuse(SolveStatus.EVALUATION_ERROR, message)
         with solve_lock:
-            most = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
+            max_entries = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
             # A daemonic process may have no children; the limit then holds between iterations alone.
             alone = multiprocessing.current_process().daemon
             entries = len(x) * len(problem.lower)
-            if (options.apart or entries > most) and not alone:
+            if (options.apart or entries > max_entries) and not alone:
                 return subprocess_solve(self, problem, x, options, progress)
             return self.run(SolveMonitor(problem, options, progress), x)
 
@@ -168,8 +168,8 @@ def subprocess_solve(
     if now > until:
         status = SolveStatus.TIME_LIMIT
         message = "ended: it did not finish in time"
-    kept = x if best is None else best
-    return _report_point(solver.name, problem, kept, status, message, now - began)
+    point = x if best is None else best
+    return _report_point(solver.name, problem, point, status, message, now - began)
 
 
 def _receive(
@@ -192,8 +192,8 @@ def _receive(
             return None, best
         if isinstance(message, SolverReport | Exception):
             return message, best
-        iteration, objective, found = message
-        best = best if found is None else found
+        iteration, objective, iterate = message
+        best = best if iterate is None else iterate
         if progress is not None:
             progress(iteration, objective)
     return None if time.monotonic() >= until else SolveStatus.STALLED, best

@@ -125,11 +125,11 @@ class SecantHessian:
         s_y = s @ y
         if not s_y > _LEAST_COSINE * np.linalg.norm(s) * np.linalg.norm(y):
             return
-        wanted = y - known @ s
+        target = y - known @ s
         s_a_s = abs(s @ self.learnt @ s)
         if s_a_s > 0.0:
-            self.learnt = self.learnt * min(1.0, abs(s @ wanted) / s_a_s)
-        error = wanted - self.learnt @ s
+            self.learnt = self.learnt * min(1.0, abs(s @ target) / s_a_s)
+        error = target - self.learnt @ s
         outer = np.outer(error, y) / s_y
         correction = (error @ s) * np.outer(y, y) / s_y**2
         self.learnt = self.learnt + outer + outer.T - correction

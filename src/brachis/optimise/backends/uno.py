@@ -64,8 +64,8 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             result = call_uno(monitor, x, units, settings, stall, hessian)
             x = units * np.array(result.primal_solution)
             ending = result.optimization_status.name
-            found = result.solution_status.name
-            small = found == "FEASIBLE_SMALL_STEP"
+            solution = result.solution_status.name
+            small = solution == "FEASIBLE_SMALL_STEP"
             has_failed = stall.seen or small or ending == "ALGORITHMIC_ERROR"
             if not has_failed or monitor.is_beaten or monitor.must_stop():
                 break
@@ -148,7 +148,7 @@ class _Stall:
     from stationarity. Or a subproblem fails, and Uno restores at a feasible point for ever, where its stationarity says
     nothing. A new approximation, scaled variables and a smaller trust region cure it.
 
-    Nothing cures a restoration that creeps far beyond a limit: there is no feasible motion near the start.
+    Nothing cures a restoration that creeps far beyond a limit: no motion near the start is feasible.
     """
 
     def __init__(self, monitor: SolveMonitor, units: np.ndarray) -> None:
@@ -159,17 +159,17 @@ class _Stall:
         self.seen = False
         self.is_lost = False
 
-    def __call__(self, point: np.ndarray, *rest: Any) -> bool:
-        *_, objective_multiplier, infeasibility, stationarity, _complementarity = rest
+    def __call__(self, point: np.ndarray, *state: Any) -> bool:
+        *_, objective_multiplier, infeasibility, stationarity, _complementarity = state
         monitor = self._monitor
         restores = objective_multiplier == 0.0
         is_near = stationarity <= 0.1 and not restores
         # In restoration Uno appends elastic variables.
-        own = self._units * point[: len(self._units)]
-        objective = objective_at(monitor.problem, own)
+        x = self._units * point[: len(self._units)]
+        objective = objective_at(monitor.problem, x)
         self._objectives.append(objective)
         if not restores:
-            monitor.keep(own, objective, infeasibility)
+            monitor.keep(x, objective, infeasibility)
         stop = monitor.between_iterations(objective)
         stop = stop or monitor.iterations >= monitor.options.max_iterations
         counts = is_near or (monitor.options.anywhere and not restores)
@@ -220,8 +220,8 @@ def call_uno(
         lambda point: monitor.objective(units * point),
         scale(monitor.gradient, units),
     )
-    most = min(options.widening, options.tolerance)
-    lower, upper = _spread_bounds(problem.lower, problem.upper, most)
+    widening = min(options.widening, options.tolerance)
+    lower, upper = _spread_bounds(problem.lower, problem.upper, widening)
     model.set_constraints(
         len(lower),
         scale(monitor.rows, 1.0),
@@ -248,19 +248,19 @@ def call_uno(
 
 
 def _spread_bounds(
-    lower: np.ndarray, upper: np.ndarray, most: float
+    lower: np.ndarray, upper: np.ndarray, max_widening: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Widen bounds of rows, (c,), by up to a part `most` of themselves, each by another one.
+    """Widen bounds of rows, (c,), by up to a part `max_widening` of themselves, each by another one.
 
     At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take an
     active-set solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason.
     Bounds of zero stay, for a sign is strict; so do rows whose bounds are equal. Bounds above 1 are widened as if they
     were 1.
     """
-    part = most * (np.arange(1, len(lower) + 1) * _GOLDEN % 1.0)
-    part[lower == upper] = 0.0
-    wider = upper + part * np.minimum(np.abs(upper), 1.0)
-    return lower - part * np.minimum(np.abs(lower), 1.0), wider
+    widening = max_widening * (np.arange(1, len(lower) + 1) * _GOLDEN % 1.0)
+    widening[lower == upper] = 0.0
+    wider = upper + widening * np.minimum(np.abs(upper), 1.0)
+    return lower - widening * np.minimum(np.abs(lower), 1.0), wider
 
 
 def _set_hessian(

@@ -27,9 +27,9 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
     problem = monitor.problem
 
-    def terminate(point: np.ndarray, *rest: Any) -> bool:
+    def terminate(point: np.ndarray, *state: Any) -> bool:
         """Tell whether to stop after an iteration."""
-        *_, objective_multiplier, _infeasibility, _stationarity, complementarity = rest
+        *_, objective_multiplier, _infeasibility, _stationarity, complementarity = state
         iterate = np.array(point[: len(x)])  # a restoration appends variables
         objective = objective_at(problem, iterate)
         violation = residual(problem, iterate)  # Uno's is of scaled rows
