@@ -153,12 +153,6 @@ class Problem(Summary):
             return beside % len(self.legs)
         return beside if 0 <= beside < len(self.legs) else None
 
-    @cached_property
-    def given_time(self) -> float:
-        """Time that passes at given speeds and in dwells, s."""
-        moving = sum(law.duration for law in self.time_laws if law is not None)
-        return moving + self.dwell_time
-
     @property
     def dwell_time(self) -> float:
         """Time for which the tool stands still between legs, s."""

@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.errors import UnreachableError
@@ -139,6 +141,7 @@ def _finish_over_time(
         target = solved.program
     soon = replace(options, deadline=session.deadline)
     adapted = adapt_mesh(solved, session, spline, soon, target=target)
+    adapted = replace(adapted, reports=(*candidate.reports, *adapted.reports))
     undone = filter(None, (solved.not_completed, adapted.not_completed))
     candidate = replace(candidate, not_completed="; ".join(undone))
     return _refine_if_fast(candidate, adapted, session, options, to_beat)
@@ -148,7 +151,7 @@ def _finish_over_path(
     candidate: RankedCandidate,
     session: SolverSession,
     options: RefinementOptions,
-    _to_beat: float,
+    to_beat: float,
 ) -> Candidate:
     """Improve joint paths further over the path, then over time, and follow the faster one's timing.
 
@@ -163,7 +166,10 @@ def _finish_over_path(
     session = limit_along_timing(session)
     retimed = improve_timings(guess, program, paths, session)
     reports = (*reports, *retimed.reports)
-    longest = retimed.t_end * (1.0 + tolerance) + guess.problem.dwell_time
+    least = retimed.t_end + guess.problem.dwell_time
+    if to_beat <= least < np.inf:
+        return replace(candidate, status=SLOW, adapted=least, reports=reports)
+    longest = least + tolerance * retimed.t_end
     motions = []
     if retimed.solved is not None and retimed.solved.t_end < longest:
         solved = replace(retimed.solved, reports=reports)
@@ -208,7 +214,7 @@ def _refine_if_fast(
         outcomes.append(outcome)
         if outcome.is_settled or options.deadline.passed:
             break
-    return next((each for each in outcomes if each.is_settled), outcomes[0])
+    return next((outcome for outcome in outcomes if outcome.is_settled), outcomes[0])
 
 
 def _open_session(
