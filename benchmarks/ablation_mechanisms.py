@@ -135,11 +135,6 @@ def return_empty(*_arguments: Any, **_keywords: Any) -> Any:
     return ()
 
 
-def return_zero(*_arguments: Any, **_keywords: Any) -> int:
-    """Count nothing, or say no."""
-    return 0
-
-
 def solve_all_rows(program: Any, x: Any, solve: Callable[..., Any]) -> Any:
     """Take the place of `solve_near_rows`."""
     return solve(program, x)
@@ -260,12 +255,13 @@ MECHANISMS = (
     Mechanism(
         "screening_ends",
         "screening does not end when several guesses are about equally fast",
-        {_SEARCH + "screening._count_near_least": return_zero},
+        {_SEARCH + "screening._NEAR_LEAST": 0.0},
+        use=_SEARCH + "screening._improve_most",
     ),
     Mechanism(
-        "perturbed",
-        "no joint paths displaced at random",
-        {_SEARCH + "starts.perturb": return_empty},
+        "random_joint_paths",
+        "no joint paths carried along from random postures",
+        {_SEARCH + "starts.random_joint_paths": return_empty},
         is_used=is_found,
     ),
     Mechanism(

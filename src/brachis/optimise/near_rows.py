@@ -40,7 +40,7 @@ _LAST_VIOLATION = 0.5
 """Violation of other rows above which an answer is another motion: then all rows are needed."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
-_FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT, SolveStatus.BEATEN)
+_FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 """Statuses after which no further solve is tried."""
 
 

@@ -27,11 +27,9 @@ from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
 _NEAR_LEAST = 1.01
-"""Factor on the least time up to which others are as fast, about: plans from there may end in either order."""
+"""Factor on the least time up to which others are as fast, about."""
 _PLACES = np.linspace(0.0, 1.0, 49)
 """Places at which joint paths are compared."""
-_SLOW = 1.03
-"""Times the least time that is slow."""
 
 
 def screen(
@@ -55,26 +53,29 @@ def screen(
     """
     listener(f"improving {len(starts)} joint paths")
     improve = partial(_improve_most, deadline=deadline, listener=listener)
+    if len(starts) <= most:
+        return _choose_distinct(improve(starts, ROUGH, CHARTS, most), most)
+    coarse = improve(_spread_out(starts), COARSE, 1, 2 * most)
+    chosen = _choose_distinct(coarse, 2 * most)
+    chosen = _choose_distinct(improve(chosen, ROUGH, CHARTS, most), most)
+    # Of many, one half of those as fast as the fastest is enough.
     alike = max(2, most // 2)
-    is_many = len(starts) > most
-    if is_many:
-        # The half that looks worse after a coarse search is left out.
-        coarse = improve(_spread_out(starts), COARSE, 1, alike + 1)
-        count = max(most, (len(coarse) + 1) // 2)
-        place = {start.origin: number for number, start in enumerate(starts)}
-        coarse.sort(key=lambda start: (start.estimate, place[start.origin]))
-        starts = coarse[:count]
-    solved = improve(starts, ROUGH, CHARTS, alike if is_many else len(starts))
-    kept: list[InitialGuess] = []
-    for start in sorted(solved, key=lambda start: start.estimate):
-        ratio = start.estimate / kept[0].estimate if kept else 1.0
-        # Of many, those slower than the fastest one are left out, and so is the second half of equally fast ones.
-        is_slow = ratio > _SLOW and is_many
-        is_one_too_many = ratio <= _NEAR_LEAST and len(kept) >= alike
-        is_known = any(is_same(start, other) for other in kept)
-        if not (is_slow or is_one_too_many or is_known):
-            kept.append(start)
-    return kept[:most]
+    slower = [
+        start
+        for start in chosen[alike:]
+        if start.estimate > _NEAR_LEAST * chosen[0].estimate
+    ]
+    return chosen[:alike] + slower
+
+
+def _choose_distinct(starts: Sequence[InitialGuess], most: int) -> list[InitialGuess]:
+    """Choose the fastest of guesses, one of each joint path; those without a time only if none has one."""
+    timed = [start for start in starts if np.isfinite(start.estimate)]
+    chosen: list[InitialGuess] = []
+    for start in sorted(timed or starts, key=lambda start: start.estimate):
+        if not any(is_same(start, other) for other in chosen):
+            chosen.append(start)
+    return chosen[:most]
 
 
 def _spread_out(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
@@ -102,17 +103,9 @@ def _improve_most(
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until `alike` of them end near the least end time: others are unlikely to end below it.
-
-    A guess that stays slower than the fastest one was at first is given up.
-    """
-    # A program over the path knows no pauses, and its time differs a little from that of a timing.
-    waiting = starts[0].problem.dwell_time
-    least = min(start.estimate for start in starts) - waiting
-    options = replace(effort.options, to_beat=_NEAR_LEAST * least)
-    effort = replace(effort, options=options)
+    """Improve guesses until `alike` of them end near the least end time: others are unlikely to end below it."""
     work = run_in_processes(
-        _improve,
+        improve_quickly,
         starts,
         deadline,
         effort,
@@ -124,24 +117,14 @@ def _improve_most(
     with closing(work) as outcomes:
         for start in outcomes:
             solved.append(start)
-            if _count_near_least(solved, apart=charts > 1) >= alike:
+            least = min(each.estimate for each in solved)
+            is_near = [each.estimate <= _NEAR_LEAST * least < np.inf for each in solved]
+            if sum(is_near) >= alike:
                 break
     return solved
 
 
-def _count_near_least(solved: Sequence[InitialGuess], *, apart: bool) -> int:
-    """Count the guesses near the least end time; with `apart` those of the same joint path once."""
-    known = [start for start in solved if np.isfinite(start.estimate)]
-    least = min((start.estimate for start in known), default=np.inf)
-    near: list[InitialGuess] = []
-    for start in known:
-        is_near = start.estimate <= _NEAR_LEAST * least
-        if is_near and not (apart and any(is_same(start, each) for each in near)):
-            near.append(start)
-    return len(near)
-
-
-def _improve(
+def improve_quickly(
     start: InitialGuess,
     deadline: Deadline,
     effort: PathEffort,

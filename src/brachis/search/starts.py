@@ -1,8 +1,8 @@
 """Initial guesses: joint paths from lattices, each smoothed, with coordinates and an estimate of its least time.
 
 Of an arm with several redundant joints the lattice's sample of postures may hold a single class of joint paths, above
-all between two given ends, and a solve from it ends at the optimum next to it. Solves from joint paths around it,
-displaced by waves over s, end at others.
+all between two given ends, and a solve from it ends at the optimum next to it. Solves from random joint paths end at
+others.
 """
 
 from __future__ import annotations
@@ -22,11 +22,17 @@ from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
 from brachis.limits import Role
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
-from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.differential_ik import differential_ik_paths
 from brachis.search.holding import explain_beyond
 from brachis.search.hopeless import refuse_hopeless
-from brachis.search.joint_path import NO_CHART, NO_TIME, DeadEnd, JointPath
+from brachis.search.joint_path import (
+    NO_CHART,
+    NO_TIME,
+    DeadEnd,
+    JointPath,
+    sampling_box,
+)
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.phase_plane import fastest_times, least_time
 from brachis.search.posture_lattice import PostureLattice
@@ -78,6 +84,14 @@ class SearchLevel:
     fallback: bool = False
 
 
+_RANDOM = 4
+"""So many times the joint paths that a level plans are drawn at random."""
+_RANDOM_STATIONS = 97
+"""Places at which they are carried along, about: a closed circle of 25 m needs 80."""
+_DRAWN = 8
+"""Postures that are drawn for each: with a free start one of four arrives at the end within the ranges."""
+_DRIFT = 2.0
+"""rad or m, in the scales of the joints: largest standard deviation of a drift from end to end."""
 _LOOKED_AT = 4
 """Joint paths that are looked at for each one that is taken, where several joints are redundant."""
 _NEARLY = 0.2
@@ -276,16 +290,16 @@ def chart_starts(
         (f"lattice {number}" + (f", from {each.seed}" if each.seed else ""), each)
         for number, each in enumerate(found, 1)
     ]
-    if problem.r > 1 and level.in_charts > 1:
-        missing = 2 * level.in_charts - len(found)
-        more = perturb(found, missing, problem.task.search.seed)
-        named += [(f"perturbed {number}", each) for number, each in enumerate(more, 1)]
+    is_sampled = problem.r > 1 or problem.start is None
+    if is_sampled and level.in_charts > 1:
+        drawn = random_joint_paths(problem, _RANDOM * level.in_charts)
+        named += [(f"random {number}", each) for number, each in enumerate(drawn, 1)]
     newton = Newton(problem.task_map)
     guesses = []
     for origin, joint_path in named:
         if joint_path is not found[0] and deadline.passed:
             break
-        guess = _guess_in_chart(newton, joint_path, origin)
+        guess = guess_in_chart(newton, joint_path, origin)
         if guess is not None:
             guesses.append(guess)
     if not guesses:
@@ -298,46 +312,59 @@ def chart_starts(
     return screen(hopeful, level.in_charts, deadline, listener)
 
 
-def perturb(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[JointPath]:
-    """Displace joint paths, one after the other and over again, by waves at random.
+def random_joint_paths(problem: Problem, most: int) -> list[JointPath]:
+    """Carry random postures, or a given one, along the path; each drifts to a side at random.
 
     Parameters
     ----------
-    joint_paths : sequence of JointPath
-        At least one.
+    problem : Problem
     most : int
-        How many to make.
-    seed : int
+        How many to find, no more.
 
     Returns
     -------
     list of JointPath
-        Within the joints' ranges and from the given ends, but not on the prescribed path: the nearest postures on it
-        are meant.
+        From and to the given ends, within the ranges and the limits at rest.
     """
-    rng = np.random.default_rng(seed)
-    problem = joint_paths[0].problem
-    s = joint_paths[0].s
-    waves = [np.sin(np.pi * s), 0.5 * np.sin(2.0 * np.pi * s)]
-    if problem.start is None:
-        waves.append(1.0 - s)
-    if problem.end is None:
-        waves.append(s)
+    rng = np.random.default_rng(problem.task.search.seed)
+    newton = Newton(problem.task_map)
     limits = problem.robot.limits
-    # Standard deviations of a 16th of a turn, then of half as much, and so on: four sizes.
-    size = cell_sizes(problem.robot, 16)
-    found = []
-    for number in range(most):
-        given = joint_paths[number % len(joint_paths)]
-        own = size / 2.0 ** (number // len(joint_paths) % 4)
-        heights = rng.normal(0.0, own, (len(waves), problem.robot.n))
-        q = given.q + np.array(waves).T @ heights
-        q = np.clip(q, limits.position_lower, limits.position_upper)
-        found.append(replace(given, q=q))
-    return found
+    s = spread_stations(problem, _RANDOM_STATIONS)
+    is_backwards = problem.start is None and problem.end is not None
+    step = -1 if is_backwards else 1
+    ends = [problem.start, problem.end][::step]
+    targets = problem.path.sample(s).target[::step]
+    count = _DRAWN * most
+    q = rng.uniform(*sampling_box(problem.robot), (count, problem.robot.n))
+    if ends[0] is not None:
+        q[:] = ends[0]
+    drift = rng.normal(0.0, 1.0, q.shape) * rng.uniform(0.0, _DRIFT, (count, 1))
+    drift *= newton.scales
+    paths = np.empty((count, 0, problem.robot.n))
+    remaining = 1.0
+    lengths = np.append(0.0, np.abs(np.diff(s[::step])))
+    for target, length in zip(targets, lengths, strict=True):
+        moved = q + length * remaining * drift
+        if ends[1] is not None:
+            moved += length / remaining * (ends[1] - q)
+        moved = np.clip(moved, limits.position_lower, limits.position_upper)
+        q = newton.nearest(np.repeat(target[None], len(q), axis=0), moved)
+        is_inside = (q >= limits.position_lower) & (q <= limits.position_upper)
+        inside = is_inside.all(axis=1)
+        q = q[inside]
+        drift = drift[inside]
+        paths = np.concatenate([paths[inside], q[:, None]], axis=1)
+        remaining -= length
+    at_rest = [limit for limit in problem.limits if limit.at_rest == "posture"]
+    allowed = (
+        JointPath(problem, s, own[::step], np.inf)
+        for own in paths
+        if all(limit.holds_at_rest(own, _NEARLY).all() for limit in at_rest)
+    )
+    return list(itertools.islice(allowed, most))
 
 
-def _guess_in_chart(
+def guess_in_chart(
     newton: Newton, joint_path: JointPath, origin: str
 ) -> InitialGuess | None:
     """Smooth a joint path, lay a chart around it, and estimate its time; None if no chart can follow it."""

@@ -23,9 +23,6 @@ from brachis.optimise.backends.protocol import (
 _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 
-
-_TRIAL_ITERATIONS = 10
-"""Iterations before a solve is compared with `SolverOptions.to_beat`."""
 _SMALL_BARRIER = 1e-5
 """Largest barrier parameter at which iterates show whether the solve has settled."""
 _NEARLY_FEASIBLE = 1e-3
@@ -66,7 +63,6 @@ class SolveMonitor:
         self.best: tuple[float, np.ndarray] | None = None
         self._evaluations = 0
         self.stagnated = False
-        self.is_beaten = False
         self._recent: list[float] = []
         self._feasible_below = 10.0 * options.tolerance
         self._progress = progress
@@ -115,12 +111,6 @@ class SolveMonitor:
         is_feasible = infeasibility <= self._feasible_below
         if is_feasible and (self.best is None or objective < self.best[0]):
             self.best = objective, x
-
-    def has_lost(self, objective: float) -> bool:
-        """Tell whether an iterate is still worse than what the solve has to beat; kept in `is_beaten`."""
-        is_tried = self.iterations >= _TRIAL_ITERATIONS
-        self.is_beaten = is_tried and objective > self.options.to_beat
-        return self.is_beaten
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
         """Tell whether iterates have been no better for long; kept in `stagnated`.
@@ -232,9 +222,7 @@ class SolveMonitor:
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED
         feasible = violation <= self._feasible_below
-        if self.is_beaten:
-            status = SolveStatus.BEATEN
-        elif status.usable and not feasible:
+        if status.usable and not feasible:
             status = SolveStatus.INFEASIBLE
         elif self.timed_out and not status.usable:
             status = SolveStatus.TIME_LIMIT

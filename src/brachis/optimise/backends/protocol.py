@@ -25,7 +25,6 @@ class SolveStatus(enum.Enum):
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
     STALLED = "the solver made no progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached"
-    BEATEN = "given up: slower than another motion"
     INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
     EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
     FAILED = "the solver failed; choose another solver"
@@ -119,8 +118,6 @@ class SolverOptions:
     anywhere : bool
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
         asks; IPOPT counts all iterates in any case.
-    to_beat : float
-        Objective. A solve that is not below it after 10 iterations ends. Uno asks.
     apart : bool
         Whether the solve runs in a process of its own, which is ended when nothing is heard of it for long. That takes
         some 0.07 s more.
@@ -137,7 +134,6 @@ class SolverOptions:
     first_step: float = 1.0
     widening: float = 0.0
     anywhere: bool = False
-    to_beat: float = np.inf
     apart: bool = False
     learnt: np.ndarray | None = None
 

@@ -67,7 +67,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             solution = result.solution_status.name
             small = solution == "FEASIBLE_SMALL_STEP"
             has_failed = stall.seen or small or ending == "ALGORITHMIC_ERROR"
-            if not has_failed or monitor.is_beaten or monitor.must_stop():
+            if not has_failed or monitor.must_stop():
                 break
     status = None
     if stall.seen:
@@ -174,7 +174,7 @@ class _Stall:
         stop = stop or monitor.iterations >= monitor.options.max_iterations
         counts = is_near or (monitor.options.anywhere and not restores)
         is_done = monitor.has_settled(objective, infeasibility if counts else np.inf)
-        stop = stop or is_done or (not restores and monitor.has_lost(objective))
+        stop = stop or is_done
         recent = self._objectives[-7:]
         creeps = len(recent) == 7 and max(recent) - min(recent) < 1e-3 * abs(objective)
         self.seen = creeps and infeasibility < 1e-3 and not is_near and not stop

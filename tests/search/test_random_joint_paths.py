@@ -1,4 +1,4 @@
-"""Joint paths around others: from the given ends, within the ranges, and of use where the lattice has few."""
+"""Random joint paths: on the path, from the given ends, within the ranges, and of use where the lattice has few."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import pytest
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import starts as module
-from brachis.search.joint_path import JointPath
-from brachis.search.starts import SEARCH_LEVELS, perturb
+from brachis.search.starts import SEARCH_LEVELS, random_joint_paths
 from brachis.task import load_task
 
 URDF = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
@@ -32,32 +31,41 @@ def problem_of(**keys) -> Problem:
     return Problem.of(Robot.from_urdf(URDF), task)
 
 
-def straight(problem: Problem) -> JointPath:
-    s = np.linspace(0.0, 1.0, 9)
-    return JointPath(problem, s, np.array(START) + s[:, None] * 0.2, 1.0)
-
-
-@pytest.mark.parametrize("given", ["start", "none"])
-def test_given_ends_stay_and_ranges_are_kept(given):
-    place = {} if given == "start" else {"start": "free", "path_start": [0.5, 0.1, 0.6]}
-    problem = problem_of(**place)
-    one = straight(problem)
-    found = perturb([one], 12, 0)
-    moved = np.array([each.q - one.q for each in found])
-    assert len(found) == 12
-    assert (np.abs(moved[:, 0]).max() == 0.0) == (given == "start")
-    assert np.abs(moved[:, -1]).max() > 0.01
+@pytest.mark.parametrize("given", ["start", "end", "none"])
+def test_they_are_on_the_path_from_given_ends_within_the_ranges(given):
+    robot = Robot.from_urdf(URDF)
+    place = robot.tool_placement(np.array(START)).translation
+    free = {"start": "free", "path_start": [0.5, 0.1, 0.6]}
+    back = {
+        "path_start": (place - [0.0, 0.3, 0.0]).tolist(),
+        "path": [{"line": {"by": [0.0, 0.3, 0.0]}}],
+        "end": {"joints": START},
+    }
+    problem = problem_of(**{"start": {}, "end": free | back, "none": free}[given])
+    found = random_joint_paths(problem, 12)
+    assert 6 <= len(found) <= 12
     for each in found:
         assert (each.q >= problem.robot.limits.position_lower).all()
         assert (each.q <= problem.robot.limits.position_upper).all()
-    sizes = np.abs(moved[:, 4]).max(axis=1)
-    assert 0.0 < sizes.min() < 0.3 * sizes.max()
+        targets = problem.path.sample(each.s).target
+        np.testing.assert_allclose(problem.task_map.values(each.q), targets, atol=1e-8)
+        assert np.abs(np.diff(each.q, axis=0)).max() < 0.8
+    ends = {"start": 0, "end": -1}
+    for name, place in ends.items():
+        postures = np.array([each.q[place] for each in found])
+        is_same = np.ptp(postures, axis=0).max() < 1e-6
+        assert is_same == (name == given)
 
 
 def test_they_are_the_same_for_the_same_seed():
-    one = straight(problem_of())
     first, again, other = (
-        np.array([each.q for each in perturb([one], 3, seed)]) for seed in (0, 0, 1)
+        np.array(
+            [
+                each.q
+                for each in random_joint_paths(problem_of(search={"seed": seed}), 3)
+            ]
+        )
+        for seed in (0, 0, 1)
     )
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.01
@@ -77,7 +85,7 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     (level,) = SEARCH_LEVELS["fast"]
     starts = module.chart_starts(problem, decompositions_of(problem), level)
     assert isinstance(starts, list)
-    assert any(start.origin.startswith("perturbed") for start in starts)
+    assert any(start.origin.startswith("random") for start in starts)
     for start in starts:
         q = start.joint_map.postures(start.joint_path)
         np.testing.assert_allclose(q[[0, -1]], [START, end], atol=1e-8)
