@@ -144,7 +144,7 @@ def _solve(
     for_large = solver_for_large("auto") if count > _MANY else None
     backend = for_large or solvers_for(task.solver.name)[0]
     solve = _session(backend, soon, listener)
-    longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
+    longest = program.scale_time(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
     if not first.status.usable:
         status = f"the fastest motion is kept: {_reason(first)}"
