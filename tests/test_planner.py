@@ -94,7 +94,7 @@ def test_if_the_time_is_up_a_motion_gets_as_slow_as_it_has_to_and_hardly_more():
         robot(), brachis.load_task(task(redundant_joints=["j1"]))
     )
     first = solve_with_uno(program, next(starting_points(program)))
-    fast = dataclasses.replace(first, x=program.with_time_scaled(first.x, 0.8))
+    fast = dataclasses.replace(first, x=program.scale_time(first.x, 0.8))
     late = RefinementOptions(deadline=Deadline(0.0))
     found = refine(program, fast, solve_with_uno, late)
     assert found.violation <= 1e-4

@@ -41,7 +41,7 @@ class Fake:
     def end_time(self, x):
         return float(x[0])
 
-    def with_time_scaled(self, x, factor):
+    def scale_time(self, x, factor):
         return x * factor
 
 
@@ -192,7 +192,7 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
 def test_if_the_time_is_up_a_feasible_start_is_the_answer():
     program = Program([phase_of("r1")])
     begun = shortest_time(program, next(starting_points(program)))
-    far = program.with_time_scaled(begun, 0.5)
+    far = program.scale_time(begun, 0.5)
     late = SolverReport(
         "uno",
         SolveStatus.TIME_LIMIT,

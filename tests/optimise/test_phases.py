@@ -139,7 +139,7 @@ def test_gradient_of_the_end_time_with_a_given_speed(case, law):
     assert np.count_nonzero(exact[1:]) > 0
     size = np.abs(expected[1:]).max()
     np.testing.assert_allclose(exact[1:], expected[1:], atol=1e-6 * size)
-    slower = program.with_time_scaled(x, 2.0)
+    slower = program.scale_time(x, 2.0)
     np.testing.assert_array_equal(slower, x)
 
 

@@ -256,7 +256,7 @@ def test_one_phase_is_the_program():
     exact = dense(program, x)
     np.testing.assert_array_equal(exact[:own], dense(phase, x))
     assert np.all(np.bincount(program.jacobian_rows)[own:] == program.variables)
-    slower = program.with_time_scaled(x, 2.0)
+    slower = program.scale_time(x, 2.0)
     assert slower[0] == 2.0 * x[0]
     np.testing.assert_array_equal(slower[1:], x[1:])
 

@@ -83,9 +83,9 @@ def test_closed_forms_are_left_for_the_last(
             )
         )
         first = [
-            start for batch in planned if not batch.fallback for start in batch.starts
+            start for batch in planned if not batch.fallback for start in batch.guesses
         ]
-        last = [start for batch in planned if batch.fallback for start in batch.starts]
+        last = [start for batch in planned if batch.fallback for start in batch.guesses]
         assert first
         assert {start.joint_map.branch_label for start in first} == {CHART}
         names[level] = {

@@ -340,7 +340,7 @@ def splines_are_too_fast(monkeypatch):
 
     def hurry(*arguments: Any) -> Any:
         solved = honest(*arguments)
-        x = solved.program.with_time_scaled(solved.x, 0.6)
+        x = solved.program.scale_time(solved.x, 0.6)
         report = dataclasses.replace(solved.report, x=x)
         return dataclasses.replace(solved, reports=(report,))
 

@@ -153,12 +153,12 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
 
 
 def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarray:
-    """Scale the time of a phase; see `shortest_time` and `Phase.with_time_scaled`."""
+    """Scale the time of a phase; see `shortest_time` and `Phase.scale_time`."""
     if phase.time_law is not None:
         phase.state(x)
         return x
 
-    scale = partial(phase.with_time_scaled, held=held)
+    scale = partial(phase.scale_time, held=held)
     has_path = phase.joint_map.path is not None
     best = x
     least = np.inf

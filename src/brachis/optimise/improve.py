@@ -71,7 +71,7 @@ class SolvedProgram(Summary):
     @property
     def x(self) -> np.ndarray:
         """The answer, (v,)."""
-        return self.program.with_time_scaled(self.report.x, self.time_scaled)
+        return self.program.scale_time(self.report.x, self.time_scaled)
 
     @property
     def t_end(self) -> float:

@@ -256,7 +256,7 @@ class Phase:
         factor = 0.0 if is_slope else 1.0
         return np.concatenate([factor * law_orders, orders], axis=2)
 
-    def with_time_scaled(
+    def scale_time(
         self, x: np.ndarray, factor: float, held: tuple[int, int] = (0, 0)
     ) -> np.ndarray:
         """Return the same motion, longer by a factor; a duration that is given stays.

@@ -282,11 +282,11 @@ class Program(PhaseSequence[Phase], Summary):
             )
         )
 
-    def with_time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
+    def scale_time(self, x: np.ndarray, factor: float) -> np.ndarray:
         """Return the same motion, every phase longer by a factor whose duration is not given."""
         return np.concatenate(
             [
-                phase.with_time_scaled(x_of_phase, factor, self.held_orders(number))
+                phase.scale_time(x_of_phase, factor, self.held_orders(number))
                 for number, (phase, x_of_phase) in enumerate(self.split(x))
             ]
         )

@@ -403,7 +403,7 @@ def _lengthen(
         before = violation
         too_short = factor
         factor = min(factor * (1.0 + violation - 0.5 * goal), max_factor)
-        violation, _ = violations(dense, dense.with_time_scaled(x, factor), goal)
+        violation, _ = violations(dense, dense.scale_time(x, factor), goal)
         if violation <= goal or (violation < best[1] and factor < max_factor):
             best = (factor, violation)
         if violation > 0.99 * before:
@@ -411,7 +411,7 @@ def _lengthen(
     # Jerks fall with the third power of the time: less may be enough.
     while best[1] <= goal and best[0] > _CLOSE * too_short:
         factor = np.sqrt(best[0] * too_short)
-        violation, _ = violations(dense, dense.with_time_scaled(x, factor), goal)
+        violation, _ = violations(dense, dense.scale_time(x, factor), goal)
         if violation <= goal:
             best = (factor, violation)
         else:

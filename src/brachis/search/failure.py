@@ -54,23 +54,23 @@ def explain_reach(
     """
     problem = decomposition.problem
     robot = problem.robot
-    given = "end" if problem.start is None else "start"
+    posture_name = "end" if problem.start is None else "start"
     posture = problem.end if problem.start is None else problem.start
     near = np.zeros(robot.n) if posture is None else posture
     s = np.linspace(0.0, 1.0, 101)
-    found = _sample_postures(decomposition, s, near, deadline)
-    if found is None:
+    postures = _sample_postures(decomposition, s, near, deadline)
+    if postures is None:
         return _NO_TIME
-    anywhere = found
-    if not _has_any(_exist(found)).all():
+    anywhere = postures
+    if not _has_any(_exist(postures)).all():
         # Wider ranges tell whether the ranges of the redundant joints or the arm are to blame.
         wider = _sample_postures(decomposition, s, near, deadline, opened=True)
         if wider is None:
             return _NO_TIME
-        anywhere = np.concatenate([found, wider], axis=1)
+        anywhere = np.concatenate([postures, wider], axis=1)
 
     for possible, cause, hint, remedies in _find_obstacles(
-        decomposition, given, s, found, anywhere
+        decomposition, posture_name, s, postures, anywhere
     ):
         if not possible.all():
             first, last = (float(end) for end in s[~possible][[0, -1]])
@@ -79,30 +79,30 @@ def explain_reach(
             error = PathError(what, s_interval=(first, last), hint=hint)
             return error.with_remedies(*remedies)
 
-    others = "other redundant joints, " if decomposition.redundant else ""
+    joint_advice = "other redundant joints, " if decomposition.redundant else ""
     return (
         "Every point of the path is within reach of this branch, but no joint path through them was found; "
-        f"try {others}another {given} posture"
+        f"try {joint_advice}another {posture_name} posture"
     )
 
 
 def _find_obstacles(
     decomposition: Decomposition,
-    given: str,
+    posture_name: str,
     s: np.ndarray,
-    found: np.ndarray,
+    postures: np.ndarray,
     anywhere: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
     """Yield at which of S stations something is possible, (S,) bool, and, if it is not: cause, hint and remedies.
 
-    `found` and `anywhere` are postures, (S, T, B, A, n), with redundant joints within their ranges and beyond. On the
-    branch of the `given` posture, ``start`` or ``end``, less is possible.
+    The redundant joints of `postures`, (S, T, B, A, n), are within their ranges, those of `anywhere` also beyond them.
+    On the branch of the task's posture, named ``start`` or ``end``, less is possible.
     """
     problem = decomposition.problem
     robot = problem.robot
     branch = decomposition.branches[0]
-    is_given = problem.start is not None or problem.end is not None
-    own = found[:, :, [branch]] if is_given else found
+    has_posture = problem.start is not None or problem.end is not None
+    on_branch = postures[:, :, [branch]] if has_posture else postures
     exists = _has_any(_exist(anywhere))
     if not exists.all() and reaches(problem, float(s[np.argmin(exists)])):
         exists[:] = True
@@ -113,7 +113,7 @@ def _find_obstacles(
         or "Shorten or move the path, or choose another start posture",
         (),
     )
-    within = _has_any(_are_within(robot, found))
+    within = _has_any(_are_within(robot, postures))
     yield (
         within,
         "no posture within the joint ranges was found from s = {first:.3g} on"
@@ -123,14 +123,14 @@ def _find_obstacles(
     )
     label = decomposition.match.solver.branches[branch]
     yield (
-        _has_any(_are_within(robot, own)),
-        f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
-        f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
+        _has_any(_are_within(robot, on_branch)),
+        f"the branch {label!r} of the {posture_name} posture does not reach s = {{first:.3g}}",
+        f"Choose a {posture_name} posture of another branch, or leave redundant_joints: auto",
         (),
     )
     for limit in problem.limits:
         if limit.at_rest == "posture" and limit.role is not Role.SCENE:
-            allowed, nearest, remedies = _check_at_rest(robot, limit, own)
+            allowed, nearest, remedies = _check_at_rest(robot, limit, on_branch)
             cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
             yield allowed, cause, "Move the path", remedies
 
@@ -156,20 +156,20 @@ def _are_within(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def _excess(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """How far joints are beyond their ranges, (..., n), rad or m; negative within, NaN where there is no posture."""
+    """How far joints are beyond their ranges, (..., n), rad or m; negative within, NaN where no posture exists."""
     limits = robot.limits
     return np.maximum(limits.position_lower - q, q - limits.position_upper)
 
 
-def _has_any(those: np.ndarray) -> np.ndarray:
-    """Tell at which stations there is a posture, (S,), for random joints, branches and alternatives, (S, T, B, A)."""
-    return np.asarray(those.any(axis=(1, 2, 3)))
+def _has_any(mask: np.ndarray) -> np.ndarray:
+    """Tell at which stations, (S,), any random joints, branch and alternative of a mask, (S, T, B, A), are true."""
+    return np.asarray(mask.any(axis=(1, 2, 3)))
 
 
 def _sample_postures(
     decomposition: Decomposition,
     s: np.ndarray,
-    given: np.ndarray,
+    near: np.ndarray,
     deadline: Deadline,
     *,
     opened: bool = False,
@@ -177,26 +177,26 @@ def _sample_postures(
     """Draw T random redundant joints: postures (S, T, B, A, n) that reach stations s, (S,), on all branches.
 
     Angles are turned into their ranges, and what does not exist is NaN; None if the time is up. `opened` ignores the
-    ranges of the redundant joints; otherwise those of the given posture are tried as well.
+    ranges of the redundant joints; otherwise those of the posture `near` are tried as well.
     """
     robot = decomposition.problem.robot
     redundant = list(decomposition.redundant)
-    low, high = sampling_box(robot, given, opened=redundant if opened else [])
+    low, high = sampling_box(robot, near, opened=redundant if opened else [])
     tries = 400 * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(
         low[redundant], high[redundant], (tries, len(redundant))
     )
     if not opened:
-        q_r[0] = np.clip(given, low, high)[redundant]
+        q_r[0] = np.clip(near, low, high)[redundant]
     targets = decomposition.problem.path.sample(s).target
     parts = []
     # No more than 20,000 postures at once, so that the deadline is noticed.
-    for those in np.array_split(targets, min(len(s), -(-len(s) * tries // 20_000))):
+    for block in np.array_split(targets, min(len(s), -(-len(s) * tries // 20_000))):
         if deadline.passed:
             return None
-        several = np.repeat(those, tries, axis=0)
-        q = solve_all(decomposition, several, np.tile(q_r, (len(those), 1)))
-        q = q.reshape(len(those), tries, *q.shape[1:])
+        repeated = np.repeat(block, tries, axis=0)
+        q = solve_all(decomposition, repeated, np.tile(q_r, (len(block), 1)))
+        q = q.reshape(len(block), tries, *q.shape[1:])
         parts.append(in_turn_of(q, 0.5 * (low + high), robot.revolute))
     return np.concatenate(parts)
 
@@ -299,12 +299,12 @@ def explain_no_motion(
     has_joint_path = _has_joint_path(candidates)
     if not_completed:
         limit = f"within the time limit of {problem.task.search.time_limit:g} s"
-        left = "; ".join(not_completed)
+        undone = "; ".join(not_completed)
         if dead_ends and not has_joint_path:
-            more = f". Not all was done {limit}: {left}: raise search.time_limit"
-            return _explain_dead_ends(problem.task, dead_ends, more)
+            hint_end = f". Not all was done {limit}: {undone}: raise search.time_limit"
+            return _explain_dead_ends(problem.task, dead_ends, hint_end)
         return PlanningError(
-            f"no motion was found {limit}: {left}", hint="Raise search.time_limit"
+            f"no motion was found {limit}: {undone}", hint="Raise search.time_limit"
         )
     advice: PathError | str = _advise(problem.task, candidates)
     if decompositions and not has_joint_path:
@@ -314,9 +314,9 @@ def explain_no_motion(
     missing = ""
     if problem.task.redundant_joints == "auto":
         missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
-    more = f". {missing}" if missing else ""
+    hint_end = f". {missing}" if missing else ""
     if dead_ends and not has_joint_path:
-        return _explain_dead_ends(problem.task, dead_ends, more)
+        return _explain_dead_ends(problem.task, dead_ends, hint_end)
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(
         status if n == 1 else f"{status} ({n} times)" for status, n in counts.items()
@@ -324,26 +324,26 @@ def explain_no_motion(
     along = " along any joint path" if has_joint_path else ""
     error = PlanningError(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
-        hint=advice + more,
+        hint=advice + hint_end,
     )
     remedies = [speed.lower_to(0.7 * speed.figure) for speed in speeds_of(problem)]
     return error.with_remedies(*remedies)
 
 
 def _explain_dead_ends(
-    task: Task, dead_ends: Mapping[str, DeadEnd], more: str
+    task: Task, dead_ends: Mapping[str, DeadEnd], hint_end: str
 ) -> PathError:
     """Say where the lattice ends that reached farthest."""
     name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
-    own = name if name == ALL_POSTURES else f"redundant joints {name}"
-    others = f" ({own}; the furthest of {len(dead_ends)} lattices)"
+    lattice_name = name if name == ALL_POSTURES else f"redundant joints {name}"
+    lattice_note = f" ({lattice_name}; the furthest of {len(dead_ends)} lattices)"
     start = "" if task.start == "free" else "start in another posture, "
     scene = ", move bodies of the scene" if task.scene else ""
     hint = f"{start}shorten or move the path{scene}, or widen the joint ranges"
     return PathError(
-        f"no continuous joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
+        f"no continuous joint path was found: {dead_ends[name]}{lattice_note if len(dead_ends) > 1 else ''}",
         s_interval=dead_ends[name].interval,
-        hint=hint.capitalize() + more,
+        hint=hint.capitalize() + hint_end,
     )
 
 
@@ -375,4 +375,6 @@ def _is_of_lattice(candidate: Candidate) -> bool:
 
 def _has_joint_path(candidates: Sequence[Candidate]) -> bool:
     """Tell whether a lattice that was looked at has a joint path."""
-    return any(each.branch for each in candidates if _is_of_lattice(each))
+    return any(
+        candidate.branch for candidate in candidates if _is_of_lattice(candidate)
+    )

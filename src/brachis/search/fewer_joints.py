@@ -29,7 +29,7 @@ _WORTH_MOVING = 2.0
 def search_motion(
     problem: Problem,
     robot: Robot,
-    known: Trajectory | None,
+    known_motion: Trajectory | None,
     open_search: Opening,
     deadline: Deadline,
     report: Listener,
@@ -37,13 +37,15 @@ def search_motion(
     """Search for the fastest motion, from a known one if one is given; raise what explains that none was found."""
     search = open_search(problem, deadline)
     exact = None
-    if known is None and problem.task.tolerances != Tolerances():
+    if known_motion is None and problem.task.tolerances != Tolerances():
         report("planning for a tool that stays exactly on the path")
         task = without_tolerances(problem.task)
         soon = deadline.part(0.5)  # the rest is for the search with tolerances
         exact = _plan_simpler(problem, robot, task, None, open_search, soon)
     with search.end_early():
-        search.run(known, exact if exact is not None and exact.verified else None)
+        search.run(
+            known_motion, exact if exact is not None and exact.verified else None
+        )
     if search.best is None and search.interrupted and exact is not None:
         search.candidates.append(exact)
         search.best = exact
@@ -84,7 +86,7 @@ def _plan_simpler(
     problem: Problem,
     robot: Robot,
     task: Task,
-    known: Trajectory | None,
+    known_motion: Trajectory | None,
     open_search: Opening,
     deadline: Deadline,
 ) -> FinishedCandidate | None:
@@ -92,13 +94,13 @@ def _plan_simpler(
     try:
         simpler = Problem.of(robot, task, problem.user_limits)
         search = open_search(simpler, deadline)
-        if known is None:
+        if known_motion is None:
             search.run()
         else:
-            search.run(known, most=1)
+            search.run(known_motion, max_batches=1)
     except BrachisError:  # all joints are needed
         return None
     if search.best is None:
         return None
-    origin = "without tolerances" if known is None else "with idle joints held"
+    origin = "without tolerances" if known_motion is None else "with idle joints held"
     return widen_plan(dataclasses.replace(search.best, origin=origin), problem)

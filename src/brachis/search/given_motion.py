@@ -71,10 +71,10 @@ def given_guess(
         The motion cannot be used; the text says why, in plain words.
     """
     joints = problem.robot.urdf_joints
-    others = motion.robot.urdf_joints
-    if not set(joints) <= set(others):
+    motion_joints = motion.robot.urdf_joints
+    if not set(joints) <= set(motion_joints):
         raise UnreachableError(
-            f"its joints are {', '.join(others)}, the robot's {', '.join(joints)}"
+            f"its joints are {', '.join(motion_joints)}, the robot's {', '.join(joints)}"
         )
     # The postures over s, and on every leg the time law.
     splits = [leg.end for leg in problem.legs[:-1]]
@@ -83,8 +83,8 @@ def given_guess(
     ends = np.concatenate([[0.0], np.interp(splits, passed, t), [motion.t_end]])
     times = [np.linspace(*pair, 401) for pair in itertools.pairwise(ends)]
     parts = []
-    for leg, own in zip(problem.legs, times, strict=True):
-        s = np.clip(motion.path_coordinate(own), leg.begin, leg.end)
+    for leg, leg_times in zip(problem.legs, times, strict=True):
+        s = np.clip(motion.path_coordinate(leg_times), leg.begin, leg.end)
         s[[0, -1]] = [leg.begin, leg.end]
         parts.append(s)
     t = np.concatenate(times)
@@ -112,10 +112,7 @@ def without_tolerances(task: Task) -> Task:
 
 
 def lock_idle(
-    robot: Robot,
-    task: Task,
-    task_map: TaskMap,
-    postures: Mapping[str, np.ndarray],
+    robot: Robot, task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> tuple[Robot, Task] | None:
     """Lock the idle joints, which no row of the task space depends on, of a robot and its task; None without any.
 
@@ -230,10 +227,10 @@ def narrow_motion(motion: Trajectory) -> Trajectory:
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
     """Positions at times, (K, n), of the problem's joints; others than the motion's stand still."""
     robot = problem.robot
-    known = dict(zip(motion.joint_names, motion.position(t).T, strict=True))
+    motion_positions = dict(zip(motion.joint_names, motion.position(t).T, strict=True))
     still = stand_still(robot, problem.given_postures)
     columns = [
-        known.get(name, np.full(len(t), value))
+        motion_positions.get(name, np.full(len(t), value))
         for name, value in zip(robot.joint_names, still, strict=True)
     ]
     return np.column_stack(columns)
@@ -258,10 +255,14 @@ def _in_coordinates(
         chart = _lay_chart(problem, motion, s, q)
         return chart, chart.curves(s, q), CHART
     joints = motion.redundant_joints
-    same = [each for each in decompositions if each.match.redundant_joints == joints]
+    same = [
+        decomposition
+        for decomposition in decompositions
+        if decomposition.match.redundant_joints == joints
+    ]
     chosen = (same or decompositions)[0]
     labels = chosen.match.solver.branches
-    branches = [each for each in chosen.branches if labels[each] == motion.branch]
+    branches = [branch for branch in chosen.branches if labels[branch] == motion.branch]
     branch = (branches or chosen.branches)[0]
     curves = np.column_stack([s, q[:, list(chosen.redundant)]])
     return chosen.joint_map(q[0], branch), curves, chosen.match.family

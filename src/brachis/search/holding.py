@@ -47,12 +47,12 @@ def explain_beyond(
         return None
     where = s[beyond[:, column] > 0.0]
     label = limit.labels[column]
-    found, allowed = in_figures(limit, int(column), float(values[station, column]))
+    figure, allowed = in_figures(limit, int(column), float(values[station, column]))
     error = PathError(
         f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
         s_interval=(float(where[0]), float(where[-1])),
         where="path",
-        found=f"{found}{label.after} at s = {s[station]:.3g}",
+        found=f"{figure}{label.after} at s = {s[station]:.3g}",
         allowed=f"{allowed}{label.after}",
         hint="Move the path",
     )
@@ -60,16 +60,18 @@ def explain_beyond(
     return worst, error.with_remedies(*remedies)
 
 
-def explain_postures(starts: Sequence[InitialGuess]) -> PathError | None:
+def explain_postures(guesses: Sequence[InitialGuess]) -> PathError | None:
     """Tell which limit on postures stands in the way, if all joint paths exceed one: along the nearest of them."""
     nearest = []
-    for start in starts:
-        q = postures_along(start, _S)
+    for guess in guesses:
+        q = postures_along(guess, _S)
         if q is None:
             continue
-        of_postures = [own for own in start.problem.limits if own.is_of_postures]
-        found = [explain_beyond(start.problem, limit, _S, q) for limit in of_postures]
-        exceeded = [each for each in found if each is not None]
+        of_postures = [limit for limit in guess.problem.limits if limit.is_of_postures]
+        excesses = [
+            explain_beyond(guess.problem, limit, _S, q) for limit in of_postures
+        ]
+        exceeded = [excess for excess in excesses if excess is not None]
         if not exceeded:
             return None
         nearest.append(max(exceeded, key=itemgetter(0)))
@@ -88,13 +90,13 @@ class _Load(NamedTuple):
 
 
 def explain_holding(
-    starts: Sequence[InitialGuess], *, everywhere: bool = False
+    guesses: Sequence[InitialGuess], *, everywhere: bool = False
 ) -> PlanningError | None:
     """Tell which limits of a mean leave too little for holding the arm along all joint paths; None: none does.
 
     Parameters
     ----------
-    starts : sequence of InitialGuess
+    guesses : sequence of InitialGuess
     everywhere : bool, optional
         Whether each posture has to exceed a limit by itself, not their mean alone.
     """
@@ -102,29 +104,29 @@ def explain_holding(
     def measure(load: _Load) -> float:
         return load.least if everywhere else load.mean
 
-    by_start = [_loads_along(start) for start in starts]
-    known = [loads for loads in by_start if loads is not None]
+    loads_by_guess = [_loads_along(guess) for guess in guesses]
+    known = [loads for loads in loads_by_guess if loads is not None]
     if not known or not all(known):
         return None
     loads = min(known, key=lambda loads: max(map(measure, loads)))
     worst = max(loads, key=measure)
-    is_redundant = starts[0].joint_map.r > 0
+    is_redundant = guesses[0].joint_map.r > 0
     # Before a plan is tried it has to be out of the question; afterwards it is the most likely reason.
     hopeless = _FAR_TOO_HEAVY if is_redundant else _TOO_HEAVY
     needed = hopeless if everywhere else _HEAVY
     if measure(worst) < needed:
         return None
-    others = [
-        own
-        for own in loads
-        if own is not worst and own.limit is worst.limit and measure(own) >= needed
+    further_loads = [
+        load
+        for load in loads
+        if load is not worst and load.limit is worst.limit and measure(load) >= needed
     ]
     where = "the best joint path that was found" if is_redundant else "the path"
-    return _explain_loads(starts[0].problem.robot, worst, others, where)
+    return _explain_loads(guesses[0].problem.robot, worst, further_loads, where)
 
 
 def _explain_loads(
-    robot: Robot, worst: _Load, others: Sequence[_Load], where: str
+    robot: Robot, worst: _Load, further_loads: Sequence[_Load], where: str
 ) -> PlanningError:
     """Say what holding the arm takes of the limit that leaves least, and which others leave too little."""
     label = worst.label
@@ -134,15 +136,15 @@ def _explain_loads(
     taken = f"{low} to {high}" if low != high else low
     mean = f"{worst.mean * figure:.4g}"
     cause = f"the {label.kind} limit of {label.subject!r} is too low to hold the arm against gravity along {where}"
-    if others:
-        names = ", ".join(repr(own.label.subject) for own in others)
+    if further_loads:
+        names = ", ".join(repr(load.label.subject) for load in further_loads)
         cause += f", and so is that of {names}"
     remedies: dict[str, Remedy] = {}
-    for own in (worst, *others):
-        for remedy in load_remedies(robot, own.limit, own.column, own.mean):
-            known = remedies.get(remedy.key, remedy)
+    for load in (worst, *further_loads):
+        for remedy in load_remedies(robot, load.limit, load.column, load.mean):
+            earlier = remedies.get(remedy.key, remedy)
             remedies[remedy.key] = max(
-                known, remedy, key=lambda own: abs(own.guess - own.asked)
+                earlier, remedy, key=lambda change: abs(change.guess - change.asked)
             )
     error = PlanningError(
         cause,
@@ -154,19 +156,19 @@ def _explain_loads(
     return error.with_remedies(*remedies.values())
 
 
-def _loads_along(start: InitialGuess) -> list[_Load] | None:
+def _loads_along(guess: InitialGuess) -> list[_Load] | None:
     """List what holding the arm along a guess takes of all limits of means; None where it has no postures."""
-    q = postures_along(start, _S)
+    q = postures_along(guess, _S)
     if q is None:
         return None
     loads = []
-    for limit in start.problem.limits:
+    for limit in guess.problem.limits:
         if limit.guarantee.is_mean:
             values = limit.values(Moments.at_rest(q))
             ratios = np.abs(limit.ratio(values))
             means = np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))
             figures = (ratios.min(axis=0), ratios.max(axis=0), means[0])
             for column, label in enumerate(limit.labels):
-                own = (float(figure[column]) for figure in figures)
-                loads.append(_Load(limit, column, label, *own))
+                column_figures = (float(figure[column]) for figure in figures)
+                loads.append(_Load(limit, column, label, *column_figures))
     return loads

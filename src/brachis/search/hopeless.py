@@ -42,20 +42,20 @@ _LEAST = 1e-4
 """Share of a speed that is possible wherever the arm can hold its postures."""
 
 
-def refuse_hopeless(starts: Sequence[InitialGuess]) -> None:
+def refuse_hopeless(guesses: Sequence[InitialGuess]) -> None:
     """Refuse loads and speeds that are far out of reach along the joint paths of all guesses, before plans are tried.
 
     Raises
     ------
     PlanningError
     """
-    problem = starts[0].problem
+    problem = guesses[0].problem
     # Friction may help to hold the arm, and a motion between different speeds may be a fall: these are tried.
     if not _has_friction(problem).any() and not any(problem.end_rates):
-        failure = explain_holding(starts, everywhere=True)
+        failure = explain_holding(guesses, everywhere=True)
         if failure is not None:
             raise failure
-    failure = explain_speeds(starts)
+    failure = explain_speeds(guesses)
     if failure is not None:
         raise failure
 
@@ -102,17 +102,19 @@ class _Speed:
 def speeds_of(problem: Problem) -> list[_Speed]:
     """List the process speeds of a task, and its speeds at ends that are not at a process speed."""
     speeds = []
-    given = [i for i, leg in enumerate(problem.legs) if leg.speed is not None]
-    parts = problem.task.tool_limits.process_speed
-    for number, (part, leg) in enumerate(zip(parts, given, strict=True)):
-        key = key_of_speed(part, number, ".speed")
-        speeds.append(_Speed(key, "process speed", part.speed, "m/s", leg))
+    speed_legs = [i for i, leg in enumerate(problem.legs) if leg.speed is not None]
+    process_speeds = problem.task.tool_limits.process_speed
+    for number, (process_speed, leg) in enumerate(
+        zip(process_speeds, speed_legs, strict=True)
+    ):
+        key = key_of_speed(process_speed, number, ".speed")
+        speeds.append(_Speed(key, "process speed", process_speed.speed, "m/s", leg))
     last = len(problem.legs) - 1
     unit = problem.task.speed_unit
     for name, leg, side in (("start", 0, 0), ("end", last, -1)):
         key = f"boundary.{name}_speed"
         figure = getattr(problem.task.boundary, f"{name}_speed")
-        if figure and leg not in given:
+        if figure and leg not in speed_legs:
             speeds.append(_Speed(key, f"{name} speed", figure, unit, leg, side))
     return speeds
 
@@ -122,7 +124,7 @@ class _SpeedCheck:
 
     Parameters
     ----------
-    start : InitialGuess
+    guess : InitialGuess
     speeds : sequence of _Speed
         At least one.
     s : (S,) ndarray
@@ -133,14 +135,14 @@ class _SpeedCheck:
 
     def __init__(
         self,
-        start: InitialGuess,
+        guess: InitialGuess,
         speeds: Sequence[_Speed],
         s: np.ndarray,
         q: np.ndarray,
     ) -> None:
-        self.problem = start.problem
+        self.problem = guess.problem
         self.speeds = speeds
-        self.is_redundant = start.joint_map.r > 0
+        self.is_redundant = guess.joint_map.r > 0
         self.planes = [
             phase_plane_on(self.problem, leg, s, q) for leg in self.problem.legs
         ]
@@ -156,8 +158,8 @@ class _SpeedCheck:
             return plane.speed_factor(rate, acceleration)
         assert speed.side is not None
         largest, label = plane.largest_rate(speed.side)
-        asked = self.problem.leg_rates[speed.leg][speed.side]
-        return largest / asked, float(plane.path.s[speed.side]), label
+        task_rate = self.problem.leg_rates[speed.leg][speed.side]
+        return largest / task_rate, float(plane.path.s[speed.side]), label
 
     def speed_at(self, leg: int, side: int) -> int | None:
         """Return the number of the speed that is given at an end of a leg; None at rest."""
@@ -222,20 +224,20 @@ def _largest_share(
 
 
 def explain_speeds(
-    starts: Sequence[InitialGuess], *, are_tried: bool = False
+    guesses: Sequence[InitialGuess], *, are_tried: bool = False
 ) -> PlanningError | None:
     """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if they may not be.
 
     Parameters
     ----------
-    starts : sequence of InitialGuess
+    guesses : sequence of InitialGuess
     are_tried : bool, optional
         Whether plans from these failed, so that too high a speed is the most likely reason; otherwise it has to be far
         out of reach.
     """
-    if not starts:
+    if not guesses:
         return None
-    problem = starts[0].problem
+    problem = guesses[0].problem
     speeds = speeds_of(problem)
     if not speeds:
         return None
@@ -244,11 +246,11 @@ def explain_speeds(
     has_friction = (_has_friction(problem) & driven).any()
     best = None
     share = _LEAST
-    for start in starts:
-        q = postures_along(start, s)
+    for guess in guesses:
+        q = postures_along(guess, s)
         if q is None:
             return None
-        check = _SpeedCheck(start, speeds, s, q)
+        check = _SpeedCheck(guess, speeds, s, q)
         # The phase plane is exact without other joint paths, and without friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
@@ -271,14 +273,21 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
     short = [leg for leg in check.free_legs if check.pass_leg(leg, every) is None]
     if short and shares[number] > share + 0.01:
         # One speed alone may be to blame.
-        alone = ((each, check.lower_one(each, 0.9 * share)) for each in shares)
-        lower = {each: _REACHED * own for each, own in alone if own is not None}
+        alone = (
+            (speed_number, check.lower_one(speed_number, 0.9 * share))
+            for speed_number in shares
+        )
+        lower = {
+            speed_number: _REACHED * speed_share
+            for speed_number, speed_share in alone
+            if speed_share is not None
+        }
         shares = lower or dict.fromkeys(shares, _REACHED * share)
 
         def reach(leg: int) -> float:
             """Return the share of the speeds between which a leg leads."""
             return _largest_share(
-                lambda own: check.pass_leg(leg, own * every) is not None, share, 1.0
+                lambda trial: check.pass_leg(leg, trial * every) is not None, share, 1.0
             )
 
         leg = min(short, key=reach)
@@ -286,23 +295,25 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         number = max(shares, key=lambda number: (number in ends, shares[number]))
         why = _explain_short_leg(check, leg, reach(leg))
     possible = {
-        each: round_to_three_digits(own * check.speeds[each].figure, down=True)
-        for each, own in shares.items()
-        if own < _EXACT or each == number
+        speed_number: round_to_three_digits(
+            speed_share * check.speeds[speed_number].figure, down=True
+        )
+        for speed_number, speed_share in shares.items()
+        if speed_share < _EXACT or speed_number == number
     }
     remedies = [
-        check.speeds[each].lower_to(figure, is_known=True)
-        for each, figure in possible.items()
+        check.speeds[speed_number].lower_to(figure, is_known=True)
+        for speed_number, figure in possible.items()
     ]
     speed = check.speeds[number]
-    most = f"{possible[number]:g} {speed.unit}"
+    largest_speed = f"{possible[number]:g} {speed.unit}"
     error = PlanningError(
         f"the {speed.name} is too high {why}",
         where=speed.key,
         found=str(speed),
-        allowed=f"about {most} along the best joint path that was found (estimate)"
+        allowed=f"about {largest_speed} along the best joint path that was found (estimate)"
         if check.is_redundant
-        else f"no more than {most} (estimate)",
+        else f"no more than {largest_speed} (estimate)",
         hint="Raise the limits that hold the motion back",
     )
     return error.with_remedies(*remedies)
@@ -318,13 +329,13 @@ def _explain_short_leg(check: _SpeedCheck, leg: int, share: float) -> str:
     timing = check.pass_leg(leg, np.full(len(check.speeds), share))
     assert timing is not None
     active = check.planes[leg].active_limit(timing.rate)
-    part = check.problem.legs[leg]
+    interval = check.problem.legs[leg]
     length = tool_distance(check.problem.task_map, check.problem.leg_paths[leg])
     needed = ""
     if length > tolerances.LENGTH:
         needed = f": that takes about {length / share**2:.3g} m, and it is {length:.3g} m long"
     return (
-        f"for the {active} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
+        f"for the {active} limit: the path from s = {interval.begin:.3g} to {interval.end:.3g} "
         f"is too short to get from {first} to {last}{needed}"
     )
 

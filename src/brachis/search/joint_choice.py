@@ -53,7 +53,7 @@ def best_of_joints(
 
 def _go_to(point: tuple[Program, np.ndarray]) -> Change:
     """Change to a program and a point, whatever was kept so far."""
-    return lambda _kept: point
+    return lambda _fastest: point
 
 
 def move_to_chart(
@@ -107,7 +107,7 @@ def _select_joints(solved: SolvedProgram) -> list[ChartRows]:
     null = Newton(chart.task_map).self_motions(q)
     n, r = null.shape[1:]
     # Three choices of one redundant joint and one of several are tried: these solves take longest.
-    most = (0, 3, 1)[min(r, 2)]
+    count = (0, 3, 1)[min(r, 2)]
     selections = []
     for joints in itertools.islice(itertools.combinations(range(n), r), 500):
         rows = np.eye(n)[list(joints)]
@@ -115,4 +115,4 @@ def _select_joints(solved: SolvedProgram) -> list[ChartRows]:
         if least >= SELECTABLE:
             selections.append((least, rows))
     selections.sort(key=lambda item: -item[0])
-    return [ChartRows.constant(rows) for _, rows in selections[:most]]
+    return [ChartRows.constant(rows) for _, rows in selections[:count]]

@@ -144,7 +144,7 @@ def _solve(
     for_large = solver_for_large("auto") if count > _MANY else None
     backend = for_large or solvers_for(task.solver.name)[0]
     solve = _session(backend, soon, listener)
-    longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
+    longest = program.scale_time(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
     if not first.status.usable:
         status = f"the fastest motion is kept: {_reason(first)}"
@@ -158,17 +158,17 @@ def _solve(
     options = RefinementOptions.of(task.refinement, soon, latest)
     # Rounds of refinement begin near enough, and end sooner.
     solve = replace(solve, options=replace(_OPTIONS, patience=2))
-    found = refine_and_verify(fastest, program, (first,), solve, options)
-    if not (isinstance(found, FinishedCandidate) and found.verified):
+    calmer = refine_and_verify(fastest, program, (first,), solve, options)
+    if not (isinstance(calmer, FinishedCandidate) and calmer.verified):
         status = "the fastest motion is kept: a smoother one was not verified"
-        return _keep(fastest, status, found.reports)
-    reduction = float(1.0 - np.sqrt(program.objective(found.refined.x)))
+        return _keep(fastest, status, calmer.reports)
+    reduction = float(1.0 - np.sqrt(program.objective(calmer.refined.x)))
     if reduction < _WORTH_IT:
-        return _keep(fastest, too_similar, found.reports)
-    later = found.t_end / fastest.t_end - 1.0
+        return _keep(fastest, too_similar, calmer.reports)
+    later = calmer.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
     return LeastMotion(
-        found.trajectory, found.verification, reduction, later, status, found.reports
+        calmer.trajectory, calmer.verification, reduction, later, status, calmer.reports
     )
 
 
@@ -205,10 +205,12 @@ def least_acceleration(
     speeds = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0)
     units = np.array(robot.position_units)
     for unit in set(robot.position_units):
-        own = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
-        if speeds[own].any():
-            weights[own] = 1.0 / speeds[own].max()
-    longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
+        unlimited = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
+        if speeds[unlimited].any():
+            weights[unlimited] = 1.0 / speeds[unlimited].max()
+    longest = np.array([x_of_phase[0] for _, x_of_phase in program.split(x)]) * (
+        1.0 + slower
+    )
     objective = LeastAcceleration(weights, longest)
     size = program.with_objective(objective).objective(x)
     return replace(objective, weights=weights / np.sqrt(size or 1.0))

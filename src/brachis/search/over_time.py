@@ -133,7 +133,7 @@ class BetterTimings:
     timings : sequence of PhaseTiming or None
         The fastest ones known, one for each phase of the program.
     solved : SolvedProgram or None
-        The motion over time; None where there is none.
+        The motion over time; None where the solve gave none.
     """
 
     program: Program
@@ -177,9 +177,9 @@ def improve_timings(
     BetterTimings
         Those given, where no joint is redundant, no time is left, or no motion comes out.
     """
-    as_given = BetterTimings(program, paths.timings)
+    unimproved = BetterTimings(program, paths.timings)
     if not guess.joint_map.r or session.deadline.passed:
-        return as_given
+        return unimproved
     followed = zip(program.phases, paths.curves, strict=True)
     restricted = program.with_phases(
         phase.restrict_to(curves, is_followed=True) for phase, curves in followed
@@ -187,7 +187,7 @@ def improve_timings(
     spline = guess.problem.task.spline
     solved = _solve_from_timings(restricted, paths.timings, session, spline)
     if solved is None:
-        return as_given
+        return unimproved
     pairs = zip(solved.program.phases, program.phases, strict=True)
     unrestricted = solved.program.with_phases(
         phase.with_limits(original.limits) for phase, original in pairs
@@ -195,7 +195,7 @@ def improve_timings(
     timings = time_phases(unrestricted, solved.x)
     if least_time(timings) < paths.t_end:
         return BetterTimings(unrestricted, timings, solved)
-    return replace(as_given, solved=solved)
+    return replace(unimproved, solved=solved)
 
 
 def _solve_from_timings(

@@ -51,8 +51,8 @@ def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
         s; infinite for a joint path that cannot be followed at any speed, or not at the given one.
     """
     total = problem.dwell_time
-    for part in fastest_times(problem, s, q):
-        total += np.inf if part is None else float(part[1][-1])
+    for timed_leg in fastest_times(problem, s, q):
+        total += np.inf if timed_leg is None else float(timed_leg[1][-1])
     return total
 
 
@@ -75,7 +75,7 @@ def fastest_times(
         For each leg path coordinates (P,) from its beginning to its end, and times (P,) from 0 on, s. None for a leg
         that cannot be passed.
     """
-    found = []
+    timed_legs = []
     parts = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
     for leg, rates, law in parts:
         plane = phase_plane_on(problem, leg, s, q)
@@ -87,8 +87,8 @@ def fastest_times(
             times, rate, acceleration = follow_law(law, plane.path.s)
             if plane.speed_factor(rate, acceleration)[0] < _ROUGH:
                 times = None
-        found.append(None if times is None else (plane.path.s, times))
-    return found
+        timed_legs.append(None if times is None else (plane.path.s, times))
+    return timed_legs
 
 
 def phase_plane_on(
@@ -103,41 +103,41 @@ def phase_plane_on(
     return PhasePlane(problem.limits, JointPath.through(stations, postures))
 
 
-def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
+def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
     """Fit splines to the joint path of a guess, as `starting_point` does.
 
     Parameters
     ----------
     program : Program
         With a phase for each leg of the path.
-    start : InitialGuess
+    guess : InitialGuess
 
     Returns
     -------
     (v,) ndarray or None
     """
-    durations = start.durations or (None,) * len(start.legs)
-    guesses = [(start.legs, durations)]
-    if start.durations is None:
+    durations = guess.durations or (None,) * len(guess.legs)
+    curves_and_durations = [(guess.legs, durations)]
+    if guess.durations is None:
         # The joint paths of legs are timed that are near the best ones, have many knots, or moving ends.
-        is_near = start.is_improved or program.variables > _FEW_VARIABLES
+        is_near = guess.is_improved or program.variables > _FEW_VARIABLES
         timed = [
             _time_guess(phase, curves)
             if is_near or any(phase.boundary.rates)
             else (curves, None)
-            for phase, curves in zip(program.phases, start.legs, strict=True)
+            for phase, curves in zip(program.phases, guess.legs, strict=True)
         ]
         curves, durations = zip(*timed, strict=True)
         if any(durations):
-            guesses.append((curves, durations))
-    found = []
-    for curves, durations in guesses:
+            curves_and_durations.append((curves, durations))
+    points = []
+    for curves, durations in curves_and_durations:
         x = starting_point(program, curves, durations)
         if x is not None:
             beyond = max(worst_time_scaling_ratio(program, x), 1.0)
-            found.append((beyond, program.end_time(x), x))
+            points.append((beyond, program.end_time(x), x))
     # The fastest one within the limits.
-    return min(found, key=itemgetter(0, 1))[-1] if found else None
+    return min(points, key=itemgetter(0, 1))[-1] if points else None
 
 
 def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:
@@ -148,16 +148,16 @@ def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | N
     if phase.time_law is not None or phase.joint_map.path is None:
         return curves, None
     try:
-        own = PhaseTiming.through(phase, curves, _STATIONS, is_rough=True)
+        phase_timing = PhaseTiming.through(phase, curves, _STATIONS, is_rough=True)
     except UnreachableError:
         return curves, None
-    if own.timing is None:
+    if phase_timing.timing is None:
         return curves, None
-    t = np.linspace(0.0, own.t_end, _STATIONS)
-    return own.course.curves(own.timing, t)[0], own.t_end
+    t = np.linspace(0.0, phase_timing.t_end, _STATIONS)
+    return phase_timing.course.curves(phase_timing.timing, t)[0], phase_timing.t_end
 
 
-def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:
+def postures_along(guess: InitialGuess, s: np.ndarray) -> np.ndarray | None:
     """Postures of a guess, (S, n), at path coordinates, (S,); None if some do not exist."""
-    q = start.postures_at(s)
+    q = guess.postures_at(s)
     return q if np.isfinite(q).all() else None

@@ -75,10 +75,10 @@ def rank_candidate(
     if deadline.passed:
         return begin_candidate(guess, NOT_TRIED)
     # A motion that is given may be near the optimum for limits that the phase plane does not know.
-    is_given = guess.durations is not None
+    is_motion = guess.durations is not None
     try:
         program = program_of(guess.problem, guess.maps_by_leg())
-        if guess.is_improved or (is_given and not is_timing_all(program)):
+        if guess.is_improved or (is_motion and not is_timing_all(program)):
             return rank(guess, program)
         return improve_over_path(guess, program, _open_session(guess, deadline, ignore))
     except UnreachableError as error:

@@ -1,9 +1,10 @@
-"""The search: initial guesses from lattices, solved coarsely, ranked, the best refined and verified.
+"""The search: initial guesses from lattices, ranked by the timing of their joint paths, the best refined and verified.
 
 1. Lattices give initial guesses, batch by batch (see `schedule`).
-2. They are solved at the first collocation points.
-3. They are refined and verified in the order of their end times as long as they may beat the best verified one.
-   Refinement slows all motions by about as much. So a motion that does not beat the best one before is not refined.
+2. Their joint paths are improved, and the least times along these rank them (see `pipeline`).
+3. In the order of these times candidates are solved over time, refined and verified, as long as they may beat the best
+   verified one. Refinement slows all motions by about as much. So a motion that does not beat the best one before its
+   refinement is not refined.
 4. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
@@ -89,8 +90,8 @@ class Search:
     ----------
     candidates : list of Candidate
         All that was looked at.
-    starts : list of InitialGuess
-        All that was begun with.
+    guesses : list of InitialGuess
+        All that candidates were begun with.
     best : FinishedCandidate or None
         The fastest verified one, or the one nearest to the limits.
     interrupted : bool
@@ -105,7 +106,7 @@ class Search:
         listener: Listener,
     ) -> None:
         self.candidates: list[Candidate] = []
-        self.starts: list[InitialGuess] = []
+        self.guesses: list[InitialGuess] = []
         self.best: FinishedCandidate | None = None
         self.interrupted = False
         self._problem = problem
@@ -134,20 +135,20 @@ class Search:
 
     def run(
         self,
-        given: Trajectory | None = None,
+        motion: Trajectory | None = None,
         exact: FinishedCandidate | None = None,
-        most: int | None = None,
+        max_batches: int | None = None,
     ) -> None:
-        """Find starts, solve, refine and verify, batch by batch.
+        """Find guesses, rank them, refine and verify the best, batch by batch.
 
         Parameters
         ----------
-        given : Trajectory, optional
+        motion : Trajectory, optional
             A motion that is tried alone at first; nothing else is if it leads to a verified motion.
         exact : FinishedCandidate, optional
-            A verified plan of the same task without tolerances. It is the plan unless a faster one is found, first near
-            it, and, if there is none or the search is exhaustive, elsewhere.
-        most : int, optional
+            A verified plan of the same task without tolerances. It is the plan unless a faster one is found: first near
+            it, then, if the search found none there or is exhaustive, elsewhere.
+        max_batches : int, optional
             Number of batches after which the search ends.
 
         Raises
@@ -157,24 +158,24 @@ class Search:
         PlanningError
             A speed, or a mean of a load, is far out of reach.
         """
-        starts = self._find_starts(given, exact)
-        for batch in itertools.islice(starts, most):
+        guess_batches = self._find_guesses(motion, exact)
+        for batch in itertools.islice(guess_batches, max_batches):
             self._rank(batch)
             self._refine_and_verify(batch)
         # The last solves may have been cut short.
         self.interrupted |= self._deadline.passed
 
-    def _find_starts(
-        self, given: Trajectory | None, exact: FinishedCandidate | None
+    def _find_guesses(
+        self, motion: Trajectory | None, exact: FinishedCandidate | None
     ) -> Iterator[Batch]:
-        """Yield batches of initial guesses while they are worth solving."""
-        if given is not None:
-            yield from self._start_from(given, GIVEN)
+        """Yield batches of initial guesses while they are worth trying."""
+        if motion is not None:
+            yield from self._guess_from(motion, GIVEN)
         elif exact is not None:
             self.candidates.append(exact)
             self._keep(exact)
-            yield from self._start_from(exact.trajectory, EXACT)
-        goes_on = given is None and self._problem.task.search.effort == "exhaustive"
+            yield from self._guess_from(exact.trajectory, EXACT)
+        goes_on = motion is None and self._problem.task.search.effort == "exhaustive"
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
@@ -188,15 +189,15 @@ class Search:
             if self._deadline.passed:
                 self.interrupted = True
                 if not batch.fallback:
-                    self._add_starts(batch)
+                    self._add_guesses(batch)
                 return
             if batch.fallback and is_first_fallback:
                 is_first_fallback = False
                 self._refuse_what_is_out_of_reach()
             yield batch
 
-    def _start_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:
-        """Yield the guess from a known motion, if it can be used; put down why a given one led to nothing."""
+    def _guess_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:
+        """Yield the guess from a known motion, if it can be used; record why the given one led to no plan."""
         outcome = "it led to no verified plan"
         try:
             guess = given_guess(self._problem, self._decompositions, motion, origin)
@@ -208,10 +209,10 @@ class Search:
 
     def _rank(self, batch: Batch) -> None:
         """Improve the joint paths of a batch, and rank them by their times."""
-        first = self._add_starts(batch)
+        first = self._add_guesses(batch)
         work = run_in_processes(
             pipeline.rank_candidate,
-            batch.starts,
+            batch.guesses,
             self._deadline,
             jobs=self._problem.task.search.jobs,
             listener=self._listener,
@@ -223,15 +224,15 @@ class Search:
                     self.interrupted = True
                 if isinstance(candidate, RankedCandidate):
                     self._ranked[number] = candidate
-        self._waiting = self._by_end_time(first)
+        self._waiting = self._by_time(first)
 
     def _refine_and_verify(self, batch: Batch) -> None:
-        """Refine and verify the candidates of a batch in the order of their end times while they may be the fastest."""
+        """Refine and verify the candidates of a batch in the order of their ranks while they may be the fastest."""
         jobs = self._problem.task.search.jobs
         # With auto they are finished one by one, for the next one may not be needed.
         jobs = 1 if jobs == "auto" else process_count(jobs)
-        left = batch.refined
-        while self._waiting and self._goes_on(left):
+        budget = batch.refined
+        while self._waiting and self._goes_on(budget):
             numbers = self._waiting[:jobs]
             work = run_in_processes(
                 pipeline.finish_candidate,
@@ -243,9 +244,9 @@ class Search:
             )
             with closing(work) as outcomes:
                 for number, outcome in zip(numbers, outcomes, strict=True):
-                    if number != numbers[0] and not self._goes_on(left):
+                    if number != numbers[0] and not self._goes_on(budget):
                         return
-                    left -= 1
+                    budget -= 1
                     candidate = outcome
                     if self._to_beat <= outcome.adapted < np.inf:
                         # Over all knots it is slower than what was verified meanwhile.
@@ -275,11 +276,11 @@ class Search:
             self.interrupted = True
         if self.interrupted:
             # One of the fastest three becomes the unverified motion.
-            for number in self._by_end_time()[:3]:
+            for number in self._by_time()[:3]:
                 if self.best is None:
-                    solved = self._ranked[number]
+                    ranked = self._ranked[number]
                     candidate = pipeline.finish_candidate(
-                        solved, np.inf, Deadline(0.0), ignore
+                        ranked, np.inf, Deadline(0.0), ignore
                     )
                     self._finish(number, candidate)
         if is_pressed and not self.is_satisfied:
@@ -290,17 +291,19 @@ class Search:
         if self.best is None:
             raise self.explain()
         return SearchOutcome(
-            self.best, self.in_order(), self.interrupted, self.not_completed()
+            self.best, self.in_order(), self.interrupted, self.list_unfinished_work()
         )
 
     def explain(self) -> BrachisError:
         """Return the error that tells why no motion was found."""
-        failure = explain_holding(self.starts) or explain_postures(self.starts)
-        failure = failure or explain_speeds(self.starts, are_tried=True)
+        failure = explain_holding(self.guesses) or explain_postures(self.guesses)
+        failure = failure or explain_speeds(self.guesses, are_tried=True)
         if failure is not None:
             return failure
         # The time for the search may have ended every solve, of which each has a time limit of its own.
-        last = [each.reports[-1] for each in self.candidates if each.reports]
+        last = [
+            candidate.reports[-1] for candidate in self.candidates if candidate.reports
+        ]
         self.interrupted |= bool(last) and all(
             report.status is SolveStatus.TIME_LIMIT
             and report.wall_time < self._problem.task.solver.time_limit
@@ -312,10 +315,10 @@ class Search:
             self.candidates,
             self._dead_ends,
             self._deadline,
-            self.not_completed() if self.interrupted else (),
+            self.list_unfinished_work() if self.interrupted else (),
         )
 
-    def not_completed(self) -> tuple[str, ...]:
+    def list_unfinished_work(self) -> tuple[str, ...]:
         """Say in plain words what was not completed."""
         parts = []
         best = self.best
@@ -330,12 +333,14 @@ class Search:
         if self._unfinished_lattices:
             names = name_first(list(self._unfinished_lattices), " | ")
             parts.append(f"the lattice of {names} was not searched completely")
-        unsolved = sum(each.status == pipeline.NOT_TRIED for each in self.candidates)
+        unsolved = sum(
+            candidate.status == pipeline.NOT_TRIED for candidate in self.candidates
+        )
         counts = {"planned": unsolved, "refined": len(self._waiting)}
-        left = [f"{n} not {what}" for what, n in counts.items() if n]
-        if left:
+        unfinished = [f"{n} not {what}" for what, n in counts.items() if n]
+        if unfinished:
             total = write_count(len(self.candidates), "candidate")
-            parts.append(f"of {total} {', '.join(left)}")
+            parts.append(f"of {total} {', '.join(unfinished)}")
         return (*parts, "the search that search.effort requires was not completed")
 
     def in_order(self) -> tuple[Candidate, ...]:
@@ -353,19 +358,19 @@ class Search:
         """When the last work ends: a second later while nothing is verified."""
         return self._deadline if self.is_satisfied else self._deadline.extend(1.0)
 
-    def _by_end_time(self, first: int = 0) -> list[int]:
-        """Numbers, from `first` on, of the candidates that were solved, the fastest one first."""
+    def _by_time(self, first: int = 0) -> list[int]:
+        """Numbers, from `first` on, of the ranked candidates, that with the least time along its joint path first."""
         return sorted(
             (number for number in self._ranked if number >= first),
             key=lambda number: (round_end_time(self._ranked[number].coarse), number),
         )
 
-    def _add_starts(self, batch: Batch) -> int:
+    def _add_guesses(self, batch: Batch) -> int:
         """Add guesses as candidates that were not tried yet; return the number of the first one."""
         first = len(self.candidates)
-        self.starts += batch.starts
+        self.guesses += batch.guesses
         self.candidates += [
-            begin_candidate(start, pipeline.NOT_TRIED) for start in batch.starts
+            begin_candidate(guess, pipeline.NOT_TRIED) for guess in batch.guesses
         ]
         return first
 
@@ -399,10 +404,10 @@ class Search:
         if failure is not None:
             raise failure
 
-    def _goes_on(self, left: int) -> bool:
+    def _goes_on(self, budget: int) -> bool:
         """Tell whether the first one of the waiting candidates is worth finishing."""
         first = self._ranked[self._waiting[0]]
-        if not self._may_win(first) or (self.is_satisfied and left <= 0):
+        if not self._may_win(first) or (self.is_satisfied and budget <= 0):
             self._waiting = []
             return False
         if self._latest.passed:
@@ -429,10 +434,10 @@ class Search:
     def _is_known(self, candidate: RankedCandidate) -> bool:
         """Tell whether a motion along the same joint path is known, in the same coordinates."""
         return any(
-            candidate.redundant_joints == other.redundant_joints
-            and candidate.branch == other.branch
-            and is_same(candidate.guess, other.guess)
-            for other in self._finished
+            candidate.redundant_joints == finished.redundant_joints
+            and candidate.branch == finished.branch
+            and is_same(candidate.guess, finished.guess)
+            for finished in self._finished
         )
 
     def _finish(self, number: int, candidate: Candidate) -> None:

@@ -31,40 +31,41 @@ _IDLE_TIME = 300.0
 _HEARTBEAT = 0.1
 """Seconds until Ctrl-C is noticed."""
 
-_Given = TypeVar("_Given")
-_Made = TypeVar("_Made")
+_Input = TypeVar("_Input")
+_Output = TypeVar("_Output")
 
 
 def run_in_processes(
-    function: Callable[..., _Made],
-    given: Sequence[_Given],
-    *others: object,
+    function: Callable[..., _Output],
+    arguments: Sequence[_Input],
+    *shared_arguments: object,
     jobs: int | str,
     listener: Listener,
-) -> Generator[_Made, None, None]:
-    """Do a piece of work for every item, in up to `jobs` processes.
+) -> Generator[_Output, None, None]:
+    """Call a function with every argument, in up to `jobs` processes.
 
     What was handed out is done even if nobody asks for its result any more.
 
     Parameters
     ----------
     function : callable
-        ``function(item, *others, listener)``; a function of a module, so that it can be sent to other processes.
-    given : sequence
-        The items.
-    *others : object
-        The same for all items.
+        ``function(argument, *shared_arguments, listener)``; a function of a module, so that it can be sent to other
+        processes.
+    arguments : sequence
+        One for each call.
+    *shared_arguments : object
+        The same for all calls.
     jobs : int or "auto"
-        With 1, and within another program's workers, the work is done here, item by item as it is asked for. With
-        ``auto`` it is, until the rest is going to take longer than 3 s, or 0.7 s where an earlier plan has started the
-        processes. What cannot be sent to others is done here too.
+        With 1, and within another program's workers, the work is done here, call by call as results are asked for.
+        With ``auto`` it is, until the rest is going to take longer than 3 s, or 0.7 s where an earlier plan has started
+        the processes. What cannot be sent to others is done here too.
     listener : callable
         Only heard of work that is done here.
 
     Yields
     ------
     object
-        What the function returns, in the order of the items.
+        What the function returns, in the order of the arguments.
 
     Raises
     ------
@@ -72,23 +73,25 @@ def run_in_processes(
         A process ended before its work was done.
     """
     count = process_count(jobs)
-    is_alone = count == 1 or len(given) <= 1 or _is_within_a_worker()
-    outcomes: list[Future[_Made]] = []
+    is_alone = count == 1 or len(arguments) <= 1 or _is_within_a_worker()
+    outcomes: list[Future[_Output]] = []
     elapsed = 0.0
     done = 0
-    for number in range(len(given)):
+    for number in range(len(arguments)):
         while number == len(outcomes) or not outcomes[number].done():
             interrupts.check()
-            waiting = given[len(outcomes) :]
+            waiting = arguments[len(outcomes) :]
             has_workers = _start_workers.cache_info().currsize > 0
             worth = _WORTH_SENDING if has_workers else _WORTH_STARTING
             is_long = elapsed / max(done, 1) * len(waiting) > worth
             if not is_alone and (jobs != "auto" or is_long):
-                outcomes += _hand_out(count - 1, waiting, function, *others)
-            if len(outcomes) < len(given):
+                outcomes += _hand_out(count - 1, waiting, function, *shared_arguments)
+            if len(outcomes) < len(arguments):
                 began = time.perf_counter()
-                item = given[len(outcomes)]
-                outcomes.append(_do_here(function, item, *others, listener))
+                argument = arguments[len(outcomes)]
+                outcomes.append(
+                    _do_here(function, argument, *shared_arguments, listener)
+                )
                 elapsed += time.perf_counter() - began
                 done += 1
             else:
@@ -96,21 +99,26 @@ def run_in_processes(
         failure = outcomes[number].exception()
         if isinstance(failure, BrokenExecutor | PicklingError):
             _refuse_lost_work(failure)
-            outcomes[number] = _do_here(function, given[number], *others, listener)
+            outcomes[number] = _do_here(
+                function, arguments[number], *shared_arguments, listener
+            )
         yield outcomes[number].result()
 
 
 def _hand_out(
     count: int,
-    waiting: Sequence[_Given],
-    function: Callable[..., _Made],
-    *others: object,
-) -> list[Future[_Made]]:
-    """Give the first items to `count` other processes, as many as they are free for, and no more than their share."""
+    waiting: Sequence[_Input],
+    function: Callable[..., _Output],
+    *shared_arguments: object,
+) -> list[Future[_Output]]:
+    """Hand out the first arguments to `count` processes, as many as they are free for, and no more than their share."""
     workers = _start_workers(count, os.getpid())
     share = len(waiting) * count // (count + 1)
-    most = min(share, workers.count_free())
-    return [workers.submit(function, item, *others) for item in waiting[:most]]
+    quota = min(share, workers.count_free())
+    return [
+        workers.submit(function, argument, *shared_arguments)
+        for argument in waiting[:quota]
+    ]
 
 
 def _refuse_lost_work(failure: Exception) -> None:
@@ -136,8 +144,8 @@ def process_count(jobs: int | str) -> int:
         return 1
     from joblib import cpu_count
 
-    most = int(cpu_count())
-    return most if isinstance(jobs, str) else min(jobs, most)
+    processors = int(cpu_count())
+    return processors if isinstance(jobs, str) else min(jobs, processors)
 
 
 class _Workers:
@@ -154,8 +162,8 @@ class _Workers:
         self._starting = [self.submit(_import_planner) for _ in range(count)]
 
     def submit(
-        self, function: Callable[..., _Made], *arguments: object
-    ) -> Future[_Made]:
+        self, function: Callable[..., _Output], *arguments: object
+    ) -> Future[_Output]:
         """Hand out a piece of work."""
         with interrupts.block_in_children():
             future = self._executor.submit(_run_in_worker, function, *arguments)
@@ -169,8 +177,8 @@ class _Workers:
 
     def count_free(self) -> int:
         """Count the pieces of work that may be handed out: two for each process that is ready."""
-        self._under_way = [own for own in self._under_way if not own.done()]
-        ready = sum(own.done() for own in self._starting)
+        self._under_way = [future for future in self._under_way if not future.done()]
+        ready = sum(future.done() for future in self._starting)
         return max(0, 2 * ready - len(self._under_way))
 
 
@@ -185,9 +193,9 @@ def _import_planner(_listener: Listener) -> None:
     import_module("brachis.search.portfolio")
 
 
-def _do_here(function: Callable[..., _Made], *arguments: object) -> Future[_Made]:
+def _do_here(function: Callable[..., _Output], *arguments: object) -> Future[_Output]:
     """Do a piece of work in this process."""
-    outcome: Future[_Made] = Future()
+    outcome: Future[_Output] = Future()
     try:
         outcome.set_result(function(*arguments))
     except BrachisError as error:  # who asks for the outcome gets it
@@ -195,7 +203,7 @@ def _do_here(function: Callable[..., _Made], *arguments: object) -> Future[_Made
     return outcome
 
 
-def _run_in_worker(function: Callable[..., _Made], *arguments: object) -> _Made:
+def _run_in_worker(function: Callable[..., _Output], *arguments: object) -> _Output:
     """Do a piece of work in a process of its own: one thread for linear algebra, nobody listening."""
     with use_one_thread():
         return function(*arguments, ignore)

@@ -54,30 +54,35 @@ def try_remedies(
     content = task.to_dict()
     advice = []
     for number, remedy in enumerate(error.remedies):
-        own = deadline.part(1.0 / (len(error.remedies) - number))
+        remedy_deadline = deadline.part(1.0 / (len(error.remedies) - number))
 
         def is_enough(
-            value: float, most: int | None, key: str = remedy.key, own: Deadline = own
+            value: float,
+            max_batches: int | None,
+            key: str = remedy.key,
+            remedy_deadline: Deadline = remedy_deadline,
         ) -> bool | None:
             """Tell whether a value of the key gives a plan; None if the time was up."""
-            limit = own.part(0.4) if most else own
+            soon = remedy_deadline.part(0.4) if max_batches else remedy_deadline
             try:
                 changed = load_task(_with_number(content, robot, key, value))
                 arm = robot
                 if changed.robot != task.robot:
                     arm = robot_from_settings(changed.robot, urdf_text=robot.urdf)
-                found = is_planned(arm, changed, families, own_limits, limit, most)
+                has_plan = is_planned(
+                    arm, changed, families, own_limits, soon, max_batches
+                )
             except BrachisError:
-                found = False
-            return None if not found and limit.passed else found
+                has_plan = False
+            return None if not has_plan and soon.passed else has_plan
 
         try:
-            found = _try_numbers(remedy, is_enough, own)
+            number_text = _try_numbers(remedy, is_enough, remedy_deadline)
         except KeyboardInterrupt:
             interrupts.clear()
             break
-        if found:
-            advice.append(f"{remedy.verb} {remedy.key} to {found}")
+        if number_text:
+            advice.append(f"{remedy.verb} {remedy.key} to {number_text}")
     # One number alone may not be enough.
     untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies)
     text = ", or ".join(advice) or f"{untried} (how far is not known)"
@@ -90,22 +95,22 @@ def is_planned(
     families: Sequence[ik.Family],
     own_limits: Sequence[LimitModel],
     deadline: Deadline,
-    most: int | None,
+    max_batches: int | None,
 ) -> bool | None:
-    """Tell whether the first `most` batches of a search, or all, lead to a verified plan.
+    """Tell whether the first `max_batches` batches of a search, or all, lead to a verified plan.
 
     Returns None where there may be one yet: not all batches were tried, or the robot has more joint paths than these
     have.
     """
-    if most:
+    if max_batches:
         task = task_with(task, effort="single")
     problem = Problem.of(robot, task, own_limits)
     search = Search(problem, decompositions_of(problem, families), deadline, ignore)
     with search.end_early():
-        search.run(most=most)
+        search.run(max_batches=max_batches)
     if search.best is not None and search.best.verified:
         return True
-    return None if most or problem.r > 0 else False
+    return None if max_batches or problem.r > 0 else False
 
 
 IsEnough = Callable[[float, int | None], bool | None]
@@ -170,10 +175,10 @@ def _with_number(
     above, _, last = key.rpartition(".")
     if last not in robot.joint_names or not above.startswith("robot.limits."):
         return with_keys(content, {key: value})
-    given: Any = content
-    for part in above.split("."):
-        given = given[part]
-    if isinstance(given, int | float):
-        given = dict.fromkeys(robot.joint_names, given)
-    others = given if isinstance(given, Mapping) else {}
-    return with_keys(content, {above: {**others, last: value}})
+    setting: Any = content
+    for name in above.split("."):
+        setting = setting[name]
+    if isinstance(setting, int | float):
+        setting = dict.fromkeys(robot.joint_names, setting)
+    by_joint = setting if isinstance(setting, Mapping) else {}
+    return with_keys(content, {above: {**by_joint, last: value}})

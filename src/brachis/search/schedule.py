@@ -34,11 +34,11 @@ from brachis.search.starts import (
 _SIZE = 12
 """Guesses of a batch."""
 _LATTICE_SHARE = 0.4
-"""Part of the time left in which the guesses of a level are looked for; those found by then are planned."""
+"""Part of the time left in which the guesses of a level are looked for; those found by then are tried."""
 
 Lattices = list[tuple[Decomposition | None, DeadEnd]]
 """Lattices that gave no guesses (None: of all postures), and where they end."""
-Found = tuple[list[InitialGuess], Lattices]
+GuessesAndLattices = tuple[list[InitialGuess], Lattices]
 
 
 @dataclass(frozen=True)
@@ -47,27 +47,27 @@ class Batch:
 
     Attributes
     ----------
-    starts : tuple of InitialGuess
+    guesses : sequence of InitialGuess
         With the solvers that plan from them.
     refined : int
-        How many of them are refined and verified, no more, once a motion is verified.
+        Largest number of them that are refined and verified once a motion is verified.
     fallback : bool
         Whether it is tried only while no motion is verified.
     lattices : list of (Decomposition or None, DeadEnd)
         Lattices that gave no guesses (None: of all postures), and where they end.
     """
 
-    starts: Sequence[InitialGuess] = ()
+    guesses: Sequence[InitialGuess] = ()
     refined: int = 0
     fallback: bool = True
     lattices: Lattices = field(default_factory=list)
 
 
 def _with_solvers(
-    starts: Sequence[InitialGuess], solvers: Sequence[str]
+    guesses: Sequence[InitialGuess], solvers: Sequence[str]
 ) -> list[InitialGuess]:
     """Combine guesses with solvers."""
-    return [replace(start, solver=solver) for solver in solvers for start in starts]
+    return [replace(guess, solver=solver) for solver in solvers for guess in guesses]
 
 
 def batches(
@@ -98,29 +98,29 @@ def batches(
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
     if isinstance(problem.task_map, JointSpace):
-        start = joint_space_start(problem)
-        refuse_hopeless([start])
-        for number, each in enumerate(_with_solvers([start], solvers)):
-            yield Batch([each], 1, fallback=number > 0)
+        guess = joint_space_start(problem)
+        refuse_hopeless([guess])
+        for number, solver_guess in enumerate(_with_solvers([guess], solvers)):
+            yield Batch([solver_guess], 1, fallback=number > 0)
         return
     if has_charts(problem, decompositions):
         find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
-        known = yield from _level_by_level(levels, solvers, find)
+        guesses = yield from _level_by_level(levels, solvers, find)
         for solver in solvers[1:]:
-            yield Batch(_with_solvers(known[:_SIZE], [solver]), len(known))
+            yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
         levels = tuple(replace(level, fallback=True) for level in levels)
     if not decompositions:
         return
     find = partial(_guess_on_branches, decompositions, deadline, listener)
-    known = yield from _level_by_level(levels, solvers, find)
-    many = len(known) + len(STRATEGIES)
-    tried = {(start.joint_map.redundant_joints, start.origin) for start in known}
-    yield Batch(_with_solvers(known[:_SIZE], solvers[1:2]), many)
+    guesses = yield from _level_by_level(levels, solvers, find)
+    many = len(guesses) + len(STRATEGIES)
+    tried = {(guess.joint_map.redundant_joints, guess.origin) for guess in guesses}
+    yield Batch(_with_solvers(guesses[:_SIZE], solvers[1:2]), many)
     for decomposition in decompositions[: levels[-1].decompositions]:
-        for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
-            if (start.joint_map.redundant_joints, start.origin) not in tried:
-                yield Batch(_with_solvers([start], solvers[:2]), many)
-    yield Batch(_with_solvers(known[:2], solvers[2:]), many)
+        for guess in numeric_starts(decomposition, len(STRATEGIES), deadline):
+            if (guess.joint_map.redundant_joints, guess.origin) not in tried:
+                yield Batch(_with_solvers([guess], solvers[:2]), many)
+    yield Batch(_with_solvers(guesses[:2], solvers[2:]), many)
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
@@ -135,24 +135,24 @@ def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> boo
 def _level_by_level(
     levels: Sequence[SearchLevel],
     solvers: Sequence[str],
-    find: Callable[[SearchLevel], Found],
+    find: Callable[[SearchLevel], GuessesAndLattices],
 ) -> Generator[Batch, None, list[InitialGuess]]:
-    """Yield batches of the guesses that are found for each level, with the first solver; return all guesses."""
-    known = []
+    """Yield batches of the guesses of each level, with the first solver; return the guesses of all levels."""
+    guesses = []
     for level in levels:
         if level.fallback:
             # The search may end here, before lattices are looked at.
             yield Batch()
-        starts, lattices = find(level)
-        known += starts
-        for first in range(0, max(1, len(starts)), _SIZE):
+        level_guesses, lattices = find(level)
+        guesses += level_guesses
+        for first in range(0, max(1, len(level_guesses)), _SIZE):
             yield Batch(
-                _with_solvers(starts[first : first + _SIZE], solvers[:1]),
+                _with_solvers(level_guesses[first : first + _SIZE], solvers[:1]),
                 level.refined,
                 level.fallback,
                 [] if first else lattices,
             )
-    return known
+    return guesses
 
 
 def _guess_in_charts(
@@ -161,14 +161,14 @@ def _guess_in_charts(
     deadline: Deadline,
     listener: Listener,
     level: SearchLevel,
-) -> Found:
+) -> GuessesAndLattices:
     """Find guesses in charts."""
     listener("looking for joint paths on the lattice of all postures")
     soon = deadline.part(_LATTICE_SHARE)
-    found = chart_starts(problem, decompositions, level, soon, listener)
-    if isinstance(found, DeadEnd):
-        return [], [(None, found)]
-    return found, []
+    outcome = chart_starts(problem, decompositions, level, soon, listener)
+    if isinstance(outcome, DeadEnd):
+        return [], [(None, outcome)]
+    return outcome, []
 
 
 def _guess_on_branches(
@@ -176,16 +176,18 @@ def _guess_on_branches(
     deadline: Deadline,
     listener: Listener,
     level: SearchLevel,
-) -> Found:
+) -> GuessesAndLattices:
     """Find guesses on the branches of closed forms; decompositions without a joint path make room for others."""
     lattices: Lattices = []
     for first in range(0, len(decompositions), level.decompositions):
-        some = decompositions[first : first + level.decompositions]
-        starts, more = _guess_on_some_branches(some, deadline, listener, level)
-        lattices += more
-        if starts:
-            refuse_hopeless(starts)
-            return starts, lattices
+        some_decompositions = decompositions[first : first + level.decompositions]
+        guesses, new_lattices = _guess_on_some_branches(
+            some_decompositions, deadline, listener, level
+        )
+        lattices += new_lattices
+        if guesses:
+            refuse_hopeless(guesses)
+            return guesses, lattices
     return [], lattices
 
 
@@ -194,35 +196,38 @@ def _guess_on_some_branches(
     deadline: Deadline,
     listener: Listener,
     level: SearchLevel,
-) -> Found:
-    """Take one guess of every choice after the other, of each those with the least estimated times first."""
+) -> GuessesAndLattices:
+    """Take a guess from every decomposition in turn, from each those with the least estimated times first."""
     search = decompositions[0].problem.task.search
     if search.guesses == "numeric":
-        most = level.joint_paths
-        numeric = (numeric_starts(each, most, deadline) for each in decompositions)
+        count = level.joint_paths
+        numeric = (
+            numeric_starts(decomposition, count, deadline)
+            for decomposition in decompositions
+        )
         return list(itertools.chain(*numeric)), []
     deadline = deadline.part(_LATTICE_SHARE)
     outcomes = run_in_processes(
-        _starts_of, decompositions, level, deadline, jobs=search.jobs, listener=listener
+        _guess_for, decompositions, level, deadline, jobs=search.jobs, listener=listener
     )
     ranked: list[tuple[int, InitialGuess]] = []
     lattices: Lattices = []
-    for decomposition, found in zip(decompositions, list(outcomes), strict=True):
-        if isinstance(found, DeadEnd):
-            lattices.append((decomposition, found))
+    for decomposition, outcome in zip(decompositions, list(outcomes), strict=True):
+        if isinstance(outcome, DeadEnd):
+            lattices.append((decomposition, outcome))
             continue
         # Those that another process found have a copy of the problem.
-        own = [replace(start, problem=decomposition.problem) for start in found]
-        own.sort(key=lambda start: start.estimate)
+        guesses = [replace(guess, problem=decomposition.problem) for guess in outcome]
+        guesses.sort(key=lambda guess: guess.estimate)
         ranked += enumerate(
-            own + numeric_starts(decomposition, level.numeric, deadline)
+            guesses + numeric_starts(decomposition, level.numeric, deadline)
         )
     ranked.sort(key=lambda item: (item[0], item[1].estimate))
-    most = level.in_closed_forms // max(1, len(decompositions[0].redundant))
-    return [start for _, start in ranked[: max(1, most)]], lattices
+    count = level.in_closed_forms // max(1, len(decompositions[0].redundant))
+    return [guess for _, guess in ranked[: max(1, count)]], lattices
 
 
-def _starts_of(
+def _guess_for(
     decomposition: Decomposition,
     level: SearchLevel,
     deadline: Deadline,

@@ -93,8 +93,8 @@ class InitialGuess(Summary):
         s = self.joint_path[:, 0]
         parts = []
         for leg in legs:
-            own = cut(s, leg.begin, leg.end)
-            parts.append(interpolate_columns(own, s, self.joint_path))
+            stations = cut(s, leg.begin, leg.end)
+            parts.append(interpolate_columns(stations, s, self.joint_path))
         return parts
 
     def maps_by_leg(self) -> list[JointMap]:
@@ -103,13 +103,13 @@ class InitialGuess(Summary):
         if len(parts) == 1:
             return [self.joint_map]
         q = self.joint_map.postures(np.concatenate(parts))
-        begins = np.cumsum([0, *(len(part) for part in parts[:-1])])
+        begins = np.cumsum([0, *(len(curves) for curves in parts[:-1])])
         if not np.isfinite(q).all():
             raise UnreachableError("the joint path leaves the branch, or the chart")
         return maps_by_leg(self.problem, self.joint_map, q[begins])
 
     def postures_at(self, s: np.ndarray) -> np.ndarray:
-        """Take postures, (S, n), at path coordinates, (S,); NaN where there are none."""
+        """Take postures, (S, n), at path coordinates, (S,); NaN where none exists."""
         path = self.joint_path
         return self.joint_map.postures(interpolate_columns(s, path[:, 0], path))
 
@@ -126,7 +126,7 @@ class Candidate(Summary):
     Attributes
     ----------
     redundant_joints : tuple of str
-        None where the coordinates are a chart's.
+        Empty where no joint is chosen, as in most charts.
     branch : str
         Label of the branch, or ``chart``; empty where no joint path was found.
     origin : str
@@ -260,7 +260,7 @@ def rank(
 def fail(
     candidate: Candidate, status: str, reports: tuple[SolverReport, ...] = ()
 ) -> Candidate:
-    """Say of which a candidate failed, after which solves more."""
+    """Return a candidate that failed: why, and after which further solves."""
     known = facts_of(candidate)
     known |= {"status": status, "reports": (*candidate.reports, *reports)}
     return Candidate(**known)
@@ -312,7 +312,9 @@ class FinishedCandidate(Candidate):
     @property
     def is_settled(self) -> bool:
         """Whether it is verified, or fails only at what the task wants checked and not kept."""
-        return all(each.passed or not each.is_kept for each in self.verification.checks)
+        return all(
+            check.passed or not check.is_kept for check in self.verification.checks
+        )
 
     @property
     def refinement_rounds(self) -> int:

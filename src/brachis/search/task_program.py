@@ -26,17 +26,17 @@ class TaskProgram(Program):
 
     Parameters
     ----------
-    start : InitialGuess
-        Joint path of the first guess, with its coordinates.
+    guess : InitialGuess
+        Joint path through which the splines of the first point are laid, with its coordinates.
     """
 
-    def __init__(self, start: InitialGuess) -> None:
-        program = program_of(start.problem, start.maps_by_leg())
-        spline = start.problem.task.spline
+    def __init__(self, guess: InitialGuess) -> None:
+        program = program_of(guess.problem, guess.maps_by_leg())
+        spline = guess.problem.task.spline
         if spline.knots == "free":
             program = program.with_free_knots(spline.shortest_interval)
         super().__init__(program.phases, program.links)
-        self._start = start
+        self._path_guess = guess
 
     @cached_property
     def guess(self) -> np.ndarray:
@@ -47,7 +47,7 @@ class TaskProgram(Program):
         PathError
             Such splines leave the branch.
         """
-        x = initial_guess(self, self._start)
+        x = initial_guess(self, self._path_guess)
         if x is None:
             raise PathError(
                 "the splines through the joint path leave the branch, or the chart",
@@ -72,4 +72,4 @@ class TaskProgram(Program):
         """
         check_array(x, (self.variables,), "x")
         check_finite(x, "x")
-        return extract_trajectory(self._start.problem.task, self, x)
+        return extract_trajectory(self._path_guess.problem.task, self, x)

@@ -82,7 +82,7 @@ def verify(
     Returns
     -------
     Candidate
-        A finished one, unless there is no trajectory.
+        A finished one where there is a trajectory.
     """
     problem = candidate.problem
     verification = None
@@ -123,10 +123,10 @@ def _in_words(
     if not np.isfinite(refined.violation):
         return f"{last.solver}: the motion leaves the branch, or the chart, between collocation points"
     if refined.violation > tolerance:
-        found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
+        reason = f"limits exceeded by {100.0 * refined.violation:.2g} %"
     elif verification is None:
-        found = "too sharp for a trajectory"
+        reason = "too sharp for a trajectory"
     else:
-        found = "the verification fails"
+        reason = "the verification fails"
     rounds = write_count(len(refined.reports) - 1, "refinement round")
-    return f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"
+    return f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {reason}"

@@ -339,7 +339,7 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
 
     def hurry(*arguments):
         solved = solve(*arguments)
-        x = solved.program.with_time_scaled(solved.x, 0.6)
+        x = solved.program.scale_time(solved.x, 0.6)
         return replace(solved, reports=(replace(solved.report, x=x),))
 
     monkeypatch.setattr(pipeline, "solve_over_time", hurry)
