@@ -111,7 +111,7 @@ def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choice
     unfinished = [
         candidate.coarse
         for candidate in result.candidates
-        if candidate.status == RANKED
+        if candidate.status in {RANKED, pipeline.SLOW}
     ]
     assert unfinished
     assert min(unfinished) >= first.coarse * (1.0 - 2e-3), (
