@@ -9,7 +9,7 @@ from typing import Any
 from brachis.search.stages import coordinates
 
 WORDS = ("joints", "branch", "origin")
-TIMES = ("coarse [s]", "t_end [s]")
+TIMES = ("estimate [s]", "t_end [s]")
 STATUS = "status"
 """The columns; named as in the JSON."""
 
@@ -22,7 +22,7 @@ def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, .
         branch = str(candidate.get("branch", ""))
         joints = coordinates(candidate.get("redundant_joints", ()), branch)
         origin = str(candidate.get("origin", ""))
-        times = (_write_seconds(candidate.get(key)) for key in ("coarse", "t_end"))
+        times = (_write_seconds(candidate.get(key)) for key in ("estimate", "t_end"))
         rows.append((joints, branch, origin, *times, status))
     return rows
 

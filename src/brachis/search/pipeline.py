@@ -37,6 +37,9 @@ from brachis.search.over_time import (
     solve_over_time,
 )
 from brachis.search.stages import (
+    NO_TIMING,
+    NOT_TRIED,
+    SLOW,
     Candidate,
     InitialGuess,
     RankedCandidate,
@@ -48,12 +51,6 @@ from brachis.search.verified import refine_and_verify
 
 _FOR_KNOTS = 0.5
 """Part of the time left after which the knots are not refined further."""
-NOT_TRIED = "not tried: the search ended"
-"""Status of a candidate for which there was no time."""
-SLOW = "not refined: no faster than another over all knots"
-"""Status of a candidate that does not beat the best one before refinement."""
-NO_TIMING = "the limits allow no timing"
-"""Status of a candidate whose joint path cannot be followed within the limits."""
 
 
 def rank_candidate(

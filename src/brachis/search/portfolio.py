@@ -37,6 +37,8 @@ from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
 from brachis.search.screening import is_same
 from brachis.search.stages import (
+    NOT_TRIED,
+    SLOW,
     Candidate,
     FinishedCandidate,
     InitialGuess,
@@ -220,7 +222,7 @@ class Search:
         with closing(work) as outcomes:
             for number, candidate in enumerate(outcomes, first):
                 self.candidates[number] = candidate
-                if candidate.status == pipeline.NOT_TRIED:
+                if candidate.status == NOT_TRIED:
                     self.interrupted = True
                 if isinstance(candidate, RankedCandidate):
                     self._ranked[number] = candidate
@@ -253,7 +255,7 @@ class Search:
                         candidate = replace(
                             self._ranked[number],
                             adapted=outcome.adapted,
-                            status=pipeline.SLOW,
+                            status=SLOW,
                         )
                     self._finish(number, candidate)
                     self._listener(candidate.describe())
@@ -333,9 +335,7 @@ class Search:
         if self._unfinished_lattices:
             names = name_first(list(self._unfinished_lattices), " | ")
             parts.append(f"the lattice of {names} was not searched completely")
-        unsolved = sum(
-            candidate.status == pipeline.NOT_TRIED for candidate in self.candidates
-        )
+        unsolved = sum(candidate.status == NOT_TRIED for candidate in self.candidates)
         counts = {"planned": unsolved, "refined": len(self._waiting)}
         unfinished = [f"{n} not {what}" for what, n in counts.items() if n]
         if unfinished:
@@ -347,7 +347,7 @@ class Search:
         """All candidates, the fastest verified one first, without their programs."""
 
         def rank(candidate: Candidate) -> tuple[float, ...]:
-            times = candidate.t_end, candidate.coarse, candidate.estimate
+            times = candidate.t_end, candidate.estimate
             return (not candidate.verified, *map(round_end_time, times))
 
         ordered = sorted(self.candidates, key=rank)
@@ -362,7 +362,7 @@ class Search:
         """Numbers, from `first` on, of the ranked candidates, that with the least time along its joint path first."""
         return sorted(
             (number for number in self._ranked if number >= first),
-            key=lambda number: (round_end_time(self._ranked[number].coarse), number),
+            key=lambda number: (round_end_time(self._ranked[number].estimate), number),
         )
 
     def _add_guesses(self, batch: Batch) -> int:
@@ -370,7 +370,7 @@ class Search:
         first = len(self.candidates)
         self.guesses += batch.guesses
         self.candidates += [
-            begin_candidate(guess, pipeline.NOT_TRIED) for guess in batch.guesses
+            begin_candidate(guess, NOT_TRIED) for guess in batch.guesses
         ]
         return first
 
@@ -419,7 +419,7 @@ class Search:
         """Tell whether a candidate may be faster than the best motion."""
         if self.best is None or not self.is_satisfied:
             return True
-        is_fast = candidate.coarse * self._least_ratio < self._to_beat
+        is_fast = candidate.estimate * self._least_ratio < self._to_beat
         return is_fast and not self._is_known(candidate)
 
     def _keep(self, candidate: FinishedCandidate) -> None:
@@ -449,7 +449,7 @@ class Search:
             return
         self._finished.append(self._ranked[number])
         # What limits and knots cost differs from motion to motion.
-        ratio = min(candidate.adapted, candidate.t_end) / candidate.coarse
+        ratio = min(candidate.adapted, candidate.t_end) / candidate.estimate
         least = min(1.0 + _LEAST_COST * (ratio - 1.0), _SURE * ratio)
         self._least_ratio = min(self._least_ratio or least, least)
         if self.best is None or self._merit(candidate) < self._merit(self.best):

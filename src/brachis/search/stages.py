@@ -26,8 +26,14 @@ from brachis.problem.problem import Problem
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
+NOT_TRIED = "not tried: the search ended"
+"""Status of a candidate for which there was no time."""
 RANKED = "not finished: ranked by the time along its joint path"
 """Status of a candidate that was not finished."""
+SLOW = "not refined: no faster than another over all knots"
+"""Status of a candidate that does not beat the best one before refinement."""
+NO_TIMING = "the limits allow no timing"
+"""Status of a candidate whose joint path cannot be followed within the limits."""
 PathMap = ClosedFormMap | ChartMap | JointSpaceMap
 """Joint maps along a path."""
 
@@ -134,11 +140,9 @@ class Candidate(Summary):
     solver : str
         Empty where nothing was solved.
     estimate : float
-        See `InitialGuess`; a rough one.
+        See `InitialGuess`. It ranks candidates.
     status : str
         In plain words.
-    coarse : float
-        Least time along the joint path that was improved, s; infinite where none was.
     adapted : float
         End time over all knots, before refinement, s; infinite where there was no such program.
     reports : tuple of SolverReport
@@ -158,7 +162,6 @@ class Candidate(Summary):
     solver: str
     estimate: float
     status: str
-    coarse: float = np.inf
     adapted: float = np.inf
     reports: tuple[SolverReport, ...] = ()
 
@@ -192,7 +195,7 @@ class Candidate(Summary):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
-        names = ("branch", "origin", "solver", "estimate", "coarse", "t_end", "status")
+        names = ("branch", "origin", "solver", "estimate", "t_end", "status")
         plain = {name: getattr(self, name) for name in (*names, "verified")}
         return {"redundant_joints": list(self.redundant_joints), **plain}
 
@@ -253,7 +256,7 @@ def rank(
 ) -> RankedCandidate:
     """Rank a guess by its estimate."""
     known = facts_of(begin_candidate(guess, RANKED))
-    known |= {"coarse": guess.estimate, "reports": reports}
+    known["reports"] = reports
     return RankedCandidate(**known, guess=guess, program=program)
 
 

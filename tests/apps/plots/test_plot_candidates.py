@@ -1,4 +1,4 @@
-"""Times at the first collocation points are compared with refined ones as refining would make them."""
+"""Times along joint paths are compared with those of motions as finishing would make them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import pytest
 
 from brachis.apps.plots import plot_candidates
 from brachis.errors import InputError
-from brachis.search.stages import Candidate
+from brachis.search.stages import RANKED, Candidate
 
 
-def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
+def candidate(joint, estimate, t_end=math.inf, *, verified=False, status=RANKED):
     """A candidate with times of its own."""
 
     class Made(Candidate):
@@ -23,9 +23,8 @@ def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"
         branch="elbow_up",
         origin="lattice 1",
         solver="uno",
-        estimate=1.0,
+        estimate=estimate,
         status=status,
-        coarse=coarse,
     )
 
 
@@ -40,23 +39,27 @@ def drawn(candidates):
 
 
 @pytest.mark.parametrize("t_end", [2.002, 1.9])
-def test_no_first_plan_is_left_of_the_fastest_for_its_few_collocation_points(t_end):
-    """Refining the fastest made its time longer, or a finer mesh shorter: so it would with the others."""
+def test_no_unfinished_one_is_left_of_the_fastest_for_its_estimate(t_end):
+    """Finishing the fastest made its time longer, or splines of better knots shorter: so it would with the others."""
     fastest = candidate("j1", 2.0, t_end, verified=True)
     marks, _ = drawn([fastest, candidate("j2", 2.0005), candidate("j3", 2.5)])
     (star,) = marks["the fastest"]
     assert star == t_end
-    (planned,) = (
-        times for label, times in marks.items() if label.startswith("planned")
+    (unfinished,) = (
+        times for label, times in marks.items() if label.startswith("not finished")
     )
-    assert planned == pytest.approx([2.0005 * t_end / 2.0, 2.5 * t_end / 2.0])
-    assert min(planned) > star
+    assert unfinished == pytest.approx([2.0005 * t_end / 2.0, 2.5 * t_end / 2.0])
+    assert min(unfinished) > star
 
 
 def test_refined_times_are_drawn_as_they_are():
     fastest = candidate("j1", 2.0, 2.002, verified=True)
     marks, _ = drawn(
-        [fastest, candidate("j2", 2.3, 2.4, verified=True), candidate("j3", 2.1, 2.2)]
+        [
+            fastest,
+            candidate("j2", 2.3, 2.4, verified=True),
+            candidate("j3", 2.1, 2.2, status="too fast"),
+        ]
     )
     assert marks["refined and verified"] == [2.4]
     (failed,) = (
@@ -66,11 +69,13 @@ def test_refined_times_are_drawn_as_they_are():
 
 
 def test_without_a_motion_nothing_is_scaled():
-    marks, _ = drawn([candidate("j1", 2.0), candidate("j2", math.inf)])
-    (planned,) = (
-        times for label, times in marks.items() if label.startswith("planned")
+    marks, _ = drawn(
+        [candidate("j1", 2.0), candidate("j2", math.inf, status="out of reach")]
     )
-    assert planned == [2.0]
+    (unfinished,) = (
+        times for label, times in marks.items() if label.startswith("not finished")
+    )
+    assert unfinished == [2.0]
 
 
 def test_nothing_to_draw_is_refused():

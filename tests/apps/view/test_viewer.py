@@ -187,13 +187,13 @@ def test_tables_have_units_and_escape_names(bare_robot, motion_of):
     }
     listed = candidates_table(
         [
-            {**known, "coarse": 1.5, "t_end": math.inf},
-            {**known, "coarse": None, "t_end": None},
+            {**known, "estimate": 1.5, "t_end": math.inf},
+            {**known, "estimate": None, "t_end": None},
         ]
     )
     assert "&lt;b&gt;" in listed
     assert "1.5000" in listed
-    assert "coarse [s]" in listed
+    assert "estimate [s]" in listed
     assert "inf" not in listed
     assert "result.json" in candidates_table([])
     assert "40 more" in candidates_table([known] * 100)

@@ -11,7 +11,7 @@ import numpy as np
 from brachis.apps.plots import style
 from brachis.common.arguments import check_list
 from brachis.errors import InputError
-from brachis.search.stages import Candidate, coordinates
+from brachis.search.stages import RANKED, SLOW, Candidate, coordinates
 from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ _MARKS: dict[str, dict[str, Any]] = {
         "marker": "o",
         "facecolors": "none",
         "edgecolors": style.GREY,
-        "label": "planned; as much longer or shorter as refining made the fastest",
+        "label": "not finished; as much longer than its timing as the fastest",
     },
     "refined": {
         "marker": "s",
@@ -195,9 +195,9 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     Returns
     -------
     Figure
-        Two columns wide; the row of the fastest candidate is the uppermost one. Candidates that were planned at the
-        first collocation points only are drawn at that time multiplied by what refining did to the time of the fastest
-        one, so that like is compared with like.
+        Two columns wide; the row of the fastest candidate is the uppermost one. Candidates that were not
+        finished are drawn at the least time along their joint paths, multiplied by what finishing did to that of the
+        fastest one, so that like is compared with like.
 
     Raises
     ------
@@ -216,15 +216,15 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
     refining = 1.0
     if math.isfinite(fastest.t_end):
-        refining = fastest.t_end / fastest.coarse
+        refining = fastest.t_end / fastest.estimate
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
     for candidate in candidates:
         is_refined = math.isfinite(candidate.t_end)
-        time = candidate.t_end if is_refined else refining * candidate.coarse
+        time = candidate.t_end if is_refined else refining * candidate.estimate
         kind = "failed"
         if candidate.verified:
             kind = "fastest" if candidate is fastest else "refined"
-        elif not is_refined and math.isfinite(candidate.coarse):
+        elif candidate.status in {RANKED, SLOW}:
             kind = "planned"
         drawn[kind].append((time, rows.index(_row(candidate))))
     known = [time for marks in drawn.values() for time, _ in marks if time < math.inf]
