@@ -87,11 +87,15 @@ class SearchLevel:
 _RANDOM = 4
 """Random joint paths for each one that a level plans."""
 _RANDOM_STATIONS = 97
-"""Places at which they are carried along, about: a closed circle of 25 m needs 80."""
+"""Stations along a random joint path, about: in 14 tasks 81 % of the drawn postures arrive, as with 385; 78 with 13."""
 _DRAWN = 8
-"""Postures that are drawn for each: with a free start one of four arrives at the end within the ranges."""
+"""Postures drawn for each random joint path: 81 % arrive in the mean of 14 tasks, 14 % in the worst one."""
 _DRIFT = 2.0
-"""rad or m, in the scales of the joints: largest standard deviation of a drift from end to end."""
+"""Largest standard deviation of a drift from end to end, rad or m, in the scales of the joints.
+
+The best of 16 joint paths is 0.5 % slower than with the best drift of 1, 2, 4 and 8, in the mean of 14 tasks; with the
+other drifts 0.8 to 1.1 %, although larger ones lead to more distinct joint paths.
+"""
 _LOOKED_AT = 4
 """Joint paths that are looked at for each one that is chosen, if several joints are redundant."""
 _NEARLY = 0.2
