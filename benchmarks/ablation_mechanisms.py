@@ -113,7 +113,7 @@ _BACKENDS = _OPTIMISE + "backends."
 find_original = pkgutil.resolve_name
 plan_simpler = find_original(_SEARCH + "fewer_joints._plan_simpler")
 finish_over_path = find_original(_SEARCH + "pipeline._finish_over_path")
-improve_most = find_original(_SEARCH + "screening._improve_most")
+improve_in_parallel = find_original(_SEARCH + "screening._improve_in_parallel")
 
 
 def return_first(first: Any, *_arguments: Any, **_keywords: Any) -> Any:
@@ -140,25 +140,25 @@ def solve_all_rows(program: Any, x: Any, solve: Callable[..., Any]) -> Any:
     return solve(program, x)
 
 
-def choose_by_estimate(starts: Any, most: int, *_arguments: Any) -> Any:
+def choose_by_estimate(guesses: Any, count: int, *_arguments: Any) -> Any:
     """Take the place of `screen`."""
-    return sorted(starts, key=lambda start: start.estimate)[:most]
+    return sorted(guesses, key=lambda guess: guess.estimate)[:count]
 
 
 def improve_roughly_alone(
-    starts: Any, effort: Any, charts: int, alike: int, **keywords: Any
+    guesses: Any, effort: Any, charts: int, alike: int, **keywords: Any
 ) -> Any:
-    """Take the place of `_improve_most`, without the coarse search, which has one chart."""
+    """Take the place of `_improve_in_parallel`, without the coarse search, which has one chart."""
     if charts == 1:
-        return list(starts)
-    return improve_most(starts, effort, charts, alike, **keywords)
+        return list(guesses)
+    return improve_in_parallel(guesses, effort, charts, alike, **keywords)
 
 
 def improve_in_one_chart(
-    start: Any, program: Any, solve: Any, effort: Any, _charts: int = 1
+    guess: Any, program: Any, solve: Any, effort: Any, _charts: int = 1
 ) -> Any:
     """Take the place of `improve_guess`."""
-    return improve_guess(start, program, solve, effort, charts=1)
+    return improve_guess(guess, program, solve, effort, charts=1)
 
 
 def plan_from_motion_alone(
@@ -243,25 +243,25 @@ MECHANISMS = (
     Mechanism(
         "screening",
         "guesses by their estimated times alone",
-        {_SEARCH + "starts.screen": choose_by_estimate},
-        is_used=lambda _result, starts, *_: len(starts) > 1,
+        {_SEARCH + "guesses.screen": choose_by_estimate},
+        is_used=lambda _result, guesses, *_: len(guesses) > 1,
     ),
     Mechanism(
         "coarse_screening",
         "no coarse search before the rough one; half of the guesses by estimated times",
-        {_SEARCH + "screening._improve_most": improve_roughly_alone},
-        is_used=lambda _result, _starts, _effort, charts, *_, **_keywords: charts == 1,
+        {_SEARCH + "screening._improve_in_parallel": improve_roughly_alone},
+        is_used=lambda _result, _guesses, _effort, charts, *_, **_keywords: charts == 1,
     ),
     Mechanism(
         "screening_ends",
         "screening does not end when several guesses are about equally fast",
         {_SEARCH + "screening._NEAR_LEAST": 0.0},
-        use=_SEARCH + "screening._improve_most",
+        use=_SEARCH + "screening._improve_in_parallel",
     ),
     Mechanism(
         "random_joint_paths",
         "no joint paths carried along from random postures",
-        {_SEARCH + "starts.random_joint_paths": return_empty},
+        {_SEARCH + "guesses.random_joint_paths": return_empty},
         is_used=is_found,
     ),
     Mechanism(
@@ -269,14 +269,14 @@ MECHANISMS = (
         "loads at rest and speeds are not looked at before a plan",
         {
             _SEARCH + "schedule.refuse_hopeless": return_none,
-            _SEARCH + "starts.refuse_hopeless": return_none,
+            _SEARCH + "guesses.refuse_hopeless": return_none,
         },
         use=_SEARCH + "hopeless.explain_speeds",
     ),
     Mechanism(
         "differential_ik",
         "no guesses by differential inverse kinematics",
-        {_SEARCH + "schedule.numeric_starts": return_empty},
+        {_SEARCH + "schedule.numeric_guesses": return_empty},
         is_used=is_found,
     ),
     Mechanism(

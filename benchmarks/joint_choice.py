@@ -34,8 +34,7 @@ from brachis.optimise.backends import solvers_for
 from brachis.optimise.retiming import ROUGH
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
-from brachis.search import pipeline, screening
-from brachis.search import starts as guesses
+from brachis.search import guesses, pipeline, screening
 from brachis.search.joint_path import JointPath, sampling_box
 from brachis.search.over_path import CHARTS
 from brachis.search.stages import RankedCandidate
@@ -161,17 +160,17 @@ def restart(content: Any) -> tuple[float, list[float]]:
         improved.append(screening.improve_quickly(guess, NEVER, ROUGH, CHARTS, ignore))
         if len(improved) == RESTARTS:
             break
-    improved.sort(key=lambda start: start.estimate)
+    improved.sort(key=lambda improved_guess: improved_guess.estimate)
     best = np.inf
     solver = solvers_for(task.solver.name)[0].name
-    for start in improved[:FINISHED]:
-        guess = replace(start, solver=solver)
+    for improved_guess in improved[:FINISHED]:
+        guess = replace(improved_guess, solver=solver)
         candidate = pipeline.rank_candidate(guess, NEVER, ignore)
         if isinstance(candidate, RankedCandidate):
             outcome = pipeline.finish_candidate(candidate, np.inf, NEVER, ignore)
             if outcome.is_settled:
                 best = min(best, outcome.t_end)
-    return best, [start.estimate for start in improved]
+    return best, [improved_guess.estimate for improved_guess in improved]
 
 
 def main() -> None:

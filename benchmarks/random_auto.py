@@ -20,8 +20,8 @@ import random_poses
 from brachis import LimitSpec, Robot, load_task
 from brachis.errors import BrachisError
 from brachis.problem.problem import Problem, decompositions_of
+from brachis.search.guesses import SEARCH_LEVELS, lattice_guesses
 from brachis.search.joint_path import DeadEnd
-from brachis.search.starts import SEARCH_LEVELS, lattice_starts
 
 
 def planar_arm() -> Robot:
@@ -55,7 +55,9 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
     except BrachisError:
         return False
     return any(
-        not isinstance(lattice_starts(decomposition, SEARCH_LEVELS["fast"][0]), DeadEnd)
+        not isinstance(
+            lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0]), DeadEnd
+        )
         for decomposition in found
     )
 

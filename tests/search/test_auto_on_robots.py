@@ -14,8 +14,8 @@ from brachis.common.deadline import NEVER
 from brachis.kinematics import CHART
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
+from brachis.search.guesses import SEARCH_LEVELS
 from brachis.search.schedule import batches
-from brachis.search.starts import SEARCH_LEVELS
 
 ROOT = Path(__file__).parents[2]
 COARSE = {"cells_per_turn": 24, "nodes": 40}
@@ -54,7 +54,7 @@ def test_closed_forms_are_left_for_the_last(
     monkeypatch,
 ):
     monkeypatch.setattr(
-        "brachis.search.schedule.numeric_starts", lambda *_given: []
+        "brachis.search.schedule.numeric_guesses", lambda *_given: []
     )  # come after the lattices
     for (
         effort,
@@ -83,17 +83,17 @@ def test_closed_forms_are_left_for_the_last(
             )
         )
         first = [
-            start for batch in planned if not batch.fallback for start in batch.guesses
+            guess for batch in planned if not batch.fallback for guess in batch.guesses
         ]
-        last = [start for batch in planned if batch.fallback for start in batch.guesses]
+        last = [guess for batch in planned if batch.fallback for guess in batch.guesses]
         assert first
-        assert {start.joint_map.branch_label for start in first} == {CHART}
+        assert {guess.joint_map.branch_label for guess in first} == {CHART}
         names[level] = {
             *(
                 name
-                for start in last
-                if start.origin.startswith("lattice")
-                for name in start.joint_map.redundant_joints
+                for guess in last
+                if guess.origin.startswith("lattice")
+                for name in guess.joint_map.redundant_joints
             )
         }
     assert names["fast"] == {"rail", "joint_1", "joint_2", "joint_3"}

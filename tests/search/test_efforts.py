@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from brachis.search.starts import SCREENED, SEARCH_LEVELS
+from brachis.search.guesses import SCREENED, SEARCH_LEVELS
 
 PAGE = Path(__file__).parents[2] / "docs/fastest_motion.md"
 

@@ -11,8 +11,8 @@ import brachis
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
+from brachis.search.guesses import FAMILY, joint_space_guess
 from brachis.search.phase_plane import initial_guess
-from brachis.search.starts import FAMILY, joint_space_start
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
 
@@ -37,12 +37,12 @@ def guess(content: dict, *, is_timed: bool) -> tuple[Problem, Program, np.ndarra
         }
     )
     problem = Problem.of(robot, task)
-    start = joint_space_start(problem)
+    initial = joint_space_guess(problem)
     if not is_timed:
         even = np.linspace(0.0, 1.0, 101)[:, None]
-        start = type(start)(problem, start.joint_map, even, np.inf, "", FAMILY)
-    program = program_of(problem, start.maps_by_leg())
-    x = initial_guess(program, start)
+        initial = type(initial)(problem, initial.joint_map, even, np.inf, "", FAMILY)
+    program = program_of(problem, initial.maps_by_leg())
+    x = initial_guess(program, initial)
     assert x is not None
     return problem, program, x
 

@@ -17,8 +17,8 @@ from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_no_motion
+from brachis.search.guesses import SEARCH_LEVELS, lattice_guesses
 from brachis.search.joint_path import DeadEnd
-from brachis.search.starts import SEARCH_LEVELS, lattice_starts
 from support.pose_arms import panda
 
 ROOT = Path(__file__).parents[2]
@@ -165,7 +165,7 @@ def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
     given = problem(scara(**options), **changes)
     ends = [
-        lattice_starts(decomposition, SEARCH_LEVELS["fast"][0])
+        lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0])
         for decomposition in decompositions_of(given)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)

@@ -23,13 +23,13 @@ from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import over_time, pipeline, portfolio, schedule, starts
+from brachis.search import guesses, over_time, pipeline, portfolio, schedule
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
+from brachis.search.guesses import SEARCH_LEVELS
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.stages import NOT_TRIED, RANKED, SLOW, Candidate, facts_of
-from brachis.search.starts import SEARCH_LEVELS
 from brachis.task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -232,7 +232,7 @@ class NoPosture:
 def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(
     robot, monkeypatch
 ):
-    monkeypatch.setattr(starts, "PostureLattice", NoPosture)
+    monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task())
     assert result.verified
     assert {candidate.redundant_joints for candidate in result.candidates} == {
@@ -255,8 +255,8 @@ def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_pat
 def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
     robot, monkeypatch, asked, lattices
 ):
-    monkeypatch.setattr(starts, "ClosedFormLattice", NoPosture)
-    monkeypatch.setattr(starts, "PostureLattice", NoPosture)
+    monkeypatch.setattr(guesses, "ClosedFormLattice", NoPosture)
+    monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task(**asked))
     assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
@@ -488,7 +488,7 @@ def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
 
 
 def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
-    clock.jump(schedule, "lattice_starts", at=1)
+    clock.jump(schedule, "lattice_guesses", at=1)
     message = (
         r"within the time limit of 60 s: the lattice of j. \| j. was not searched completely; "
         r"of \d+ candidates \d+ not planned; .*\. Raise search\.time_limit"
@@ -498,7 +498,7 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
 
 
 def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clock):
-    clock.jump(schedule, "lattice_starts", at=1, by=30.0)
+    clock.jump(schedule, "lattice_guesses", at=1, by=30.0)
     result = brachis.plan(robot, task(**EVERY_CHOICE))
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1

@@ -9,8 +9,8 @@ import pytest
 
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
-from brachis.search import starts as module
-from brachis.search.starts import SEARCH_LEVELS, random_joint_paths
+from brachis.search import guesses as module
+from brachis.search.guesses import SEARCH_LEVELS, random_joint_paths
 from brachis.task import load_task
 
 URDF = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
@@ -73,7 +73,7 @@ def test_they_are_the_same_for_the_same_seed():
 
 def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     """The lattice ends in one node there, and has few joint paths."""
-    monkeypatch.setattr(module, "screen", lambda starts, *_others: starts)
+    monkeypatch.setattr(module, "screen", lambda guesses, *_others: guesses)
     end = [0.62, 0.62, 0.35, -1.1, 0.3, 0.8, 0.1]
     robot = Robot.from_urdf(URDF)
     places = [
@@ -83,9 +83,9 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
         end={"joints": end}, path=[{"line": {"by": (places[1] - places[0]).tolist()}}]
     )
     (level,) = SEARCH_LEVELS["fast"]
-    starts = module.chart_starts(problem, decompositions_of(problem), level)
-    assert isinstance(starts, list)
-    assert any(start.origin.startswith("random") for start in starts)
-    for start in starts:
-        q = start.joint_map.postures(start.joint_path)
+    guesses = module.chart_guesses(problem, decompositions_of(problem), level)
+    assert isinstance(guesses, list)
+    assert any(guess.origin.startswith("random") for guess in guesses)
+    for guess in guesses:
+        q = guess.joint_map.postures(guess.joint_path)
         np.testing.assert_allclose(q[[0, -1]], [START, end], atol=1e-8)

@@ -1,4 +1,4 @@
-"""Screening: the fastest starts that differ, whatever time or backend is missing."""
+"""Screening: the fastest guesses that differ, whatever time or backend is missing."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from brachis.optimise.retiming import COARSE, ROUGH
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
+from brachis.search import guesses as module
 from brachis.search import screening
-from brachis.search import starts as module
 from brachis.task import load_task
 from support.solvers import INTERIOR
 
@@ -32,8 +32,8 @@ def quiet(_text: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def starts():
-    """Starts of a free start posture, as the lattice gives them."""
+def guesses():
+    """Guesses of a task with a free start posture, as the lattice gives them."""
     task = load_task(
         {
             "brachis": 1,
@@ -51,46 +51,46 @@ def starts():
         level, in_charts=100, only_minima=False, cells_per_turn=24
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "screen", lambda starts, *_others: starts)
+        patch.setattr(module, "screen", lambda guesses, *_others: guesses)
         patch.setattr(module, "random_joint_paths", lambda *_arguments: [])
-        found = module.chart_starts(problem, decompositions_of(problem), many)
+        found = module.chart_guesses(problem, decompositions_of(problem), many)
     assert isinstance(found, list)
     assert len(found) > MOST
     return found[:12]
 
 
-def test_the_fastest_that_differ_are_kept(starts):
-    kept = screening.screen(starts, MOST, NEVER, quiet)
+def test_the_fastest_that_differ_are_kept(guesses):
+    kept = screening.screen(guesses, MOST, NEVER, quiet)
     assert 1 <= len(kept) <= MOST
-    estimates = [start.estimate for start in kept]
+    estimates = [guess.estimate for guess in kept]
     assert estimates == sorted(estimates)
     assert max(estimates) <= 1.03 * min(estimates)
-    for start in kept:
-        q = start.joint_map.postures(start.joint_path)
-        targets = start.problem.path.sample(start.joint_path[:, 0]).target
-        np.testing.assert_allclose(start.problem.task_map.values(q), targets, atol=1e-9)
+    for guess in kept:
+        q = guess.joint_map.postures(guess.joint_path)
+        targets = guess.problem.path.sample(guess.joint_path[:, 0]).target
+        np.testing.assert_allclose(guess.problem.task_map.values(q), targets, atol=1e-9)
 
 
-def test_few_starts_are_improved_too(starts):
-    (better,) = screening.screen(starts[:1], MOST, NEVER, quiet)
+def test_few_guesses_are_improved_too(guesses):
+    (better,) = screening.screen(guesses[:1], MOST, NEVER, quiet)
     assert better.is_improved
-    assert better.estimate < starts[0].estimate
+    assert better.estimate < guesses[0].estimate
 
 
-def test_without_time_or_motion_starts_are_kept_that_differ(starts, monkeypatch):
-    late = screening.screen(starts, MOST, Deadline(0.0), quiet)
-    spread = screening._spread_out(starts)
-    assert [start.origin for start in late] == [start.origin for start in spread[:MOST]]
+def test_without_time_or_motion_guesses_are_kept_that_differ(guesses, monkeypatch):
+    late = screening.screen(guesses, MOST, Deadline(0.0), quiet)
+    spread = screening._spread_out(guesses)
+    assert [guess.origin for guess in late] == [guess.origin for guess in spread[:MOST]]
 
     def missing(*_arguments: object) -> None:
         raise UnreachableError("out of reach")
 
     monkeypatch.setattr(screening, "improve_guess", missing)
-    without = screening.screen(starts, MOST, NEVER, quiet)
-    assert [start.origin for start in without] == [start.origin for start in late]
+    without = screening.screen(guesses, MOST, NEVER, quiet)
+    assert [guess.origin for guess in without] == [guess.origin for guess in late]
 
 
-def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeypatch):
+def test_those_for_which_there_was_no_time_come_after_the_others(guesses, monkeypatch):
     solved = itertools.chain([True], itertools.cycle([False]))
     honest = screening.improve_guess
 
@@ -100,52 +100,52 @@ def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeyp
         raise UnreachableError("out of reach")
 
     monkeypatch.setattr(screening, "improve_guess", once)
-    first, *others = screening.screen(starts, MOST, NEVER, quiet)
-    assert first.origin == starts[0].origin
+    first, *others = screening.screen(guesses, MOST, NEVER, quiet)
+    assert first.origin == guesses[0].origin
     assert others == [], "what was not solved is slower for all that is known"
 
 
-def test_starts_say_whose_closed_form_they_begin_with(starts):
+def test_guesses_say_whose_closed_form_they_begin_with(guesses):
     names = {
-        decomposition.name for decomposition in decompositions_of(starts[0].problem)
+        decomposition.name for decomposition in decompositions_of(guesses[0].problem)
     }
-    for start in starts:
-        number, _, seed = start.origin.partition(", from ")
+    for guess in guesses:
+        number, _, seed = guess.origin.partition(", from ")
         assert number.startswith("lattice ")
         assert seed in names
 
 
-def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
-    starts, monkeypatch
+def test_no_further_guess_is_looked_at_where_the_least_end_time_is_met_again(
+    guesses, monkeypatch
 ):
     looked_at = []
 
-    def quickly(start, _deadline, effort, _charts, _listener):
+    def quickly(guess, _deadline, effort, _charts, _listener):
         if effort.places == ROUGH.places:
-            return start
-        looked_at.append(start)
+            return guess
+        looked_at.append(guess)
         times = [1.5, 1.0, np.inf, 1.02, 1.001, 1.009, 1.008]
-        return dataclasses.replace(start, estimate=times[len(looked_at) - 1])
+        return dataclasses.replace(guess, estimate=times[len(looked_at) - 1])
 
     monkeypatch.setattr(screening, "improve_quickly", quickly)
-    monkeypatch.setattr(screening, "is_same", lambda *_starts: False)
-    kept = screening.screen(starts, MOST, NEVER, quiet)
+    monkeypatch.setattr(screening, "is_same", lambda *_guesses: False)
+    kept = screening.screen(guesses, MOST, NEVER, quiet)
     assert len(looked_at) == 7
-    assert [start.estimate for start in kept] == [1.0, 1.001]
+    assert [guess.estimate for guess in kept] == [1.0, 1.001]
 
 
-def test_the_best_of_a_coarse_search_are_searched_again(starts, monkeypatch):
+def test_the_best_of_a_coarse_search_are_searched_again(guesses, monkeypatch):
     searched = {COARSE.places: [], ROUGH.places: []}
 
-    def ranked(start, _deadline, effort, _charts, _listener):
-        searched[effort.places].append(start.origin)
-        number = [own.origin for own in starts].index(start.origin)
-        return dataclasses.replace(start, estimate=2.0 - 0.1 * number)
+    def ranked(guess, _deadline, effort, _charts, _listener):
+        searched[effort.places].append(guess.origin)
+        number = [own.origin for own in guesses].index(guess.origin)
+        return dataclasses.replace(guess, estimate=2.0 - 0.1 * number)
 
     monkeypatch.setattr(screening, "improve_quickly", ranked)
-    monkeypatch.setattr(screening, "is_same", lambda *_starts: False)
-    screening.screen(starts, MOST, NEVER, quiet)
-    origins = [start.origin for start in starts]
+    monkeypatch.setattr(screening, "is_same", lambda *_guesses: False)
+    screening.screen(guesses, MOST, NEVER, quiet)
+    origins = [guess.origin for guess in guesses]
     assert searched[COARSE.places][0] == origins[0]
     assert sorted(searched[COARSE.places]) == sorted(origins)
     assert searched[ROUGH.places] == origins[::-1][: 2 * MOST]
@@ -156,21 +156,21 @@ def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
     problem = Problem.of(robot_from_settings(task.robot), task)
     (decomposition,) = decompositions_of(problem)
     (level,) = module.SEARCH_LEVELS["fast"]
-    found = module.lattice_starts(decomposition, level)
+    found = module.lattice_guesses(decomposition, level)
     assert isinstance(found, list)
     assert len(found) == level.joint_paths // 2
-    assert all(start.is_improved for start in found)
-    estimates = [start.estimate for start in found]
+    assert all(guess.is_improved for guess in found)
+    estimates = [guess.estimate for guess in found]
     assert estimates == sorted(estimates)
     # Those of the shortest joint paths alone.
     few = dataclasses.replace(level, joint_paths=2)
-    (shortest,) = module.lattice_starts(decomposition, few)
+    (shortest,) = module.lattice_guesses(decomposition, few)
     assert not shortest.is_improved
     assert estimates[0] < shortest.estimate
 
 
 def test_large_programs_over_the_path_go_to_an_interior_point_first(
-    starts, monkeypatch
+    guesses, monkeypatch
 ):
     monkeypatch.setattr(improve, "_LARGE_PROGRAM", 20)
     solvers = []
@@ -182,7 +182,7 @@ def test_large_programs_over_the_path_go_to_an_interior_point_first(
         return report
 
     monkeypatch.setattr(improve, "solve_near_rows", near_rows)
-    plain = screening.screen(starts[:2], MOST, NEVER, quiet)
+    plain = screening.screen(guesses[:2], MOST, NEVER, quiet)
     assert not solvers
 
     # What it leaves is solved as any other.
@@ -193,18 +193,18 @@ def test_large_programs_over_the_path_go_to_an_interior_point_first(
 
     failing = dataclasses.replace(TABLE[INTERIOR], run=give_up)
     monkeypatch.setitem(TABLE, INTERIOR, failing)
-    again = screening.screen(starts[:2], MOST, NEVER, quiet)
+    again = screening.screen(guesses[:2], MOST, NEVER, quiet)
     assert set(solvers) == {"uno"}
     assert again[0].estimate == pytest.approx(plain[0].estimate, rel=1e-2)
 
 
-def test_guesses_are_looked_at_the_farthest_from_each_other_first(starts):
-    first, second, *others = screening._spread_out([*starts, starts[0]])
-    assert first is starts[0]
-    assert {start.origin for start in (first, second, *others)} <= {
-        start.origin for start in starts
+def test_guesses_are_looked_at_the_farthest_from_each_other_first(guesses):
+    first, second, *others = screening._spread_out([*guesses, guesses[0]])
+    assert first is guesses[0]
+    assert {guess.origin for guess in (first, second, *others)} <= {
+        guess.origin for guess in guesses
     }
-    paths = [start.postures_at(np.linspace(0.0, 1.0, 49)) for start in starts]
+    paths = [guess.postures_at(np.linspace(0.0, 1.0, 49)) for guess in guesses]
     distances = [np.abs(path - paths[0]).max() for path in paths]
-    assert second is starts[int(np.argmax(distances))]
+    assert second is guesses[int(np.argmax(distances))]
     assert len(others) + 2 == len({path.tobytes() for path in map(np.array, paths)})

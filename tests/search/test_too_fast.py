@@ -205,7 +205,7 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is
     monkeypatch,
 ):
     monkeypatch.setattr(
-        "brachis.search.starts.screen", lambda *_: pytest.fail("a plan was tried")
+        "brachis.search.guesses.screen", lambda *_: pytest.fail("a plan was tried")
     )
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     content = {

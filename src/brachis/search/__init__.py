@@ -1,8 +1,8 @@
 """Search for the fastest motion: joint paths from lattices, a portfolio over decompositions, branches and guesses."""
 
+from brachis.search.guesses import first_guess
 from brachis.search.portfolio import Search
 from brachis.search.remedies import try_remedies
-from brachis.search.starts import first_guess
 from brachis.search.task_program import TaskProgram
 
 __all__ = ["Search", "TaskProgram", "first_guess", "try_remedies"]

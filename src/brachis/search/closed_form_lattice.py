@@ -88,11 +88,11 @@ class Cells:
         """Cells, (..., r), in which positions, (..., r), are."""
         return np.rint((positions - self.origin) / self.size).astype(int)
 
-    def everywhere(self, most: int, rng: np.random.Generator) -> np.ndarray:
-        """List the cells at which a motion may begin, (C, r); of several joints `most` random ones."""
+    def everywhere(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """List the cells at which a motion may begin, (C, r); of several joints `count` random ones."""
         if self.r == 1:
             return np.arange(self.first[0], self.last[0] + 1)[:, None]
-        return rng.integers(self.first, self.last + 1, (most if self.r else 1, self.r))
+        return rng.integers(self.first, self.last + 1, (count if self.r else 1, self.r))
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
         """Offsets to the cells that the next station may be in, (O, r): all within the window, or a sample."""
@@ -114,7 +114,7 @@ def cell_sizes(robot: Robot, cells_per_turn: int) -> np.ndarray:
 
 
 def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the different cells, (C, r), and where each given one, (K, r), is among them, (K,)."""
+    """Return the different cells, (C, r), and the index, (K,), among them of each of `cells`, (K, r)."""
     # A number for each cell: NumPy's sorting of rows takes many times as long.
     span = np.ptp(cells, axis=0) + 1
     weights = np.append(np.cumprod(span[:0:-1])[::-1], 1)[: len(span)]
@@ -128,10 +128,10 @@ def _near_start(problem: Problem, joint: int) -> float:
     axes = list(problem.task_map.axes)
     q = np.zeros((2, problem.robot.n))
     q[1, joint] = 1.0
-    there, beyond = problem.robot.tool_placements(q)[0][:, axes]
-    axis = beyond - there
-    wanted = problem.path.sample(np.zeros(1)).target[0, : len(axes)]
-    return float(axis @ (wanted - there) / max(axis @ axis, 1e-12))
+    tool, displaced_tool = problem.robot.tool_placements(q)[0][:, axes]
+    axis = displaced_tool - tool
+    beginning = problem.path.sample(np.zeros(1)).target[0, : len(axes)]
+    return float(axis @ (beginning - tool) / max(axis @ axis, 1e-12))
 
 
 def solve_all(
@@ -200,9 +200,9 @@ class ClosedFormLattice(Lattice):
         """List edges to the cells around; at the very end to the given end's, too."""
         offsets = self._cells.neighbours(rng)
         nodes = np.arange(len(before.branch))
-        own = self._cells.near(before.q[:, self._redundant])
+        node_cells = self._cells.near(before.q[:, self._redundant])
         parent = np.repeat(nodes, len(offsets))
-        around = (own[:, None] + offsets).reshape(len(parent), self._cells.r)
+        around = (node_cells[:, None] + offsets).reshape(len(parent), self._cells.r)
         end = self.problem.end
         if self._to_end and end is not None and station == len(self.s) - 1:
             aim = np.tile(self._cells.near(end[self._redundant]), (len(nodes), 1))
@@ -229,9 +229,9 @@ class ClosedFormLattice(Lattice):
         """Choose among the nodes clear of the branch boundary that can be held."""
         clear = np.ones(len(layer.branch), dtype=bool)
         for branch in np.unique(layer.branch):
-            own = layer.branch == branch
-            margins = self._solver.branch_margins(layer.q[own], int(branch))
-            clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
+            on_branch = layer.branch == branch
+            margins = self._solver.branch_margins(layer.q[on_branch], int(branch))
+            clear[on_branch] = margins.min(axis=1, initial=np.inf) >= self._clear
         return super()._keep(layer[clear], choose) or OTHER_BRANCH
 
     def _thin(self, layer: Layer) -> Layer:

@@ -29,11 +29,11 @@ from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import lock_joints
 from brachis.robot.task_map import JointSpace
+from brachis.search.guesses import FAMILY, bring_onto_path
 from brachis.search.joint_choice import SELECTABLE
 from brachis.search.least_motion import LeastMotion
 from brachis.search.schedule import has_charts
 from brachis.search.stages import FinishedCandidate, InitialGuess, PathMap
-from brachis.search.starts import FAMILY, bring_onto_path
 from brachis.task import Posture, Task, Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory

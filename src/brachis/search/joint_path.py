@@ -22,7 +22,7 @@ NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
 NO_TIME = "the time was up"
 _TRIES = 1000
-"""Random postures from which one at a place is looked for, before it is called out of reach."""
+"""Random postures from which Newton's method begins, before a place counts as out of reach."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ class DeadEnd:
         return f"{place} {self.cause}"
 
 
-def distinct(joint_paths: Sequence[JointPath], most: int) -> list[int]:
-    """Choose up to `most` joint paths: the shortest one, and others far from those chosen.
+def distinct(joint_paths: Sequence[JointPath], count: int) -> list[int]:
+    """Choose up to `count` joint paths: the shortest one, and others far from those chosen.
 
     The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
     the distance is infinite.
@@ -94,7 +94,7 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[int]:
     ----------
     joint_paths : sequence of JointPath
         The shortest one first, at least one.
-    most : int
+    count : int
 
     Returns
     -------
@@ -109,7 +109,7 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[int]:
     distance = np.full(len(joint_paths), np.inf)
     chosen: list[int] = []
     best = 0
-    while len(chosen) < min(most, len(joint_paths)):
+    while len(chosen) < min(count, len(joint_paths)):
         chosen.append(best)
         apart = (np.abs(q - q[best]) * weights).max(axis=(1, 2))
         distance = np.minimum(
@@ -157,23 +157,23 @@ def reaches(problem: Problem, s: float) -> bool:
     low, high = sampling_box(problem.robot)
     drawn = np.random.default_rng(0).uniform(low, high, (_TRIES, problem.robot.n))
     targets = np.repeat(problem.path.sample([s]).target, _TRIES, axis=0)
-    found = Newton(problem.task_map).nearest(targets, drawn)
-    return bool(np.isfinite(found).all(axis=1).any())
+    postures = Newton(problem.task_map).nearest(targets, drawn)
+    return bool(np.isfinite(postures).all(axis=1).any())
 
 
 def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:
     """Find how far a limit is exceeded at rest, at least, on ways through postures, (K, L, n).
 
-    Of the best way the largest violation, its column, and what is found there and allowed, in words.
+    Of the best way the largest violation, its column, and in words the figure there and the allowed one.
     """
     values = limit.values(Moments.at_rest(q.reshape(-1, q.shape[-1])))
     values = values.reshape(*q.shape[:2], -1)
     beyond = limit.violation(values)
     best = np.argmin(beyond.max(axis=(1, 2)))
     place, column = np.unravel_index(np.argmax(beyond[best]), beyond.shape[1:])
-    found, allowed = in_figures(limit, int(column), float(values[best, place, column]))
+    figure, allowed = in_figures(limit, int(column), float(values[best, place, column]))
     unit = limit.labels[column].after
-    text = f"{found}{unit} at best, allowed: {allowed}{unit}"
+    text = f"{figure}{unit} at best, allowed: {allowed}{unit}"
     return float(beyond[best, place, column]), int(column), text
 
 

@@ -52,7 +52,7 @@ from brachis.search.stations import stations
 LARGEST_STEP = 0.8
 """Largest step of a joint between stations, rad or m."""
 _HOMEWARD = 0.6
-"""Part of the largest step that joints may need at every station that is left to a given end."""
+"""Part of the largest step that joints may need at every station before a given end."""
 _LOOKS = 9
 """Postures on a step that are looked at, to name what is in the way."""
 _OTHER_WAYS = 3
@@ -96,9 +96,9 @@ class Layer:
         return cls(branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
 
 
-def farthest(points: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
-    """Choose points, (K, n), each the farthest from all that are kept, (H, n)."""
-    distance = np.abs(points[:, None] - kept[None]).max(axis=2).min(axis=1)
+def farthest(points: np.ndarray, references: np.ndarray, count: int) -> list[int]:
+    """Choose points, (K, n), each the farthest from all references, (H, n), and all chosen before."""
+    distance = np.abs(points[:, None] - references[None]).max(axis=2).min(axis=1)
     chosen = []
     for _ in range(count):
         chosen.append(int(np.argmax(distance)))
@@ -211,7 +211,7 @@ class Lattice(ABC):
     def _thin(self, layer: Layer) -> Layer:
         """Keep no more nodes than a layer may have."""
 
-    def _choose_starts(self, layer: Layer) -> Layer:
+    def _choose_start_nodes(self, layer: Layer) -> Layer:
         """Choose among the nodes of a free start."""
         return self._thin(layer)
 
@@ -219,13 +219,13 @@ class Lattice(ABC):
     def _at_end(self, last: Layer) -> np.ndarray:
         """Tell which nodes of the last layer, (K,) bool, meet the given end posture."""
 
-    def joint_paths(self, most: int) -> list[JointPath] | DeadEnd:
+    def joint_paths(self, count: int) -> list[JointPath] | DeadEnd:
         """Find joint paths along the path.
 
         Parameters
         ----------
-        most : int
-            How many at most.
+        count : int
+            How many, no more.
 
         Returns
         -------
@@ -263,11 +263,13 @@ class Lattice(ABC):
             ends = layer.parent[ends]
         in_order = np.array(traced if self._backwards else traced[::-1])
         q = in_order.swapaxes(0, 1) + TURN * self._turn_of(last)[:, None]
-        found = [
-            JointPath(self.problem, self.s, own, float(length), int(branch))
-            for own, length, branch in zip(q, last.length, last.branch, strict=True)
+        joint_paths = [
+            JointPath(self.problem, self.s, postures, float(length), int(branch))
+            for postures, length, branch in zip(
+                q, last.length, last.branch, strict=True
+            )
         ]
-        return self._choose(found, last, most)
+        return self._choose(joint_paths, last, count)
 
     def _first_layer(self, rng: np.random.Generator) -> Layer | str:
         """Make the nodes with which joint paths begin, or tell what refuses them."""
@@ -281,7 +283,7 @@ class Lattice(ABC):
         within = np.flatnonzero(inside.all(axis=1))
         if not len(within):
             return leaving_range(self._robot, inside)
-        return self._keep(layer[within], self._choose_starts)
+        return self._keep(layer[within], self._choose_start_nodes)
 
     def _next(
         self, before: Layer, station: int, rng: np.random.Generator
@@ -311,41 +313,41 @@ class Lattice(ABC):
         layer = Layer(branch, q[good], low[good], high[good], length, parent)
         chosen = self._shortest_free(before, layer, edges.key[good])
         if not len(chosen):
-            some = shortest(length, edges.key[good])
-            ways = before.q[parent[some]], layer.q[some]
-            return self._blame(np.linspace(*ways, _LOOKS, axis=1)) or JUMPS
+            blocked = shortest(length, edges.key[good])
+            ends = before.q[parent[blocked]], layer.q[blocked]
+            return self._blame(np.linspace(*ends, _LOOKS, axis=1)) or JUMPS
         return self._keep(self._in_reach(layer[chosen], station), self._thin)
 
     def _in_reach(self, layer: Layer, station: int) -> Layer:
-        """Leave out nodes from which a given end is too far for the stations that are left, where there are others."""
+        """Leave out nodes from which a given end is too far for the stations before it, unless all are."""
         if not self._to_end:
             return layer
-        left = len(self.s) - 1 - station
+        stations_to_end = len(self.s) - 1 - station
         far = np.abs(layer.q - self.problem.end).max(axis=1)
-        reach = _HOMEWARD * LARGEST_STEP * left
-        is_near = far <= reach if left else self._at_end(layer)
+        reach = _HOMEWARD * LARGEST_STEP * stations_to_end
+        is_near = far <= reach if stations_to_end else self._at_end(layer)
         return layer[is_near] if is_near.any() else layer
 
     def _shortest_free(
         self, before: Layer, layer: Layer, keys: np.ndarray
     ) -> np.ndarray:
-        """Choose the shortest way to each node, (E, k), of those on which nothing is in the way."""
+        """Choose the shortest edge to each node, by keys (E, k), of those along which nothing is in the way."""
         chosen = shortest(layer.length, keys)
         free = self._are_free(before, layer, chosen)
         if free.all():
             return chosen
-        found = [chosen[free]]
+        free_edges = [chosen[free]]
         numbers = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-        left = np.arange(len(keys))
+        edges = np.arange(len(keys))
         for _ in range(_OTHER_WAYS):
-            is_lost = np.isin(numbers[left], numbers[chosen[~free]])
-            left = np.setdiff1d(left[is_lost], chosen)
-            if not len(left):
+            is_lost = np.isin(numbers[edges], numbers[chosen[~free]])
+            edges = np.setdiff1d(edges[is_lost], chosen)
+            if not len(edges):
                 break
-            chosen = left[shortest(layer.length[left], numbers[left, None])]
+            chosen = edges[shortest(layer.length[edges], numbers[edges, None])]
             free = self._are_free(before, layer, chosen)
-            found.append(chosen[free])
-        return np.sort(np.concatenate(found))
+            free_edges.append(chosen[free])
+        return np.sort(np.concatenate(free_edges))
 
     def _are_free(self, before: Layer, layer: Layer, chosen: np.ndarray) -> np.ndarray:
         """Tell on which of the chosen steps to a layer nothing is in the way, (C,)."""
@@ -379,20 +381,22 @@ class Lattice(ABC):
                 cause = f"the {limit.name} limit of {subject} {limit.refusal} ({text})"
         return cause
 
-    def _choose_some(self, layer: Layer, most: int) -> np.ndarray:
-        """Choose `most` nodes: half of least length, what is left to a given end included, the others far apart."""
-        if len(layer.q) <= most:
+    def _choose_some(self, layer: Layer, count: int) -> np.ndarray:
+        """Choose `count` nodes: half of least length, with the step to a given end, half far apart."""
+        if len(layer.q) <= count:
             return np.arange(len(layer.q))
         cost = layer.length
         if self._to_end:
-            left = self.problem.end - layer.q
-            cost = cost + self._lengths(layer.q, left, np.arange(len(left)))
+            steps_to_end = self.problem.end - layer.q
+            cost = cost + self._lengths(
+                layer.q, steps_to_end, np.arange(len(steps_to_end))
+            )
         order = np.argsort(cost, kind="stable")
-        half = most // 2
+        half = count // 2
         nearest = layer.q[order[0]]
         weights = weights_near(self._robot, self.problem.limits, nearest)
         scaled = layer.q[order] * weights
-        far = half + np.unique(farthest(scaled[half:], scaled[:half], most - half))
+        far = half + np.unique(farthest(scaled[half:], scaled[:half], count - half))
         return np.sort(np.concatenate([order[:half], order[far]]))
 
     def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -401,18 +405,20 @@ class Lattice(ABC):
         return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
 
     def _choose(
-        self, found: list[JointPath], _ends: Layer, most: int
+        self, joint_paths: list[JointPath], _ends: Layer, count: int
     ) -> list[JointPath]:
-        """Choose up to `most` of the joint paths found, which end at these nodes: some that differ."""
-        return [found[i] for i in distinct(found, most)]
+        """Choose up to `count` of the joint paths, which end at these nodes: some that differ."""
+        return [joint_paths[i] for i in distinct(joint_paths, count)]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""
         first, last = self._turns_within(nodes.low, nodes.high)
         with np.errstate(invalid="ignore"):  # inf - inf
             middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / TURN
-        wanted = np.where(self._open_turns & np.isfinite(middle), np.round(middle), 0.0)
-        return np.clip(wanted, first, last)
+        central_turns = np.where(
+            self._open_turns & np.isfinite(middle), np.round(middle), 0.0
+        )
+        return np.clip(central_turns, first, last)
 
     def _turns_within(
         self, low: np.ndarray, high: np.ndarray

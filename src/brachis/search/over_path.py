@@ -2,8 +2,8 @@
 
 That takes tenths of a second. It ranks guesses, and where the phase plane knows all limits it is the plan but for the
 splines. The lattice's joint path may be far from the best one next to it. A chart holds around its own joint path: if
-the rows are no longer transversal along the better one, or the margin holds the motion back, a new chart is laid around
-this one, and the search goes on in it.
+its rows lose transversality along the better one, or its margin holds the motion back, a new chart is laid around the
+better one, and the search goes on in it.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ _TRANSVERSAL = 0.5
 """Least transversality of rows along a motion, below which its chart is left for another."""
 
 
-_MORE = 1.2
-"""Times the violation by which a timing takes longer."""
-_LONGEST = 0.1
-"""Part of the time by which it may at once."""
+_EXCESS_FACTOR = 1.2
+"""Part of its time by which a motion is made longer, over its violation."""
+_LARGEST_EXCESS = 0.1
+"""Violation from which on a motion is not made longer."""
 _LENGTHENINGS = 4
 """Times that a motion is verified, no more."""
 
@@ -60,21 +60,21 @@ class BetterGuess:
 
     Attributes
     ----------
-    start : InitialGuess
+    guess : InitialGuess
         With the better joint path, its chart, and its least time as the estimate.
     program : Program
-        In that chart, over the knots of the given one.
-    found : BetterPaths
+        In that chart, over the knots of the given program.
+    paths : BetterPaths
         With the reports of all solves.
     """
 
-    start: InitialGuess
+    guess: InitialGuess
     program: Program
-    found: BetterPaths
+    paths: BetterPaths
 
 
 def improve_guess(
-    start: InitialGuess,
+    guess: InitialGuess,
     program: Program,
     solve: SolverSession,
     effort: PathEffort,
@@ -84,13 +84,13 @@ def improve_guess(
 
     Parameters
     ----------
-    start : InitialGuess
+    guess : InitialGuess
     program : Program
         Of its joint maps, over any knots; see `improve_joint_paths`.
     solve : SolverSession
     effort : PathEffort
     charts : int, optional
-        In which it is looked for, no more.
+        Charts in which it is looked for, no more.
 
     Returns
     -------
@@ -102,25 +102,27 @@ def improve_guess(
     UnreachableError
         It leaves its joint map.
     """
-    tolerance = start.problem.task.spline.tolerance
-    found = improve_joint_paths(program, start.legs, solve, tolerance, effort)
-    better = BetterGuess(_along(start, found), program, found)
+    tolerance = guess.problem.task.spline.tolerance
+    paths = improve_joint_paths(program, guess.legs, solve, tolerance, effort)
+    better = BetterGuess(_replace_paths(guess, paths), program, paths)
     # A chart around a motion that is given is kept.
-    if not start.in_chart or start.durations or not better.start.is_improved:
+    if not guess.in_chart or guess.durations or not better.guess.is_improved:
         return better
     with contextlib.suppress(UnreachableError):
         for _ in range(charts - 1):
             moved = _lay_chart(better)
             if moved is None or solve.deadline.passed:
                 break
-            own = _program_like(program, moved)
-            found = improve_joint_paths(own, moved.legs, solve, tolerance, effort)
-            reports = (*better.found.reports, *found.reports)
-            found = replace(found, reports=reports)
-            gain = 1.0 - found.t_end / better.found.t_end
+            chart_program = _program_like(program, moved)
+            paths = improve_joint_paths(
+                chart_program, moved.legs, solve, tolerance, effort
+            )
+            reports = (*better.paths.reports, *paths.reports)
+            paths = replace(paths, reports=reports)
+            gain = 1.0 - paths.t_end / better.paths.t_end
             if gain < -tolerances.GAIN:
                 break
-            better = BetterGuess(_along(moved, found), own, found)
+            better = BetterGuess(_replace_paths(moved, paths), chart_program, paths)
             if gain < tolerances.GAIN:
                 break
     with contextlib.suppress(UnreachableError):
@@ -128,10 +130,10 @@ def improve_guess(
     return better
 
 
-def _program_like(program: Program, start: InitialGuess) -> Program:
+def _program_like(program: Program, guess: InitialGuess) -> Program:
     """Write the program of a guess down over the knots of another."""
     grids = [phase.grid for phase in program.phases]
-    return program_over(start.problem, start.maps_by_leg(), grids)
+    return program_over(guess.problem, guess.maps_by_leg(), grids)
 
 
 def _centre(better: BetterGuess) -> BetterGuess:
@@ -139,51 +141,51 @@ def _centre(better: BetterGuess) -> BetterGuess:
 
     Its coordinates stay, and so do the timings that were found. Raises UnreachableError where no chart can be laid.
     """
-    chart, s, q = _chart_of(better.start)
+    chart, s, q = _chart_of(better.guess)
     centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
-    start = replace(better.start, joint_map=centred)
-    program = _program_like(better.program, start)
-    return replace(better, start=start, program=program)
+    guess = replace(better.guess, joint_map=centred)
+    program = _program_like(better.program, guess)
+    return replace(better, guess=guess, program=program)
 
 
-def _chart_of(start: InitialGuess) -> tuple[ChartMap, np.ndarray, np.ndarray]:
+def _chart_of(guess: InitialGuess) -> tuple[ChartMap, np.ndarray, np.ndarray]:
     """Return the chart of a guess, its path coordinates, (S,), and postures, (S, n); raise UnreachableError without."""
-    chart = start.joint_map
+    chart = guess.joint_map
     assert isinstance(chart, ChartMap)
-    q = chart.postures(start.joint_path)
+    q = chart.postures(guess.joint_path)
     if not np.isfinite(q).all():
         raise UnreachableError("the joint path leaves the chart")
-    return chart, start.joint_path[:, 0], q
+    return chart, guess.joint_path[:, 0], q
 
 
-def _along(start: InitialGuess, found: BetterPaths) -> InitialGuess:
+def _replace_paths(guess: InitialGuess, paths: BetterPaths) -> InitialGuess:
     """Return a guess with better joint paths, leg by leg, and their time."""
-    if not np.isfinite(found.t_end):
-        return start
-    curves = np.concatenate(found.curves)
+    if not np.isfinite(paths.t_end):
+        return guess
+    curves = np.concatenate(paths.curves)
     grows = np.append(True, np.diff(curves[:, 0]) > 0.0)
     return replace(
-        start,
+        guess,
         joint_path=curves[grows],
-        estimate=found.t_end + start.problem.dwell_time,
+        estimate=paths.t_end + guess.problem.dwell_time,
         durations=None,
         is_improved=True,
     )
 
 
 def _lay_chart(better: BetterGuess) -> InitialGuess | None:
-    """Lay a chart around a better joint path; None where its own one is good.
+    """Lay a chart around a better joint path; None where its present chart is good.
 
     Raises UnreachableError where no chart can be laid.
     """
-    chart, s, q = _chart_of(better.start)
+    chart, s, q = _chart_of(better.guess)
     newton = Newton(chart.task_map)
     rows = chart.rows.at(s)[0] * newton.scales
     least = transversality(rows, newton.self_motions(q)).min()
-    if least >= _TRANSVERSAL and not better.found.is_held_back:
+    if least >= _TRANSVERSAL and not better.paths.is_held_back:
         return None
     moved = chart_around(chart.task_map, chart.path, s, q)
-    return replace(better.start, joint_map=moved, joint_path=moved.curves(s, q))
+    return replace(better.guess, joint_map=moved, joint_path=moved.curves(s, q))
 
 
 def is_timing_plan(guess: InitialGuess, program: Program) -> bool:
@@ -215,7 +217,7 @@ def improve_over_path(
         The joint path leaves its joint map.
     """
     better = improve_guess(guess, program, session, ROUGH)
-    return rank(better.start, better.program, better.found.reports)
+    return rank(better.guess, better.program, better.paths.reports)
 
 
 def plan_timing(
@@ -254,8 +256,8 @@ def plan_timing(
     excess = report.violation
     factor = 1.0
     for _ in range(_LENGTHENINGS):
-        if options.tolerance < excess < _LONGEST:
-            factor *= 1.0 + _MORE * excess
+        if options.tolerance < excess < _LARGEST_EXCESS:
+            factor *= 1.0 + _EXCESS_FACTOR * excess
         longer = SolvedProgram(
             finer, (report,), violation=report.violation, time_scaled=factor
         )

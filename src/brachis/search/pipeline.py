@@ -1,6 +1,6 @@
 """From an initial guess to a verified motion: every task goes through these steps, in this order.
 
-    joint path      from a lattice, from a given motion, or given by the task           `schedule`, `starts`
+    joint path      from a lattice, from a given motion, or given by the task           `schedule`, `guesses`
     over the path   joint path and speed together, in a chart or in closed form         `over_path`
     timing          the fastest one along the best joint path, by the phase plane       `PhaseTiming`
     splines         over given knots, or over knots where the timing needs them         `over_time`

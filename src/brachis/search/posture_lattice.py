@@ -83,56 +83,59 @@ class PostureLattice(Lattice):
         return np.abs(last.q - self.problem.end).max(axis=1) < _SAME
 
     def _choose(
-        self, found: list[JointPath], ends: Layer, most: int
+        self, joint_paths: list[JointPath], ends: Layer, count: int
     ) -> list[JointPath]:
-        """Choose joint paths no longer than any to a node around theirs, then some that differ, and name their seeds.
+        """Choose joint paths no longer than those to nodes around, then some that differ, and name their seeds.
 
         Of several redundant joints the nodes are samples, which have no such minima.
         """
         chosen = []
         if self._r <= 1:
             first, second = self._near(ends.q, ends.q, self._around)
-            own = ends.branch[first] == ends.branch[second]
+            same_label = ends.branch[first] == ends.branch[second]
             around = np.full(len(ends.q), np.inf)
-            np.minimum.at(around, first[own], ends.length[second[own]])
-            chosen = np.flatnonzero(around >= ends.length)[:most].tolist()
+            np.minimum.at(around, first[same_label], ends.length[second[same_label]])
+            chosen = np.flatnonzero(around >= ends.length)[:count].tolist()
         if self._r > 1 or not self._only_minima:
-            others = distinct(found, most)
-            chosen += [i for i in others if i not in chosen][: most - len(chosen)]
-        return [replace(found[i], seed=self._seed_of(found[i].q[0])) for i in chosen]
+            indices = distinct(joint_paths, count)
+            chosen += [i for i in indices if i not in chosen][: count - len(chosen)]
+        return [
+            replace(joint_paths[i], seed=self._seed_of(joint_paths[i].q[0]))
+            for i in chosen
+        ]
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
         """Make nodes all over the self-motion manifold at the path's beginning, one in a cell."""
         target = self._targets[:1]
         count = 4 * self._nodes
-        found = []
+        seeds = []
         for decomposition in self._decompositions:
             cells = Cells.of(decomposition, self._cells_per_turn, None)
             q_r = cells.positions(cells.everywhere(count, rng))
             q = solve_all(decomposition, np.repeat(target, len(q_r), axis=0), q_r)
-            found.append(q[np.isfinite(q).all(axis=3)])
-        if not found:
+            seeds.append(q[np.isfinite(q).all(axis=3)])
+        if not seeds:
             low, high = sampling_box(self._robot)
             drawn = rng.uniform(low, high, (count, len(low)))
             q = self._newton.nearest(np.repeat(target, count, axis=0), drawn)
-            found.append(q[np.isfinite(q).all(axis=1)])
-        self._seeds = found
-        q = np.concatenate(found)
-        _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
-        return Layer.start(q[kept], np.zeros(len(kept), dtype=int))
+            seeds.append(q[np.isfinite(q).all(axis=1)])
+        self._seeds = seeds
+        q = np.concatenate(seeds)
+        _, one_per_cell = np.unique(self._key(q, self._size), axis=0, return_index=True)
+        return Layer.start(q[one_per_cell], np.zeros(len(one_per_cell), dtype=int))
 
     def _seed_of(self, q: np.ndarray) -> str:
-        """Name the closed form that gave the start, (n,); empty for a given one."""
+        """Name the closed form that gave a start posture, (n,); empty if the task gives it."""
         if not self._seeds:
             return ""
         if not self._decompositions:
             return "random"
-        steps = [np.abs(self._step(q, own)).max(axis=1) for own in self._seeds]
-        nearest = [own.min(initial=np.inf) for own in steps]
+        distances = [np.abs(self._step(q, seeds)).max(axis=1) for seeds in self._seeds]
+        nearest = [distance.min(initial=np.inf) for distance in distances]
         return self._decompositions[int(np.argmin(nearest))].name
 
-    def _choose_starts(self, layer: Layer) -> Layer:
-        """Label the starts: joint paths of different labels do not displace each other.
+    def _choose_start_nodes(self, layer: Layer) -> Layer:
+        """Label the start nodes: joint paths of different labels do not displace each other.
 
         Of one redundant joint a label is a connected component of the self-motion
         manifold; of several, a few postures far from each other have one each.
@@ -164,13 +167,15 @@ class PostureLattice(Lattice):
         values, jacobian = self._newton.task_coordinates(before.q)
         # Of self-motion, where joints have their cells as units.
         null = null_spaces(jacobian * self._size)
-        wanted = self.problem.task_map.difference(self._targets[station][None], values)
+        task_step = self.problem.task_map.difference(
+            self._targets[station][None], values
+        )
         still = np.zeros((len(null), self._r))  # without self-motion
         rows = np.swapaxes(null, 1, 2) / self._size
         square = np.concatenate([jacobian, rows], axis=1)
-        needed = solve_each(square, np.concatenate([wanted, still], axis=1))
+        needed = solve_each(square, np.concatenate([task_step, still], axis=1))
         if self._r <= 1:
-            around = self._at_cells(before.q, jacobian, null, wanted, station)
+            around = self._at_cells(before.q, jacobian, null, task_step, station)
             parent, which = self._near(before.q, around, LARGEST_STEP)
             q = around[which]
         else:
@@ -181,16 +186,17 @@ class PostureLattice(Lattice):
             parent = np.append(parent, node)
             q = np.vstack([q, end[which]])
         step = self._step(before.q[parent], q)
-        own = step - needed[parent]
-        own = own / self._size
-        small = np.all(np.abs(own) <= 1.0, axis=1)
+        self_motion = (step - needed[parent]) / self._size
+        is_small = np.all(np.abs(self_motion) <= 1.0, axis=1)
         # Postures across a fold of the manifold differ in other directions.
-        along = np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1)
+        along = np.linalg.norm(
+            np.einsum("eir,ei->er", null[parent], self_motion), axis=1
+        )
         return Edges(
             parent,
             step,
             np.column_stack([before.branch[parent], self._key(q, _SAME)]),
-            allowed=small | (along >= 0.7 * np.linalg.norm(own, axis=1)),
+            allowed=is_small | (along >= 0.7 * np.linalg.norm(self_motion, axis=1)),
         )
 
     def _near(
@@ -200,11 +206,11 @@ class PostureLattice(Lattice):
         from scipy.spatial import KDTree
 
         box = np.where(self._modulo, TURN, 0.0)
-        one, other = (
+        first_tree, second_tree = (
             KDTree(self._without_turns(q), boxsize=box) for q in (first, second)
         )
-        pairs = one.sparse_distance_matrix(
-            other, reach, p=np.inf, output_type="ndarray"
+        pairs = first_tree.sparse_distance_matrix(
+            second_tree, reach, p=np.inf, output_type="ndarray"
         )
         return pairs["i"], pairs["j"]
 
@@ -213,7 +219,7 @@ class PostureLattice(Lattice):
         q: np.ndarray,
         jacobian: np.ndarray,
         null: np.ndarray,
-        wanted: np.ndarray,
+        task_step: np.ndarray,
         station: int,
     ) -> np.ndarray:
         """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
@@ -226,20 +232,22 @@ class PostureLattice(Lattice):
         cells = np.rint(at / size).astype(int)[which] + np.tile(offsets, (len(q), 1))
         levels = cells * size[which]
         augmented = np.concatenate([jacobian, rows], axis=1)[which]
-        right = np.concatenate([wanted[which], levels - at[which]], axis=1)
+        right = np.concatenate([task_step[which], levels - at[which]], axis=1)
         begun = q[which] + solve_each(augmented, right)
         regular = np.flatnonzero(np.isfinite(begun).all(axis=1))
-        # One start for each posture: from the node whose own cell is nearest.
+        # One prediction for each posture: from the node whose cell is nearest.
         keys = [joints[which], cells, self._key(np.nan_to_num(begun), 0.5)]
         far = np.tile(np.abs(offsets).sum(axis=1), len(q)).astype(float)
         keys_of_regular = np.concatenate(keys, axis=1)[regular]
         chosen = regular[shortest(far[regular], keys_of_regular)]
-        found = self._project(
+        postures = self._project(
             begun[chosen], rows[which[chosen]], levels[chosen], station
         )
-        found = found[np.isfinite(found).all(axis=1)]
-        _, kept = np.unique(self._key(found, _SAME), axis=0, return_index=True)
-        return found[kept]
+        postures = postures[np.isfinite(postures).all(axis=1)]
+        _, one_per_node = np.unique(
+            self._key(postures, _SAME), axis=0, return_index=True
+        )
+        return postures[one_per_node]
 
     def _sample(
         self,
@@ -255,18 +263,18 @@ class PostureLattice(Lattice):
         random = rng.normal(0.0, 2.5, (6, r))
         offsets = np.vstack([np.zeros((1, r)), single, random])
         aside = np.einsum("kij,oj->koi", null, offsets) * self._size
-        if self._to_end:  # one more: a part of the way to the given end
-            left = (self.problem.end - q) / max(1, len(self.s) - station)
-            homing = np.einsum("kir,kjr,kj->ki", null, null, left / self._size)
+        if self._to_end:  # and towards the given end
+            step_to_end = (self.problem.end - q) / max(1, len(self.s) - station)
+            homing = np.einsum("kir,kjr,kj->ki", null, null, step_to_end / self._size)
             homing = homing * self._size
             aside = np.concatenate([aside, homing[:, None]], axis=1)
         parent = np.repeat(np.arange(len(q)), aside.shape[1])
         begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
         rows = (np.swapaxes(null, 1, 2) / self._size)[parent]
         levels = np.einsum("kij,kj->ki", rows, begun)
-        found = self._project(begun, rows, levels, station)
-        exists = np.isfinite(found).all(axis=1)
-        return parent[exists], found[exists]
+        postures = self._project(begun, rows, levels, station)
+        exists = np.isfinite(postures).all(axis=1)
+        return parent[exists], postures[exists]
 
     def _project(
         self, q: np.ndarray, rows: np.ndarray, levels: np.ndarray, station: int
@@ -280,10 +288,13 @@ class PostureLattice(Lattice):
         if self._r <= 1:
             return layer[self._is_short(layer)]
         labels = np.unique(layer.branch)
-        most = max(10, self._nodes // len(labels))
-        own = (np.flatnonzero(layer.branch == label) for label in labels)
-        kept = [those[self._choose_some(layer[those], most)] for those in own]
-        return layer[np.concatenate(kept)]
+        per_label = max(10, self._nodes // len(labels))
+        nodes_by_label = (np.flatnonzero(layer.branch == label) for label in labels)
+        chosen = [
+            nodes[self._choose_some(layer[nodes], per_label)]
+            for nodes in nodes_by_label
+        ]
+        return layer[np.concatenate(chosen)]
 
     def _is_short(self, layer: Layer) -> np.ndarray:
         """Tell which nodes, (K,) bool, are not much longer than those of other labels in the same posture."""

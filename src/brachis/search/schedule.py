@@ -18,18 +18,18 @@ from brachis.optimise.backends import solvers_for
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.differential_ik import STRATEGIES
+from brachis.search.guesses import (
+    SEARCH_LEVELS,
+    SearchLevel,
+    chart_guesses,
+    joint_space_guess,
+    lattice_guesses,
+    numeric_guesses,
+)
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
-from brachis.search.starts import (
-    SEARCH_LEVELS,
-    SearchLevel,
-    chart_starts,
-    joint_space_start,
-    lattice_starts,
-    numeric_starts,
-)
 
 _SIZE = 12
 """Guesses of a batch."""
@@ -98,7 +98,7 @@ def batches(
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
     if isinstance(problem.task_map, JointSpace):
-        guess = joint_space_start(problem)
+        guess = joint_space_guess(problem)
         refuse_hopeless([guess])
         for number, solver_guess in enumerate(_with_solvers([guess], solvers)):
             yield Batch([solver_guess], 1, fallback=number > 0)
@@ -117,7 +117,7 @@ def batches(
     tried = {(guess.joint_map.redundant_joints, guess.origin) for guess in guesses}
     yield Batch(_with_solvers(guesses[:_SIZE], solvers[1:2]), many)
     for decomposition in decompositions[: levels[-1].decompositions]:
-        for guess in numeric_starts(decomposition, len(STRATEGIES), deadline):
+        for guess in numeric_guesses(decomposition, len(STRATEGIES), deadline):
             if (guess.joint_map.redundant_joints, guess.origin) not in tried:
                 yield Batch(_with_solvers([guess], solvers[:2]), many)
     yield Batch(_with_solvers(guesses[:2], solvers[2:]), many)
@@ -165,7 +165,7 @@ def _guess_in_charts(
     """Find guesses in charts."""
     listener("looking for joint paths on the lattice of all postures")
     soon = deadline.part(_LATTICE_SHARE)
-    outcome = chart_starts(problem, decompositions, level, soon, listener)
+    outcome = chart_guesses(problem, decompositions, level, soon, listener)
     if isinstance(outcome, DeadEnd):
         return [], [(None, outcome)]
     return outcome, []
@@ -202,7 +202,7 @@ def _guess_on_some_branches(
     if search.guesses == "numeric":
         count = level.joint_paths
         numeric = (
-            numeric_starts(decomposition, count, deadline)
+            numeric_guesses(decomposition, count, deadline)
             for decomposition in decompositions
         )
         return list(itertools.chain(*numeric)), []
@@ -220,7 +220,7 @@ def _guess_on_some_branches(
         guesses = [replace(guess, problem=decomposition.problem) for guess in outcome]
         guesses.sort(key=lambda guess: guess.estimate)
         ranked += enumerate(
-            guesses + numeric_starts(decomposition, level.numeric, deadline)
+            guesses + numeric_guesses(decomposition, level.numeric, deadline)
         )
     ranked.sort(key=lambda item: (item[0], item[1].estimate))
     count = level.in_closed_forms // max(1, len(decompositions[0].redundant))
@@ -239,4 +239,4 @@ def _guess_for(
     if decomposition.redundant:
         place = f"lattice of {decomposition.name}"
     listener(f"looking for joint paths on the {place}")
-    return lattice_starts(decomposition, level, deadline, listener)
+    return lattice_guesses(decomposition, level, deadline, listener)

@@ -17,14 +17,14 @@ _STATIONS = 401
 """Stations along a joint path of a guess."""
 _LEAST_STATIONS = 41
 """Fewest stations along a leg."""
-_FEWEST = 24.0
-"""Steps of a lattice, no fewer."""
-_MOST = 600
-"""Steps of a lattice, no more."""
-_LONGEST = 0.05
-"""Length of a step of a lattice, m, no longer."""
+_FEWEST_STEPS = 24.0
+"""Fewest steps of a lattice."""
+_MOST_STEPS = 600
+"""Most steps of a lattice."""
+_LONGEST_STEP = 0.05
+"""Longest step of a lattice, m."""
 _LARGEST_TURN = 0.25
-"""Turn of a step of a lattice, rad, no larger: of the direction of motion, or of the tool."""
+"""Largest turn in a step of a lattice, rad, of the direction of motion or of the tool."""
 _PLACES = 2000
 """Places at which a path is measured, about."""
 
@@ -41,7 +41,7 @@ def measure(path: Path, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
     bends = np.linalg.norm(np.diff(along, axis=0, prepend=along[:1]), axis=1)
     change = task_map.difference(targets[1:], targets[:-1])
     turns = np.maximum(task_map.norms(change)[1], bends) / _LARGEST_TURN
-    steps = np.max([_FEWEST * np.diff(s), sizes / _LONGEST, turns], axis=0)
+    steps = np.max([_FEWEST_STEPS * np.diff(s), sizes / _LONGEST_STEP, turns], axis=0)
     return s, np.append(0.0, np.cumsum(steps))
 
 
@@ -62,7 +62,7 @@ def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
     """
     s, steps = measure(path, task_map)
     # Rounding of the sum adds no step.
-    count = int(min(np.ceil(density * steps[-1] - 1e-6), _MOST))
+    count = int(min(np.ceil(density * steps[-1] - 1e-6), _MOST_STEPS))
     return np.interp(np.linspace(0.0, steps[-1], count + 1), steps, s)
 
 

@@ -41,7 +41,7 @@ from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
 
 SCREENED = 4
-"""So many times the joint paths that a level plans are looked at."""
+"""Joint paths that are looked at for each one that a level plans."""
 FAMILY = "path of joints"
 """Family, and origin, of the guess for a path of joints."""
 
@@ -59,11 +59,11 @@ class SearchLevel:
     numeric : int
         Joint paths by numeric inverse kinematics as well, if the start posture is given.
     in_charts : int
-        Plans in charts; four times as many joint paths are looked at.
+        Guesses in charts that are ranked; four times as many joint paths are looked at.
     in_closed_forms : int
-        Coarse plans in closed forms; those with the least estimated time come first.
+        Guesses in closed forms that are ranked; those with the least estimated time come first.
     refined : int
-        Plans that are refined and verified at most, as long as they may beat the best one.
+        Candidates that are refined and verified, no more, as long as they may beat the best one.
     cells_per_turn, nodes : int
         Of the lattice.
     only_minima : bool
@@ -85,15 +85,19 @@ class SearchLevel:
 
 
 _RANDOM = 4
-"""So many times the joint paths that a level plans are drawn at random."""
+"""Random joint paths for each one that a level plans."""
 _RANDOM_STATIONS = 97
-"""Places at which they are carried along, about: a closed circle of 25 m needs 80."""
+"""Stations along a random joint path, about: in 14 tasks 81 % of the drawn postures arrive, as with 385; 78 with 13."""
 _DRAWN = 8
-"""Postures that are drawn for each: with a free start one of four arrives at the end within the ranges."""
+"""Postures drawn for each random joint path: 81 % arrive in the mean of 14 tasks, 14 % in the worst one."""
 _DRIFT = 2.0
-"""rad or m, in the scales of the joints: largest standard deviation of a drift from end to end."""
+"""Largest standard deviation of a drift from end to end, rad or m, in the scales of the joints.
+
+The best of 16 joint paths is 0.5 % slower than with the best drift of 1, 2, 4 and 8, in the mean of 14 tasks; with the
+other drifts 0.8 to 1.1 %, although larger ones lead to more distinct joint paths.
+"""
 _LOOKED_AT = 4
-"""Joint paths that are looked at for each one that is taken, where several joints are redundant."""
+"""Joint paths that are looked at for each one that is chosen, if several joints are redundant."""
 _NEARLY = 0.2
 """Violation of a limit of the scene with which a joint path still is a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
@@ -114,7 +118,7 @@ SEARCH_LEVELS = {
 """Levels that are gone through one after the other, by the task's ``search.effort``; so a good motion is known soon."""
 
 
-def lattice_starts(
+def lattice_guesses(
     decomposition: Decomposition,
     level: SearchLevel,
     deadline: Deadline = NEVER,
@@ -122,7 +126,7 @@ def lattice_starts(
 ) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
-    If several joints are redundant, more joint paths are found, and the most promising ones are kept.
+    If several joints are redundant, more joint paths are looked at, and the most promising ones are chosen.
 
     Parameters
     ----------
@@ -136,19 +140,19 @@ def lattice_starts(
     list of InitialGuess or DeadEnd
     """
     r = len(decomposition.redundant)
-    most = max(1, level.joint_paths // max(1, r))
-    looked_at = _LOOKED_AT * most if r > 1 and most > 1 else most
-    found = _joint_paths(decomposition, level, looked_at, deadline)
-    kept = most * len(decomposition.branches)
-    if isinstance(found, DeadEnd) or len(found) <= kept:
-        return found
-    return screen(found, kept, deadline, listener)
+    per_branch = max(1, level.joint_paths // max(1, r))
+    looked_at = _LOOKED_AT * per_branch if r > 1 and per_branch > 1 else per_branch
+    guesses = _take_guesses(decomposition, level, looked_at, deadline)
+    count = per_branch * len(decomposition.branches)
+    if isinstance(guesses, DeadEnd) or len(guesses) <= count:
+        return guesses
+    return screen(guesses, count, deadline, listener)
 
 
-def _joint_paths(
-    decomposition: Decomposition, level: SearchLevel, most: int, deadline: Deadline
+def _take_guesses(
+    decomposition: Decomposition, level: SearchLevel, count: int, deadline: Deadline
 ) -> list[InitialGuess] | DeadEnd:
-    """Take up to `most` joint paths for every branch from a decomposition's lattice."""
+    """Take guesses from up to `count` joint paths for every branch from a decomposition's lattice."""
     for finer, density in ((1, 1.0), (3, 2.0)):
         lattice = ClosedFormLattice(
             decomposition,
@@ -157,13 +161,13 @@ def _joint_paths(
             nodes=finer * level.nodes,
             deadline=deadline,
         )
-        found = lattice.joint_paths(most * len(decomposition.branches))
-        if not isinstance(found, DeadEnd):
+        joint_paths = lattice.joint_paths(count * len(decomposition.branches))
+        if not isinstance(joint_paths, DeadEnd):
             return [
                 _guess_on_branch(decomposition, joint_path, f"lattice {number}")
-                for number, joint_path in enumerate(found, 1)
+                for number, joint_path in enumerate(joint_paths, 1)
             ]
-        dead_end = found
+        dead_end = joint_paths
     return dead_end
 
 
@@ -191,7 +195,7 @@ def _guess_on_branch(
         curves = np.column_stack([s, smoothed[:, joint_map.redundant]])
         q = joint_map.postures(curves)
         if np.isfinite(q).all():
-            # It keeps clear of the branch boundary, where the start does.
+            # It keeps clear of the branch boundary, if the start posture does.
             margins = joint_map.branch_margins(q)
             least = min(0.02, margins[0].min(initial=np.inf))
             if margins.min(initial=np.inf) > 0.5 * least:
@@ -206,10 +210,10 @@ def _guess_on_branch(
     return InitialGuess(problem, joint_map, curves, estimate, origin, family)
 
 
-def numeric_starts(
-    decomposition: Decomposition, most: int, deadline: Deadline
+def numeric_guesses(
+    decomposition: Decomposition, count: int, deadline: Deadline
 ) -> list[InitialGuess]:
-    """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
+    """Carry the given start posture along the path by numeric inverse kinematics, in up to `count` ways.
 
     Those that hit something are left out.
 
@@ -217,7 +221,7 @@ def numeric_starts(
     ----------
     decomposition : Decomposition
         With a given start posture; without one the list is empty.
-    most : int
+    count : int
     deadline : Deadline
 
     Returns
@@ -228,22 +232,22 @@ def numeric_starts(
     if problem.start is None:
         return []
     joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
-    joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
+    joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), count)
     family = decomposition.match.family
     scene = [limit for limit in problem.limits if limit.role is Role.SCENE]
-    starts = []
+    guesses = []
     for number, joint_path in enumerate(joint_paths, 1):
         q = joint_map.postures(joint_path)
         q = q[np.isfinite(q).all(axis=1)]
         if all(limit.holds_at_rest(q, _NEARLY).all() for limit in scene):
             origin = f"numeric {number}"
-            starts.append(
+            guesses.append(
                 InitialGuess(problem, joint_map, joint_path, np.inf, origin, family)
             )
-    return starts
+    return guesses
 
 
-def chart_starts(
+def chart_guesses(
     problem: Problem,
     decompositions: Sequence[Decomposition],
     level: SearchLevel,
@@ -281,23 +285,30 @@ def chart_starts(
             only_minima=level.only_minima,
             deadline=deadline,
         )
-        found = lattice.joint_paths(SCREENED * level.in_charts)
-        if not isinstance(found, DeadEnd):
+        joint_paths = lattice.joint_paths(SCREENED * level.in_charts)
+        if not isinstance(joint_paths, DeadEnd):
             break
-    if isinstance(found, DeadEnd):
-        return found
+    if isinstance(joint_paths, DeadEnd):
+        return joint_paths
     named = [
-        (f"lattice {number}" + (f", from {each.seed}" if each.seed else ""), each)
-        for number, each in enumerate(found, 1)
+        (
+            f"lattice {number}"
+            + (f", from {joint_path.seed}" if joint_path.seed else ""),
+            joint_path,
+        )
+        for number, joint_path in enumerate(joint_paths, 1)
     ]
     is_sampled = problem.r > 1 or problem.start is None
     if is_sampled and level.in_charts > 1:
         drawn = random_joint_paths(problem, _RANDOM * level.in_charts)
-        named += [(f"random {number}", each) for number, each in enumerate(drawn, 1)]
+        named += [
+            (f"random {number}", joint_path)
+            for number, joint_path in enumerate(drawn, 1)
+        ]
     newton = Newton(problem.task_map)
     guesses = []
     for origin, joint_path in named:
-        if joint_path is not found[0] and deadline.passed:
+        if joint_path is not joint_paths[0] and deadline.passed:
             break
         guess = guess_in_chart(newton, joint_path, origin)
         if guess is not None:
@@ -312,13 +323,13 @@ def chart_starts(
     return screen(hopeful, level.in_charts, deadline, listener)
 
 
-def random_joint_paths(problem: Problem, most: int) -> list[JointPath]:
+def random_joint_paths(problem: Problem, count: int) -> list[JointPath]:
     """Carry random postures, or a given one, along the path; each drifts to a side at random.
 
     Parameters
     ----------
     problem : Problem
-    most : int
+    count : int
         How many to find, no more.
 
     Returns
@@ -334,13 +345,13 @@ def random_joint_paths(problem: Problem, most: int) -> list[JointPath]:
     step = -1 if is_backwards else 1
     ends = [problem.start, problem.end][::step]
     targets = problem.path.sample(s).target[::step]
-    count = _DRAWN * most
-    q = rng.uniform(*sampling_box(problem.robot), (count, problem.robot.n))
+    draws = _DRAWN * count
+    q = rng.uniform(*sampling_box(problem.robot), (draws, problem.robot.n))
     if ends[0] is not None:
         q[:] = ends[0]
-    drift = rng.normal(0.0, 1.0, q.shape) * rng.uniform(0.0, _DRIFT, (count, 1))
+    drift = rng.normal(0.0, 1.0, q.shape) * rng.uniform(0.0, _DRIFT, (draws, 1))
     drift *= newton.scales
-    paths = np.empty((count, 0, problem.robot.n))
+    paths = np.empty((draws, 0, problem.robot.n))
     remaining = 1.0
     lengths = np.append(0.0, np.abs(np.diff(s[::step])))
     for target, length in zip(targets, lengths, strict=True):
@@ -355,13 +366,13 @@ def random_joint_paths(problem: Problem, most: int) -> list[JointPath]:
         drift = drift[inside]
         paths = np.concatenate([paths[inside], q[:, None]], axis=1)
         remaining -= length
-    at_rest = [limit for limit in problem.limits if limit.at_rest == "posture"]
+    posture_limits = [limit for limit in problem.limits if limit.at_rest == "posture"]
     allowed = (
-        JointPath(problem, s, own[::step], np.inf)
-        for own in paths
-        if all(limit.holds_at_rest(own, _NEARLY).all() for limit in at_rest)
+        JointPath(problem, s, postures[::step], np.inf)
+        for postures in paths
+        if all(limit.holds_at_rest(postures, _NEARLY).all() for limit in posture_limits)
     )
-    return list(itertools.islice(allowed, most))
+    return list(itertools.islice(allowed, count))
 
 
 def guess_in_chart(
@@ -404,8 +415,8 @@ def bring_onto_path(
     return q
 
 
-def joint_space_start(problem: Problem) -> InitialGuess:
-    """Time a path of joints in the phase plane, and start from there.
+def joint_space_guess(problem: Problem) -> InitialGuess:
+    """Make the guess for a path of joints, timed in the phase plane.
 
     Parameters
     ----------
@@ -423,8 +434,8 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     """
     s = spread_stations(problem)
     q = problem.path.sample(s).target
-    passed = [part for part in fastest_times(problem, s, q) if part is not None]
-    is_passed = len(passed) == len(problem.legs)
+    timings = [timing for timing in fastest_times(problem, s, q) if timing is not None]
+    is_passed = len(timings) == len(problem.legs)
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
         is_needed = not is_passed or limit.longer_time != "relieves"
@@ -435,9 +446,11 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if not is_passed:
         return InitialGuess(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
-    durations = tuple(float(times[-1]) for _, times in passed)
+    durations = tuple(float(times[-1]) for _, times in timings)
     even = np.linspace(0.0, 1.0, 401)
-    timed = [np.interp(even * times[-1], times, stations) for stations, times in passed]
+    timed = [
+        np.interp(even * times[-1], times, stations) for stations, times in timings
+    ]
     estimate = sum(durations) + problem.dwell_time
     motion = np.concatenate(timed)[:, None]
     return InitialGuess(
@@ -456,14 +469,16 @@ def first_guess(
         The lattices have no joint path.
     """
     if isinstance(problem.task_map, JointSpace):
-        return joint_space_start(problem)
+        return joint_space_guess(problem)
     level = SEARCH_LEVELS["fast"][0]
     if not decompositions:
-        found = chart_starts(problem, decompositions, level)
+        guesses = chart_guesses(problem, decompositions, level)
     for decomposition in decompositions:
-        found = _joint_paths(decomposition, level, 1, NEVER)
-        if not isinstance(found, DeadEnd):
+        guesses = _take_guesses(decomposition, level, 1, NEVER)
+        if not isinstance(guesses, DeadEnd):
             break
-    if isinstance(found, DeadEnd):
-        raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
-    return found[0]
+    if isinstance(guesses, DeadEnd):
+        raise PathError(
+            f"no joint path was found: {guesses}", s_interval=guesses.interval
+        )
+    return guesses[0]
