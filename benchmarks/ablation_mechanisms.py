@@ -18,7 +18,7 @@ from brachis.errors import BrachisError
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.retiming import FINE, improve_joint_paths
-from brachis.search.over_path import improve_guess, plan_timing
+from brachis.search.over_path import improve_guess, lay_along_timing
 from brachis.search.stages import rank
 
 IsUsed = Callable[..., bool]
@@ -196,7 +196,7 @@ def finish_by_timing_alone(
     legs = candidate.guess.legs
     paths = improve_joint_paths(program, legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
-    planned = plan_timing(candidate, program, paths.timings, reports, options)
+    planned = lay_along_timing(candidate, program, paths.timings, reports, options)
     return planned or finish_over_path(candidate, session, options, to_beat)
 
 

@@ -144,7 +144,7 @@ def lattice_guesses(
     looked_at = _LOOKED_AT * per_branch if r > 1 and per_branch > 1 else per_branch
     guesses = _take_guesses(decomposition, level, looked_at, deadline)
     count = per_branch * len(decomposition.branches)
-    if isinstance(guesses, DeadEnd) or len(guesses) <= count:
+    if isinstance(guesses, DeadEnd):
         return guesses
     return screen(guesses, count, deadline, listener)
 
@@ -298,7 +298,9 @@ def chart_guesses(
         )
         for number, joint_path in enumerate(joint_paths, 1)
     ]
-    is_sampled = problem.r > 1 or problem.start is None
+    # Backwards from a given end the lattice of one redundant joint has a single joint path.
+    is_backwards = problem.start is None and problem.end is not None
+    is_sampled = problem.r > 1 or is_backwards
     if is_sampled and level.in_charts > 1:
         drawn = random_joint_paths(problem, _RANDOM * level.in_charts)
         named += [

@@ -188,8 +188,8 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
     return replace(better.guess, joint_map=moved, joint_path=moved.curves(s, q))
 
 
-def is_timing_plan(guess: InitialGuess, program: Program) -> bool:
-    """Tell whether the fastest timing may be the plan: the phase plane knows all limits, and the knots are open.
+def follows_timing(guess: InitialGuess, program: Program) -> bool:
+    """Tell whether splines along the timing may be the answer: the phase plane knows all limits, ``intervals`` is auto.
 
     As a fallback other solvers solve over time.
     """
@@ -220,7 +220,7 @@ def improve_over_path(
     return rank(better.guess, better.program, better.paths.reports)
 
 
-def plan_timing(
+def lay_along_timing(
     candidate: RankedCandidate,
     program: Program,
     timings: Sequence[PhaseTiming | None],

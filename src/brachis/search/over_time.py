@@ -151,7 +151,7 @@ class BetterTimings:
         return () if self.solved is None else self.solved.reports
 
 
-def limit_along_timing(session: SolverSession) -> SolverSession:
+def shorten_solves(session: SolverSession) -> SolverSession:
     """Bound the effort of solves that begin with the fastest timing."""
     iterations = min(_ITERATIONS, session.options.max_iterations)
     options = replace(session.options, max_iterations=iterations, widening=_WIDENING)

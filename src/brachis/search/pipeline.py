@@ -1,17 +1,25 @@
-"""From an initial guess to a verified motion: every task goes through these steps, in this order.
+"""From an initial guess to a verified motion, in the order in which it happens.
 
-    joint path      from a lattice, from a given motion, or given by the task           `schedule`, `guesses`
-    over the path   joint path and speed together, in a chart or in closed form         `over_path`
-    timing          the fastest one along the best joint path, by the phase plane       `PhaseTiming`
-    splines         over given knots, or over knots where the timing needs them         `over_time`
-    over time       the program with all limits, from these splines                     `over_time`
-    knots           more of them, free ones, other coordinates over the same ones       `mesh`, `joint_choice`
-    refinement      collocation points where limits are exceeded between others         `refine`
-    verification    from URDF, path and limits alone                                    `verified`
+    joint path      from a lattice, at random, of a given motion, or of the task
+    over the path   joint path and speed together                                       a better InitialGuess
+    timing          the fastest one along that joint path, by the phase plane           RankedCandidate
+    over time       the program with all limits, from splines along that timing         SolvedProgram
+    knots           finer, or free ones; other coordinates over the same ones           SolvedProgram
+    refinement      collocation points where limits are exceeded between others         SolvedProgram
+    verification    from URDF, path and limits alone                                    FinishedCandidate
 
-`rank_candidate` goes as far as the timing, whose time ranks candidates. `finish_candidate` goes on from there with
-those that may be the fastest. Where the phase plane knows all limits, and the knots are open, the program over time
-improves the joint path, and splines along the timing of this are the answer where they are faster.
+`rank_candidate` goes as far as the timing: its time, `Candidate.estimate`, ranks candidates. Limits that the phase
+plane does not know (jerk, torque rate, means) are not in it. `finish_candidate` goes on with those that may be the
+fastest, in one of two ways:
+
+- `_finish_over_time`, where knots are given (``intervals: 20``, or ``knots: free``), or the phase plane does not know a
+  limit. The answer of the program over time is refined.
+- `_finish_over_path`, for ``intervals: auto`` and limits that it knows. The program over time improves the joint path.
+  Its answer is refined if it is about as fast as the timing of its own joint path; otherwise splines are laid along
+  this timing.
+
+Coordinates are those of a closed form where the task names its redundant joints, and else of a chart, which measures
+self-motion around a joint path. A path of joints leaves nothing to improve: it is timed, and splines are laid along it.
 """
 
 from __future__ import annotations
@@ -30,10 +38,10 @@ from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import FINE, improve_joint_paths, is_timing_all
 from brachis.optimise.transcription import program_of
 from brachis.search.joint_choice import best_of_joints
-from brachis.search.over_path import improve_over_path, is_timing_plan, plan_timing
+from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
 from brachis.search.over_time import (
     improve_timings,
-    limit_along_timing,
+    shorten_solves,
     solve_over_time,
 )
 from brachis.search.stages import (
@@ -49,8 +57,8 @@ from brachis.search.stages import (
 )
 from brachis.search.verified import refine_and_verify
 
-_FOR_KNOTS = 0.5
-"""Part of the time left after which the knots are not refined further."""
+_BEFORE_REFINEMENT = 0.5
+"""Part of the time left for all that comes before refinement."""
 
 
 def rank_candidate(
@@ -100,11 +108,13 @@ def finish_candidate(
     Candidate
         A finished one where there is a motion.
     """
-    session = _open_session(candidate.guess, deadline.part(_FOR_KNOTS), listener)
+    session = _open_session(
+        candidate.guess, deadline.part(_BEFORE_REFINEMENT), listener
+    )
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
-    is_plan = is_timing_plan(candidate.guess, candidate.program)
-    finish = _finish_over_path if is_plan else _finish_over_time
+    is_followed = follows_timing(candidate.guess, candidate.program)
+    finish = _finish_over_path if is_followed else _finish_over_time
     return finish(candidate, session, options, to_beat)
 
 
@@ -118,6 +128,7 @@ def _finish_over_time(
     guess = candidate.guess
     spline = guess.problem.task.spline
     pairs = zip(candidate.program.phases, guess.legs, strict=True)
+    # Rows that are far from their bounds all along the joint path are left out.
     program = candidate.program.with_phases(
         phase.restrict_to(curves) for phase, curves in pairs
     )
@@ -128,12 +139,13 @@ def _finish_over_time(
     if not solved.usable:
         words = solved.report.status.name.lower().replace("_", " ")
         return fail(candidate, words, solved.reports)
+    # Many knots are reached from few.
     target = solved.program if spline.intervals == "auto" else program
-    is_final = spline.intervals != "auto" and spline.knots != "free"
+    has_given_knots = spline.intervals != "auto" and spline.knots != "free"
     has_all_knots = solved.program.intervals == target.intervals
-    # The chart around a given motion is kept.
+    # The chart around a given motion is kept, and so is a joint that the task names.
     is_free = guess.in_chart and guess.durations is None
-    if is_final and has_all_knots and is_free and not session.deadline.passed:
+    if has_given_knots and has_all_knots and is_free and not session.deadline.passed:
         solved = best_of_joints(guess.problem, solved, session)
         target = solved.program
     soon = replace(options, deadline=session.deadline)
@@ -160,7 +172,7 @@ def _finish_over_path(
     tolerance = guess.problem.task.spline.tolerance
     paths = improve_joint_paths(program, guess.legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
-    session = limit_along_timing(session)
+    session = shorten_solves(session)
     retimed = improve_timings(guess, program, paths, session)
     reports = (*reports, *retimed.reports)
     least = retimed.t_end + guess.problem.dwell_time
@@ -174,7 +186,9 @@ def _finish_over_path(
         motions.append(motion)
         if motion.is_settled and motion.t_end < longest:
             return motion
-    laid = plan_timing(candidate, retimed.program, retimed.timings, reports, options)
+    laid = lay_along_timing(
+        candidate, retimed.program, retimed.timings, reports, options
+    )
     if laid is not None:
         motions.append(laid)
     no_timing = replace(candidate, status=NO_TIMING, reports=reports)

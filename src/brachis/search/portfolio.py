@@ -50,8 +50,6 @@ from brachis.trajectory import Trajectory
 _LEAST_COST = 0.5
 """Part of what knots, and limits that the phase plane does not know, cost one motion, that they cost another at least.
 With 10 intervals they cost a planar arm 17 to 20 % of the time."""
-_SURE = 0.998
-"""Factor by which another motion may be shorter than its timing says, where these cost nothing."""
 _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
 
@@ -335,8 +333,8 @@ class Search:
         if self._unfinished_lattices:
             names = name_first(list(self._unfinished_lattices), " | ")
             parts.append(f"the lattice of {names} was not searched completely")
-        unsolved = sum(candidate.status == NOT_TRIED for candidate in self.candidates)
-        counts = {"planned": unsolved, "refined": len(self._waiting)}
+        untried = sum(candidate.status == NOT_TRIED for candidate in self.candidates)
+        counts = {"tried": untried, "finished": len(self._waiting)}
         unfinished = [f"{n} not {what}" for what, n in counts.items() if n]
         if unfinished:
             total = write_count(len(self.candidates), "candidate")
@@ -450,7 +448,7 @@ class Search:
         self._finished.append(self._ranked[number])
         # What limits and knots cost differs from motion to motion.
         ratio = min(candidate.adapted, candidate.t_end) / candidate.estimate
-        least = min(1.0 + _LEAST_COST * (ratio - 1.0), _SURE * ratio)
+        least = min(1.0 + _LEAST_COST * (ratio - 1.0), ratio)
         self._least_ratio = min(self._least_ratio or least, least)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self._keep(candidate)

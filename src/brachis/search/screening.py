@@ -53,19 +53,10 @@ def screen(
     """
     listener(f"improving {len(guesses)} joint paths")
     improve = partial(_improve_in_parallel, deadline=deadline, listener=listener)
-    if len(guesses) <= count:
-        return _choose_distinct(improve(guesses, ROUGH, CHARTS, count), count)
-    coarse = improve(_spread_out(guesses), COARSE, 1, 2 * count)
-    chosen = _choose_distinct(coarse, 2 * count)
-    chosen = _choose_distinct(improve(chosen, ROUGH, CHARTS, count), count)
-    # Of many, one half of those as fast as the fastest is enough.
-    alike = max(2, count // 2)
-    slower = [
-        guess
-        for guess in chosen[alike:]
-        if guess.estimate > _NEAR_LEAST * chosen[0].estimate
-    ]
-    return chosen[:alike] + slower
+    if len(guesses) > count:
+        coarse = improve(_spread_out(guesses), COARSE, 1, 2 * count)
+        guesses = _choose_distinct(coarse, 2 * count)
+    return _choose_distinct(improve(guesses, ROUGH, CHARTS, count), count)
 
 
 def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[InitialGuess]:
