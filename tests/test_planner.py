@@ -116,8 +116,8 @@ def test_every_solve_is_reported():
         robot(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}])
     )
     reports = result.candidate.reports
-    assert len(reports) == 3 + result.candidate.refinement_rounds, (
-        "over the path, and twice over time: the branch margin holds this motion back"
+    assert len(reports) == 2 + result.candidate.refinement_rounds, (
+        "the branch margin holds this motion back"
     )
     assert result.to_dict()["iterations"] == sum(
         report.iterations for report in reports

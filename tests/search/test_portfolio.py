@@ -411,7 +411,7 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
     ("asked", "solved", "left"),
     [
         ({}, 1, "of 2 candidates 1 not tried"),
-        (BRANCH, 2, "of 4 candidates 2 not tried, 1 not finished"),
+        (BRANCH, 2, "of 5 candidates 3 not tried, 1 not finished"),
     ],
 )
 @pytest.mark.usefixtures("splines_are_too_fast")
