@@ -298,7 +298,7 @@ def test_many_intervals_are_planned_at_once_from_the_timing():
     assert result.verified
     assert result.t_end == pytest.approx(2.1421, abs=5e-4)
     assert len(np.unique(result.trajectory.knots)) == 101
-    _over_path, *reports = result.candidate.reports
+    reports = result.candidate.reports
     assert {len(report.x) for report in reports} == {196}
     assert sum(report.iterations for report in reports) < 60
 
@@ -308,7 +308,7 @@ def test_many_intervals_are_planned_from_few_where_the_timing_leaves_a_limit_out
     arm = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=jerks)
     result = brachis.plan(arm, task(intervals=50, degree=4))
     assert result.verified
-    _over_path, *reports = result.candidate.reports
+    reports = result.candidate.reports
     assert len(reports[0].x) < 0.6 * len(reports[-1].x)
 
 
