@@ -5,8 +5,8 @@ speed has no fastest motion, but one motion, which the limits allow or do not al
 
 The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until nothing is
 too fast: the limits that hold the fastest motion are near then, and a solver sees where to go. Where a smooth motion
-from rest to rest is faster, or splines cannot follow the timing within the limits, it is that one. So it is, if knots
-are few, for a joint path that may be far from the best one: its timing leads to other optima.
+from rest to rest is faster, or splines cannot follow the timing within the limits, it is that one. Where
+splines over few knots leave the branch, it goes straight from end to end.
 """
 
 from __future__ import annotations
@@ -29,8 +29,6 @@ from brachis.timing import JointPath, PhasePlane
 
 _STATIONS = 401
 """Stations along a joint path of a guess."""
-_FEW_VARIABLES = 60
-"""With no more variables, a joint path that was not improved is not timed: its timing leads to other optima."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
 _ROUGH = 0.99
@@ -119,14 +117,8 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
     durations = guess.durations or (None,) * len(guess.legs)
     curves_and_durations = [(guess.legs, durations)]
     if guess.durations is None:
-        # The joint paths of legs are timed that are near the best ones, have many knots, or moving ends.
-        is_near = guess.is_improved or program.variables > _FEW_VARIABLES
-        timed = [
-            _time_guess(phase, curves)
-            if is_near or any(phase.boundary.rates)
-            else (curves, None)
-            for phase, curves in zip(program.phases, guess.legs, strict=True)
-        ]
+        pairs = zip(program.phases, guess.legs, strict=True)
+        timed = [_time_guess(phase, curves) for phase, curves in pairs]
         curves, durations = zip(*timed, strict=True)
         if any(durations):
             curves_and_durations.append((curves, durations))
@@ -136,8 +128,12 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
         if x is not None:
             beyond = max(worst_time_scaling_ratio(program, x), 1.0)
             points.append((beyond, program.end_time(x), x))
-    # The fastest one within the limits.
-    return min(points, key=itemgetter(0, 1))[-1] if points else None
+    if points:
+        # The fastest one within the limits.
+        return min(points, key=itemgetter(0, 1))[-1]
+    # Over few knots splines may leave the branch where the joint path bends.
+    straight = [np.linspace(curves[0], curves[-1], _STATIONS) for curves in guess.legs]
+    return starting_point(program, straight, (None,) * len(straight))
 
 
 def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:
