@@ -248,7 +248,7 @@ MECHANISMS = (
     ),
     Mechanism(
         "coarse_screening",
-        "no coarse search before the rough one; half of the guesses by estimated times",
+        "no coarse search before the rough one; the better guesses by estimated times",
         {_SEARCH + "screening._improve_in_parallel": improve_roughly_alone},
         is_used=lambda _result, _guesses, _effort, charts, *_, **_keywords: charts == 1,
     ),

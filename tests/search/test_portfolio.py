@@ -427,7 +427,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     assert result.verification.worst_ratio > 1.0
     tried = [each for each in result.candidates if each.status != NOT_TRIED]
     assert len(tried) == solved
-    assert result.t_end == tried[0].t_end
+    assert result.t_end >= min(each.estimate for each in tried)
     assert left in result.not_completed
 
 

@@ -117,8 +117,13 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
     durations = guess.durations or (None,) * len(guess.legs)
     curves_and_durations = [(guess.legs, durations)]
     if guess.durations is None:
-        pairs = zip(program.phases, guess.legs, strict=True)
-        timed = [_time_guess(phase, curves) for phase, curves in pairs]
+        # The timing of a joint path that was not improved leads to other optima.
+        timed = [
+            _time_guess(phase, curves)
+            if guess.is_improved or any(phase.boundary.rates)
+            else (curves, None)
+            for phase, curves in zip(program.phases, guess.legs, strict=True)
+        ]
         curves, durations = zip(*timed, strict=True)
         if any(durations):
             curves_and_durations.append((curves, durations))

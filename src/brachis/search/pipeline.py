@@ -75,15 +75,17 @@ def rank_candidate(
     Returns
     -------
     Candidate
-        A ranked one, unless the joint path leaves its joint map.
+        A ranked one, unless the joint path leaves its joint map, or the time is up.
     """
     if deadline.passed:
         return begin_candidate(guess, NOT_TRIED)
-    # A motion that is given may be near the optimum for limits that the phase plane does not know.
+    # A motion that is given is where the program over time begins, if that gives the answer.
     is_motion = guess.durations is not None
+    has_given_knots = guess.problem.task.spline.intervals != "auto"
     try:
         program = program_of(guess.problem, guess.maps_by_leg())
-        if guess.is_improved or (is_motion and not is_timing_all(program)):
+        begins_over_time = has_given_knots or not is_timing_all(program)
+        if guess.is_improved or (is_motion and begins_over_time):
             return rank(guess, program)
         return improve_over_path(guess, program, _open_session(guess, deadline, ignore))
     except UnreachableError as error:
@@ -153,7 +155,11 @@ def _finish_over_time(
     adapted = replace(adapted, reports=(*candidate.reports, *adapted.reports))
     undone = filter(None, (solved.not_completed, adapted.not_completed))
     candidate = replace(candidate, not_completed="; ".join(undone))
-    return _refine_if_fast(candidate, adapted, session, options, to_beat)
+    if adapted.usable:
+        candidate = replace(candidate, adapted=adapted.t_end)
+        if adapted.t_end >= to_beat:
+            return replace(candidate, status=SLOW, reports=adapted.reports)
+    return _refine(candidate, adapted, session, options)
 
 
 def _finish_over_path(
@@ -176,13 +182,14 @@ def _finish_over_path(
     retimed = improve_timings(guess, program, paths, session)
     reports = (*reports, *retimed.reports)
     least = retimed.t_end + guess.problem.dwell_time
+    candidate = replace(candidate, adapted=least, reports=reports)
     if to_beat <= least < np.inf:
-        return replace(candidate, status=SLOW, adapted=least, reports=reports)
+        return replace(candidate, status=SLOW)
     longest = least + tolerance * retimed.t_end
     motions = []
     if retimed.solved is not None and retimed.solved.t_end < longest:
         solved = replace(retimed.solved, reports=reports)
-        motion = _refine_if_fast(candidate, solved, session, options, longest)
+        motion = _refine(candidate, solved, session, options)
         motions.append(motion)
         if motion.is_settled and motion.t_end < longest:
             return motion
@@ -191,7 +198,7 @@ def _finish_over_path(
     )
     if laid is not None:
         motions.append(laid)
-    no_timing = replace(candidate, status=NO_TIMING, reports=reports)
+    no_timing = replace(candidate, status=NO_TIMING)
     return min(
         motions,
         key=lambda motion: (not motion.is_settled, motion.t_end),
@@ -199,22 +206,17 @@ def _finish_over_path(
     )
 
 
-def _refine_if_fast(
+def _refine(
     candidate: RankedCandidate,
     adapted: SolvedProgram,
     session: SolverSession,
     options: RefinementOptions,
-    to_beat: float,
 ) -> Candidate:
-    """Refine and verify a motion over all its knots, if it is faster than what it has to beat.
+    """Refine and verify a motion over all its knots.
 
     Rounds begin near their answer, which helps an active-set method, and an interior point not at all. So the task's
     first solver refines, and the one that found the motion if that fails.
     """
-    if adapted.usable:
-        candidate = replace(candidate, adapted=adapted.t_end)
-        if adapted.t_end >= to_beat:
-            return replace(candidate, status=SLOW)
     first = solvers_for(candidate.problem.task.solver.name)[0]
     outcomes: list[Candidate] = []
     for backend in dict.fromkeys((first, session.backend)):

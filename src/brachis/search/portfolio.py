@@ -48,8 +48,10 @@ from brachis.search.stages import (
 from brachis.trajectory import Trajectory
 
 _LEAST_COST = 0.5
-"""Part of what knots, and limits that the phase plane does not know, cost one motion, that they cost another at least.
-With 10 intervals they cost a planar arm 17 to 20 % of the time."""
+"""Knots, and limits that the phase plane does not know, lengthen every motion. They cost a candidate at least this part
+of the smallest cost so far. With 10 intervals they cost joint paths of a planar arm 17 to 20 % of the time."""
+_RANKING_SHARE = 0.6
+"""Part of the time left after which no joint path is improved while nothing is verified."""
 _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
 
@@ -210,10 +212,13 @@ class Search:
     def _rank(self, batch: Batch) -> None:
         """Improve the joint paths of a batch, and rank them by their times."""
         first = self._add_guesses(batch)
+        until = self._deadline
+        if not self.is_satisfied:
+            until = until.part(_RANKING_SHARE)
         work = run_in_processes(
             pipeline.rank_candidate,
             batch.guesses,
-            self._deadline,
+            until,
             jobs=self._problem.task.search.jobs,
             listener=self._listener,
         )
@@ -253,6 +258,7 @@ class Search:
                         candidate = replace(
                             self._ranked[number],
                             adapted=outcome.adapted,
+                            reports=outcome.reports,
                             status=SLOW,
                         )
                     self._finish(number, candidate)
@@ -275,8 +281,13 @@ class Search:
             is_pressed = True
             self.interrupted = True
         if self.interrupted:
-            # One of the fastest three becomes the unverified motion.
-            for number in self._by_time()[:3]:
+            # One of the fastest three that did not fail becomes the unverified motion.
+            hopeful = [
+                number
+                for number in self._by_time()
+                if isinstance(self.candidates[number], RankedCandidate)
+            ]
+            for number in hopeful[:3]:
                 if self.best is None:
                     ranked = self._ranked[number]
                     candidate = pipeline.finish_candidate(
@@ -446,10 +457,10 @@ class Search:
         if not isinstance(candidate, FinishedCandidate):
             return
         self._finished.append(self._ranked[number])
-        # What limits and knots cost differs from motion to motion.
-        ratio = min(candidate.adapted, candidate.t_end) / candidate.estimate
-        least = min(1.0 + _LEAST_COST * (ratio - 1.0), ratio)
-        self._least_ratio = min(self._least_ratio or least, least)
+        if np.isfinite(candidate.estimate):
+            ratio = min(candidate.adapted, candidate.t_end) / candidate.estimate
+            least = min(1.0 + _LEAST_COST * (ratio - 1.0), ratio)
+            self._least_ratio = min(self._least_ratio or least, least)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self._keep(candidate)
 

@@ -224,7 +224,7 @@ def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RankedCandidate(Candidate):
-    """A candidate whose joint path was improved over the path, where limits allow a timing of it.
+    """A candidate whose joint path was improved over the path where that is possible, and may be finished.
 
     Attributes
     ----------

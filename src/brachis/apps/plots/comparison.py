@@ -215,17 +215,17 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     fastest = candidates[0]
     rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
     refining = 1.0
-    if math.isfinite(fastest.t_end):
+    if math.isfinite(fastest.t_end) and math.isfinite(fastest.estimate):
         refining = fastest.t_end / fastest.estimate
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
     for candidate in candidates:
-        is_refined = math.isfinite(candidate.t_end)
-        time = candidate.t_end if is_refined else refining * candidate.estimate
+        time = candidate.t_end
         kind = "failed"
         if candidate.verified:
             kind = "fastest" if candidate is fastest else "refined"
         elif candidate.status in {RANKED, SLOW}:
             kind = "planned"
+            time = refining * candidate.estimate
         drawn[kind].append((time, rows.index(_row(candidate))))
     known = [time for marks in drawn.values() for time, _ in marks if time < math.inf]
     edge = 1.05 * max(known, default=1.0)
