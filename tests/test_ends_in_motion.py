@@ -308,7 +308,7 @@ LINK = """<link name="l{0}"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
 
 @pytest.mark.parametrize("kind", ["continuous", "revolute"])
 def test_a_circle_round_the_arm_closes_if_joints_turn_freely(tmp_path, kind):
-    """The first joint makes a whole turn, which a joint with a range cannot repeat."""
+    """A joint makes a whole turn, which one with a range cannot repeat."""
     links = [LINK.format(i, kind, f"l{i - 1}", 0.4 * (i > 1)) for i in (1, 2, 3)]
     tool = (
         '<link name="tool"/><joint name="jt" type="fixed"><parent link="l3"/>'
@@ -331,7 +331,9 @@ def test_a_circle_round_the_arm_closes_if_joints_turn_freely(tmp_path, kind):
     }
     result = brachis.plan(task, strict=False)
     turned = result.trajectory.position(result.t_end) - result.trajectory.position(0.0)
-    assert np.abs(turned[0]) == pytest.approx(2.0 * np.pi, abs=1e-9)
+    turns = np.abs(turned) / (2.0 * np.pi)
+    assert turns.max() > 0.9
+    assert turns == pytest.approx(turns.round(), abs=1e-9)
     assert failed(result.trajectory) == (
         set() if kind == "continuous" else {"position over the seam"}
     )
