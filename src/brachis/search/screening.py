@@ -28,6 +28,10 @@ from brachis.search.stages import InitialGuess
 
 _NEAR_LEAST = 1.01
 """Factor on the least time up to which others are as fast, about."""
+_SAME_TIME = 0.02
+"""Part of the time by which estimates of the same joint path differ, no more."""
+_SAME_POSTURE = 0.15
+"""Distance of joints along the same joint path, rad or m, no more."""
 _PLACES = np.linspace(0.0, 1.0, 49)
 """Places at which joint paths are compared."""
 
@@ -146,7 +150,7 @@ def is_same(first: InitialGuess, second: InitialGuess) -> bool:
     """Tell whether two improved guesses are the same joint path, nearly."""
     if not np.isfinite([first.estimate, second.estimate]).all():
         return False
-    if abs(first.estimate - second.estimate) > 0.02 * second.estimate:
+    if abs(first.estimate - second.estimate) > _SAME_TIME * second.estimate:
         return False
     postures = [guess.postures_at(_PLACES) for guess in (first, second)]
-    return bool(np.abs(postures[0] - postures[1]).max() < 0.15)  # rad or m
+    return bool(np.abs(postures[0] - postures[1]).max() < _SAME_POSTURE)
