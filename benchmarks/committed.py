@@ -41,13 +41,19 @@ def save(
     script, *arguments = sys.argv
     if "--save" in arguments:
         arguments.remove("--save")
+        told: list[str] = []
+        for argument in arguments:
+            if Path(argument).is_absolute():
+                told.pop()  # where files go on this machine says nothing of the result
+            else:
+                told.append(argument)
         write(
             Path(script).stem,
             " ".join(
                 [
                     "python",
                     f"{Path(script).resolve().parent.name}/{Path(script).name}",
-                    *arguments,
+                    *told,
                 ]
             ),
             title,

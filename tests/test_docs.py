@@ -101,3 +101,16 @@ def test_citation_is_that_of_this_version():
     )
     assert isinstance(citation["preferred-citation"]["year"], int)
     assert citation["references"][0]["title"] in README
+
+
+def test_results_name_no_folder_of_a_machine(bench, tmp_path, monkeypatch):
+    committed = bench("committed")
+    monkeypatch.setattr(committed, "FOLDER", tmp_path)
+    script = str(ROOT / "benchmarks/laws.py")
+    given = ["--seed", "1", "--folder", str(tmp_path), "--save"]
+    monkeypatch.setattr("sys.argv", [script, *given])
+    committed.save("Laws", ["pair"], [["1"]])
+    (written,) = tmp_path.glob("*.json")
+    assert '"python benchmarks/laws.py --seed 1"' in written.read_text()
+    for result in (ROOT / "benchmarks/results").glob("*.json"):
+        assert not re.search(r'"command": "[^"]* /', result.read_text()), result
