@@ -121,7 +121,7 @@ def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choice
 
 
 @pytest.mark.usefixtures("wall_clock")
-@pytest.mark.parametrize("asked", [{}, BRANCH])
+@pytest.mark.parametrize("asked", [{}, BRANCH, {"spline": {"intervals": "auto"}}])
 def test_the_same_candidates_whatever_the_number_of_processes(robot, usual, asked):
     one = brachis.plan(robot, task(search={"jobs": 1}, **asked)) if asked else usual
     two = brachis.plan(robot, task(search={"jobs": 2}, **asked))
