@@ -117,7 +117,10 @@ def finish_candidate(
     options = RefinementOptions.of(settings, deadline)
     is_followed = follows_timing(candidate.guess, candidate.program)
     finish = _finish_over_path if is_followed else _finish_over_time
-    return finish(candidate, session, options, to_beat)
+    try:
+        return finish(candidate, session, options, to_beat)
+    except UnreachableError as error:
+        return fail(candidate, str(error))
 
 
 def _finish_over_time(
@@ -134,10 +137,7 @@ def _finish_over_time(
     program = candidate.program.with_phases(
         phase.restrict_to(curves) for phase, curves in pairs
     )
-    try:
-        solved = solve_over_time(guess, program, session)
-    except UnreachableError as error:
-        return fail(candidate, str(error))
+    solved = solve_over_time(guess, program, session)
     if not solved.usable:
         words = solved.report.status.name.lower().replace("_", " ")
         return fail(candidate, words, solved.reports)
