@@ -18,7 +18,7 @@ import numpy as np
 
 from brachis import LimitSpec, Result, Robot, Trajectory, load_task, plan
 from brachis.apps.bottleneck import CheckedSensitivity, check_sensitivities
-from brachis.apps.bottleneck.sensitivities import sensitivities
+from brachis.explain import sensitivities
 from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
@@ -195,7 +195,7 @@ class Compared:
         """Return the cells of its line."""
         entry = self.at_step
         limit = " ".join(
-            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.side))
+            filter(None, (str(entry.sensitivity.label), entry.sensitivity.side))
         )
         marks = ["not optimal"] * (not self.optimal) + ["> 5 %"] * (
             self.large and self.off > REQUIRED

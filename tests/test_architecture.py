@@ -40,6 +40,7 @@ ORDER = (
     "timing",
     "problem",
     "optimise",
+    "explain",
     "search",
     "apps.bottleneck",
     "apps.plots",
@@ -62,6 +63,7 @@ VERIFY_MUST_NOT_REACH = {
     "timing",
     "problem",
     "optimise",
+    "explain",
     "search",
 }
 MAY_NAME_KINDS = ("limits", "verify/limits", "task", "robot")

@@ -146,7 +146,7 @@ def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(
         assert entry.predicted == pytest.approx(entry.re_solved, rel=0.05)
     for entry in fresh.sensitivities.limits:
         other = report.sensitivities.of(
-            entry.label.subject, entry.label.kind, entry.bound.side
+            entry.label.subject, entry.label.kind, entry.side
         )
         assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-2, abs=1e-5)
 

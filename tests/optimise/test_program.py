@@ -10,9 +10,9 @@ import pickle
 import numpy as np
 import pytest
 
-from brachis.apps.bottleneck.sensitivities import multipliers_of, sensitivities_at
 from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER
+from brachis.explain import multipliers_of, sensitivities_at
 from brachis.kinematics import DirectJointMap
 from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for

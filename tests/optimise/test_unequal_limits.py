@@ -66,7 +66,7 @@ def test_the_plan_with_equal_limits_breaks_the_unequal_ones_and_sensitivities_na
     assert check.value == pytest.approx(PUSH / BRAKE, rel=1e-3)
     entries = report(bound).sensitivities.limits
     told = {
-        entry.bound.side: entry.derivative
+        entry.side: entry.derivative
         for entry in entries
         if entry.limit.kind == "torque"
     }

@@ -110,7 +110,7 @@ def test_bottlenecks_are_those_of_the_fastest_motion(result):
     )
     assert len(ours.limits) == len(theirs.limits) > 0
     for entry in ours.limits:
-        other = theirs.of(entry.label.subject, entry.label.kind, entry.bound.side)
+        other = theirs.of(entry.label.subject, entry.label.kind, entry.side)
         assert other.derivative == pytest.approx(entry.derivative, rel=1e-6, abs=1e-9)
 
 
@@ -149,7 +149,7 @@ def test_a_slower_motion_is_calmer(tmp_path):
         Trajectory.load(tmp_path / "result.npz")
     ).sensitivities
     for entry in brachis.bottleneck.report(result).sensitivities.limits:
-        found = again.of(entry.label.subject, entry.label.kind, entry.bound.side)
+        found = again.of(entry.label.subject, entry.label.kind, entry.side)
         assert found.derivative == pytest.approx(entry.derivative, rel=0.05, abs=1e-3)
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from brachis.common.labels import Label
 from brachis.limits.checks import build_user_limits
 from brachis.limits.clearance import build_clearance
 from brachis.limits.drives import build_torque_speed, build_total_power
@@ -28,7 +29,6 @@ from brachis.limits.protocol import (
     Guarantee,
     HasLatticeWeights,
     JointStates,
-    Label,
     Limit,
     Moments,
     Partials,

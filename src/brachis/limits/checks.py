@@ -9,17 +9,10 @@ from typing import Any
 import numpy as np
 
 from brachis.common.arguments import check_array, check_finite
+from brachis.common.labels import Label
 from brachis.errors import InputError
 from brachis.limits.derivatives import check_partials, sample_moments, write_posture
-from brachis.limits.protocol import (
-    Bound,
-    Guarantee,
-    Label,
-    Limit,
-    Moments,
-    Partials,
-    Role,
-)
+from brachis.limits.protocol import Bound, Guarantee, Limit, Moments, Partials, Role
 from brachis.robot import Robot
 from brachis.robot.custom_limits import (
     LimitModel,

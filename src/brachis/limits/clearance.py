@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.arrays import LastCall, count_each
-from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials, Role
+from brachis.common.labels import Label
+from brachis.limits.protocol import Bound, JointStates, Limit, Partials, Role
 from brachis.robot import Robot
 from brachis.scene import UNIT, ClosePairs, Scene, scene_of
 from brachis.scene.chain import Chain

@@ -31,8 +31,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.labels import Label
 from brachis.limits.joint import power_partials, powers
-from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials
+from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot
 from brachis.robot.limits import Curve
 from brachis.task import LIMIT_KINDS, Task

@@ -24,13 +24,13 @@ from typing import Literal, Self
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
+from brachis.common.labels import Label
 from brachis.kernel import Chain, ScaledQuantity
 from brachis.limits.protocol import (
     Bound,
     Guarantee,
     HasLatticeWeights,
     JointStates,
-    Label,
     Limit,
     Partials,
     compute_inset,

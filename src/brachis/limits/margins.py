@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials
+from brachis.common.labels import Label
+from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot, task_map_of
 from brachis.robot.joints import in_turn_of
 from brachis.task import Task

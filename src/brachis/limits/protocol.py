@@ -22,6 +22,7 @@ from typing import Any, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 
+from brachis.common.labels import Label
 from brachis.kernel import Chain, Quantity
 from brachis.robot import Robot
 from brachis.robot.custom_limits import name_failures
@@ -109,50 +110,6 @@ class Role(Enum):
     """A limit of what stands around the robot."""
     SAFEGUARD = "safeguard"
     """Numerical, not physical: small violations are ignored, and the verification does not check it."""
-
-
-@dataclass(frozen=True)
-class Label:
-    """What one value of a limit is.
-
-    Attributes
-    ----------
-    subject : str
-        Of what: a joint's name, ``tool``, a pair of joints, ...
-    kind : str
-        What is limited, in words, for example ``torque``.
-    unit : str
-        Of the limit that the user gives.
-    key : str
-        Key of the task that sets it; empty without one.
-    active_text, slack_text : str
-        Text for "the limit is active", and for the slack that a wider bound provides. If empty, both are made of
-        subject and kind.
-    share : str
-        What the ratio to the bound is, as the title of an axis. If empty, for example ``torque / limit``.
-    """
-
-    subject: str
-    kind: str
-    unit: str
-    key: str = ""
-    active_text: str = ""
-    slack_text: str = ""
-    share: str = ""
-
-    @property
-    def after(self) -> str:
-        """The unit, as it stands after a figure."""
-        return "" if self.unit == "-" else f" {self.unit}"
-
-    @property
-    def axis(self) -> str:
-        """Title of an axis over which ratios are drawn."""
-        return self.share or f"{self.kind} / limit"
-
-    def __str__(self) -> str:
-        """Return subject and kind."""
-        return f"{self.subject} {self.kind}"
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.common.labels import Label
 from brachis.kernel import Chain, FormulaQuantity
 from brachis.kinematics import JointMap
-from brachis.limits.protocol import (
-    Guarantee,
-    JointStates,
-    Label,
-    Limit,
-    Partials,
-    Role,
-)
+from brachis.limits.protocol import Guarantee, JointStates, Limit, Partials, Role
 
 MARGIN = 5e-3
 """Least branch margin, dimensionless. Nearer to the boundary, non-redundant joints are too fast for any collocation

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.arrays import apply_each, cross
+from brachis.common.labels import Label
 from brachis.limits.protocol import (
     Bound,
     JointStates,
-    Label,
     Limit,
     Partials,
     Role,

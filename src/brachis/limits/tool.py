@@ -16,17 +16,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.limits.protocol import (
-    Bound,
-    JointStates,
-    Label,
-    Limit,
-    Partials,
-    Role,
-)
+from brachis.common.labels import Label
+from brachis.limits.protocol import Bound, JointStates, Limit, Partials, Role
 from brachis.robot import Robot
 from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
+
+PROCESS_SPEED = "process speed"
+"""What a lead's largest speed follows from."""
 
 
 class ToolRatios(Limit):
@@ -196,14 +193,16 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
         labels.append(_label("speed", "m/s"))
     limits = task.tool_limits
     leads = [lead for part in limits.process_speed for lead in part.leads]
-    for quantity, key, parts in (
-        ("feed rate", "feed", limits.feed),
-        ("speed of a lead", "process_speed", leads),
+    for quantity, key, cause, parts in (
+        ("feed rate", "feed", "feed rate", limits.feed),
+        ("speed of a lead", "process_speed", PROCESS_SPEED, leads),
     ):
         for part in parts:
             tables.append(SpeedTable(part.s, part.speed, whole=False))
             where = f"tool, s = {part.s[0]:.4g} to {part.s[-1]:.4g},"
-            labels.append(Label(where, quantity, "m/s", f"tool_limits.{key}"))
+            labels.append(
+                Label(where, quantity, "m/s", f"tool_limits.{key}", cause=cause)
+            )
     return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 
 

@@ -65,7 +65,7 @@ def program_over(
         )
     phases = []
     for number, (joint_map, grid) in enumerate(zip(joint_maps, grids, strict=True)):
-        boundary = _boundary(problem, joint_map, number)
+        boundary = boundary_of(problem, joint_map, number)
         pause = problem.legs[number].dwell
         phases.append(Phase(joint_map, problem.limits, grid, boundary, pause=pause))
     return Program(phases, list(_links(problem, joint_maps)))
@@ -81,8 +81,8 @@ def maps_by_leg(
     return [joint_map.along(path, start) for path, start in pairs]
 
 
-def _boundary(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
-    """Write the boundary conditions of a leg in the coordinates of a joint map."""
+def boundary_of(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
+    """Write the boundary conditions of a leg, by its number, in the coordinates of a joint map."""
     leg = problem.legs[number]
     last = len(problem.legs) - 1
     is_periodic = problem.task.boundary.periodic

@@ -49,6 +49,7 @@ from brachis.search.stages import (
     NOT_TRIED,
     SLOW,
     Candidate,
+    FinishedCandidate,
     InitialGuess,
     RankedCandidate,
     begin_candidate,
@@ -197,6 +198,8 @@ def _finish_over_path(
         candidate, retimed.program, retimed.timings, reports, options
     )
     if laid is not None:
+        if isinstance(laid, FinishedCandidate) and retimed.solved is not None:
+            laid = replace(laid, optimum=retimed.solved)
         motions.append(laid)
     no_timing = replace(candidate, status=NO_TIMING)
     return min(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from brachis.common.arrays import clear_rounding
 from brachis.common.summary import Summary
+from brachis.explain import Sensitivities, explain_motion
 from brachis.optimise.backends import SolverReport
 from brachis.robot.from_task import in_use
 from brachis.robot.plausibility import Issue
@@ -61,8 +63,14 @@ class PlannedMotion(Summary):
         return self.trajectory.sample(dt, last=last)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory to an npz file, which `Trajectory.load` reads."""
-        self.trajectory.save(path)
+        """Write trajectory and sensitivities to an npz file, which `Trajectory.load` reads."""
+        replace(self.trajectory, sensitivities=self.sensitivities).save(path)
+
+    @cached_property
+    def sensitivities(self) -> Sensitivities:
+        """What limits, process speeds and dwells cost, from the multipliers of the plan."""
+        candidate = self.candidate
+        return explain_motion(candidate.problem, candidate.refined, candidate.optimum)
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds."""

@@ -280,7 +280,10 @@ class FinishedCandidate(Candidate):
     family : str
         Family of the closed form.
     refined : SolvedProgram
-        The last program, its answer and its multipliers.
+        The last program, and its answer.
+    optimum : SolvedProgram
+        The program whose multipliers say what limits cost: the last one, or the program over time that improved the
+        joint path along whose timing splines were laid.
     trajectory : Trajectory
     verification : Verification
         Of the trajectory.
@@ -298,6 +301,7 @@ class FinishedCandidate(Candidate):
     problem: Problem
     family: str
     refined: SolvedProgram
+    optimum: SolvedProgram
     trajectory: Trajectory
     verification: Verification
     not_completed: str = ""

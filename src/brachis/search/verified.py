@@ -105,6 +105,7 @@ def verify(
         problem=problem,
         family=candidate.family,
         refined=refined,
+        optimum=refined,
         trajectory=trajectory,
         verification=verification,
         not_completed=candidate.not_completed,

@@ -32,6 +32,7 @@ from brachis.task.fields import LARGEST, Model
 from brachis.task.messages import task_error
 from brachis.trajectory.phases import find_phase_knots
 from brachis.trajectory.recovered import Recovered, StoredRecovery
+from brachis.trajectory.sensitivities import Sensitivities
 
 SCHEMA = 4
 ARRAYS = (
@@ -81,6 +82,7 @@ class _Meta(Model, extra="ignore", strict=True):
     joint_names: list[str]
     recovered: StoredRecovery | None = None
     own_limits: list[str] = Field(default_factory=list)
+    sensitivities: dict[str, Any] | None = None
 
 
 def write_result(
@@ -223,6 +225,8 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         "degree": meta.degree,
         "recovered": recovered and Recovered.of_file(recovered, robot.n),
         "own_limits": tuple(meta.own_limits),
+        "sensitivities": meta.sensitivities
+        and Sensitivities.of_file(meta.sensitivities),
         **arrays,
     }
 

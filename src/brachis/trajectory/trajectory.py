@@ -33,6 +33,7 @@ from brachis.trajectory.pieces import Pieces, piece_coefficients
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples, tool_motion
+from brachis.trajectory.sensitivities import Sensitivities
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,6 +83,8 @@ class Trajectory(Summary):
         Where the motion comes from, if it was not planned; its path is then known to a tolerance.
     own_limits : tuple of str
         Names of limits of the user's own that were no part of the task. The limits themselves are not saved.
+    sensitivities : Sensitivities or None
+        What limits, speeds and stops cost, where that is known from the plan.
 
     Examples
     --------
@@ -110,6 +113,7 @@ class Trajectory(Summary):
     chart_knots: np.ndarray
     recovered: Recovered | None = None
     own_limits: tuple[str, ...] = ()
+    sensitivities: Sensitivities | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""
@@ -330,6 +334,7 @@ class Trajectory(Summary):
             "joint_names": self.joint_names,
             "recovered": None if self.recovered is None else self.recovered.to_file(),
             "own_limits": self.own_limits,
+            "sensitivities": self.sensitivities and self.sensitivities.to_file(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 

@@ -10,7 +10,7 @@ import pytest
 
 import brachis
 from brachis.apps.bottleneck import check, check_sensitivities
-from brachis.apps.bottleneck.sensitivities import sensitivities
+from brachis.explain import figures_of, sensitivities
 from brachis.optimise.backends import solvers_for
 from support.effort import QUICK
 
@@ -77,7 +77,8 @@ def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
     refined = scara("j1").candidate.refined
     program, x = refined.program, refined.x
     entry = sensitivities(refined).of("j2", "torque")
-    other = program.relax(entry.limit, entry.bound, 0.25 * entry.bound.full_scale)
+    ((limit, bound),) = figures_of(program)[entry.label, entry.side]
+    other = program.relax(limit, bound, 0.25 * entry.full_scale)
     np.testing.assert_allclose(other.rows(x), program.rows(x), atol=1e-10)
     count = program.collocation_points
     torque = slice(0, 3 * count)

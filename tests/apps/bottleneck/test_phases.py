@@ -10,7 +10,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import limits_by_phase, saturations
-from brachis.apps.bottleneck.sensitivities import ActiveSet
+from brachis.explain import ActiveSet
 from support.effort import QUICK
 from support.gantry import gantry_motion
 

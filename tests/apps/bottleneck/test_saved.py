@@ -31,7 +31,7 @@ def assert_same(saved, fresh):
     assert costly
     for entry in fresh.sensitivities.limits:
         other = saved.sensitivities.of(
-            entry.label.subject, entry.label.kind, entry.bound.side
+            entry.label.subject, entry.label.kind, entry.side
         )
         assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-3, abs=1e-6)
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.apps.bottleneck.sensitivities import (
+from brachis.explain import (
     ActiveSet,
     Multipliers,
+    figures_of,
     multipliers_of,
     sensitivities,
     sensitivities_at,
@@ -105,19 +106,18 @@ def test_ends_of_a_range(slide):
     assert min(entry.change(1.0) for entry in ends.values()) < -1e-3, (
         "a wider range saves time"
     )
-    assert ends["lower"].bound.full_scale == pytest.approx(2.0 * half)
+    assert ends["lower"].full_scale == pytest.approx(2.0 * half)
     assert ends["lower"].label.unit == "m"
+    figures = figures_of(result.candidate.optimum.program)
     for entry in ends.values():
-        wider, column = (
-            entry.limit.relax(entry.bound, 0.5 * entry.bound.full_scale),
-            entry.bound.column,
-        )
+        ((limit, bound),) = figures[entry.label, entry.side]
+        wider, column = limit.relax(bound, 0.5 * entry.full_scale), bound.column
         ends_now = (
             half * wider.lower[column],
             half * wider.upper[column],
         )  # the rows count half ranges
         assert ends_now == pytest.approx(
-            (-2.0 * half, half) if entry.bound.side == "lower" else (-half, 2.0 * half)
+            (-2.0 * half, half) if entry.side == "lower" else (-half, 2.0 * half)
         )
 
 
@@ -201,7 +201,7 @@ def test_least_squares_agree_with_the_solver(scara, joint):
     assert max(own.residual, fitted.residual) < 1e-5
     for entry in sensitivities_at(program, own).limits:
         other = sensitivities_at(program, fitted).of(
-            entry.label.subject, entry.label.kind, entry.bound.side
+            entry.label.subject, entry.label.kind, entry.side
         )
         assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
 

@@ -27,10 +27,12 @@ from brachis.apps.bottleneck.saturation import (
     limits_by_phase,
     saturations,
 )
-from brachis.apps.bottleneck.sensitivities import (
+from brachis.explain import (
     BranchBoundary,
     Sensitivities,
     Sensitivity,
+    TaskSaving,
+    explain_motion,
     sensitivities,
 )
 
@@ -48,7 +50,9 @@ __all__ = [
     "Sensitivities",
     "Sensitivity",
     "SensitivityCheck",
+    "TaskSaving",
     "check_sensitivities",
+    "explain_motion",
     "find_reference",
     "limit_ratios",
     "limits_by_phase",

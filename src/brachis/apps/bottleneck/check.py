@@ -22,16 +22,18 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.bottleneck.sensitivities import (
+from brachis.common.summary import Summary
+from brachis.common.threads import use_one_thread
+from brachis.errors import PlanningError, UnreachableError
+from brachis.explain import (
+    LimitBound,
     Sensitivities,
     Sensitivity,
+    figures_of,
     jacobian_matrix,
     multipliers_of,
     sensitivities,
 )
-from brachis.common.summary import Summary
-from brachis.common.threads import use_one_thread
-from brachis.errors import PlanningError, UnreachableError
 from brachis.optimise.backends import SolverOptions, residual, solvers_for
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
@@ -85,7 +87,7 @@ class CheckedSensitivity:
         return {
             "subject": entry.label.subject,
             "kind": entry.label.kind,
-            "end": entry.bound.side,
+            "end": entry.side,
             "predicted_s": self.predicted,
             "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
@@ -160,7 +162,7 @@ def check_sensitivities(
     Parameters
     ----------
     refined : SolvedProgram
-        ``result.candidate.refined``.
+        ``result.candidate.optimum``.
     predictions : Sensitivities, optional
         What is checked; by default the result of `sensitivities`.
     step : float, optional
@@ -183,23 +185,33 @@ def check_sensitivities(
     with use_one_thread():
         if max(residual(program, base), _stationarity(program, base)) > 1e-9:
             base, _ = _solve_again(program, base)
+        figures = figures_of(program)
         for entry in (predictions or sensitivities(refined)).limits:
+            bounds = figures.get((entry.label, entry.side))
+            if bounds is None:  # a process speed, which is no limit of the program
+                continue
             # If a limit changes nothing, the answer stays an optimum.
             if abs(entry.change(step)) <= 1e-9 * t_end(base):
                 same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True)
                 checked.append(same)
             else:
-                checked.append(_check_limit(entry, step, program, base))
+                checked.append(_check_limit(entry, step, program, base, bounds))
     elapsed = time.perf_counter() - began
     return SensitivityCheck(step, t_end(base), tuple(checked), elapsed)
 
 
 def _check_limit(
-    entry: Sensitivity, step: float, program: Program, base: np.ndarray
+    entry: Sensitivity,
+    step: float,
+    program: Program,
+    base: np.ndarray,
+    bounds: list[LimitBound],
 ) -> CheckedSensitivity:
     """Solve with one limit raised, and back if the change may be one to another local optimum."""
     predicted = entry.change(step)
-    raised = program.relax(entry.limit, entry.bound, step * entry.bound.full_scale)
+    raised = program
+    for limit, bound in bounds:
+        raised = raised.relax(limit, bound, step * entry.full_scale)
     linearised = linearised_change(raised, base)
     # The base is an optimum to a tolerance only; the rest of its way does not count.
     lacking = linearised_change(program, base)

@@ -22,17 +22,13 @@ from brachis.apps.bottleneck.saturation import (
     limits_in,
     saturations,
 )
-from brachis.apps.bottleneck.sensitivities import (
-    TIMINGS,
-    Sensitivities,
-    Sensitivity,
-    sensitivities,
-)
 from brachis.common.progress import Listener, ignore
 from brachis.common.summary import LINES
 from brachis.errors import InputError
+from brachis.explain import TIMINGS, Sensitivities, Sensitivity, explain_motion
 from brachis.ik import Family
-from brachis.optimise.retiming import SOLVER
+from brachis.limits import Limit, limits_of
+from brachis.problem.problem import Problem
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.joints import shown_unit
 from brachis.search.given_motion import narrow_motion
@@ -195,37 +191,38 @@ def report(
         active = saturations(trajectory)
         phases = limits_by_phase(trajectory, active)
         return BottleneckReport(trajectory.t_end, None, active, phases)
+    costs = motion.sensitivities
     trajectory = narrow_motion(trajectory)
-    refined = None
-    if not isinstance(motion, Trajectory):
-        refined = motion.candidate.refined
-    if refined is not None and not (
-        refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r
-    ):
-        optimum = refined
-    else:  # loaded, or a timing alone, which says nothing of limits that another joint path would relieve
-        listener("solving the problem of the motion again")
-        optimum = solve_again(
-            trajectory, listener, families=families, own_limits=own_limits
+    checked = None
+    best = None
+    if isinstance(motion, Trajectory):
+        limits: Sequence[Limit] = limits_of(
+            trajectory.robot, trajectory.task, own_limits
         )
-    refined = refined or optimum
-    listener("computing what every limit costs")
-    found = sensitivities(optimum)
-    tolerance = trajectory.task.refinement.tolerance
-    limits = limits_in(refined.program)
+        if costs is None or check or reference:
+            listener("solving the problem of the motion again")
+            optimum = solve_again(
+                trajectory, listener, families=families, own_limits=own_limits
+            )
+            refined = optimum
+            problem = Problem.of(trajectory.robot, trajectory.task, own_limits)
+            costs = explain_motion(problem, refined, optimum)
+    else:
+        optimum = motion.candidate.optimum
+        refined = motion.candidate.refined
+        limits = limits_in(refined.program)
     listener("looking for what is active, and when")
     active = saturations(trajectory, limits)
-    checked = None
     if check:
         listener("solving again with every limit raised")
-        checked = check_sensitivities(optimum, found)
-    best = None
+        checked = check_sensitivities(optimum, costs)
     if reference:
         listener("planning again with discontinuous torque")
+        tolerance = trajectory.task.refinement.tolerance
         best = find_reference(refined, tolerance=tolerance)
     return BottleneckReport(
         t_end=trajectory.t_end,
-        sensitivities=found,
+        sensitivities=costs,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
         timing=find_timing_gap(trajectory, limits),
@@ -259,13 +256,15 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
             f"warning: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
             "motion is not an optimum, and the savings below are rough"
         )
-    costly = [
-        _saving(entry, t_end, degrees=degrees)
+    savings = [
+        (-entry.change(_FRACTION), _more_room(entry, degrees=degrees))
         for entry in found.limits
-        if -entry.change(_FRACTION) > _NOTHING * t_end
     ]
-    lines += costly
-    if len(costly) < len(found.limits):
+    savings += [(saving.saved, saving.change) for saving in found.task]
+    savings.sort(key=lambda saving: -saving[0])
+    costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
+    lines += [f"{change} saves {_part(saved, t_end)}" for saved, change in costly]
+    if len(costly) < len(savings):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     if found.source == TIMINGS:
         how = "timings of the same joint path with limits raised"
@@ -283,21 +282,22 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     return lines
 
 
-def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
-    """Say what more room at one limit saves."""
+def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
+    """Say what more room at one limit is."""
     label = entry.label
-    end = entry.bound.side
+    end = entry.side
     unit, factor = shown_unit(label.unit, degrees=degrees)
-    amount = f"{factor * _FRACTION * entry.bound.full_scale:.3g} {unit}"
+    amount = f"{factor * _FRACTION * entry.full_scale:.3g} {unit}"
+    if label.cause:
+        faster = (1.0 + _FRACTION) * entry.figure
+        return f"a {label.cause} of {faster:.4g} {unit} in place of {entry.figure:.4g} {unit}"
     if label.slack_text:
-        more = f"{amount} more {label.slack_text}"
-    elif end is None:
-        more = (
+        return f"{amount} more {label.slack_text}"
+    if end is None:
+        return (
             f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
         )
-    else:
-        more = f"{amount} more room at the {end} end of {label}"
-    return f"{more} saves {_part(-entry.change(_FRACTION), t_end)}"
+    return f"{amount} more room at the {end} end of {label}"
 
 
 def _timing(found: TimingGap, t_end: float) -> list[str]:
@@ -318,7 +318,7 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
     for entry in check.entries:
         if not entry.predicted:
             continue
-        side = entry.sensitivity.bound.side or ""
+        side = entry.sensitivity.side or ""
         what = f"{entry.sensitivity.label} {side}".rstrip()
         line = (
             f"checked, {what} +{100.0 * check.step:g} %: predicted {1e3 * entry.predicted:+.4f} ms, solved again "

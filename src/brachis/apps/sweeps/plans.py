@@ -258,7 +258,7 @@ def run_plan(plan: Plan) -> Outcome:
         wall_time = time.perf_counter() - began
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "motion.npz"
-            result.trajectory.save(path)
+            result.save(path)
             motion = path.read_bytes()
     except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
         return Outcome.of_error(error, time.perf_counter() - began)

@@ -1,0 +1,39 @@
+"""Why a motion takes as long as it does: what limits, speeds and waits cost, from the plan's own multipliers."""
+
+from brachis.explain.motion import explain_motion
+from brachis.explain.multipliers import (
+    ActiveSet,
+    Multipliers,
+    jacobian_matrix,
+    multipliers_of,
+)
+from brachis.explain.sensitivities import (
+    LimitBound,
+    figures_of,
+    sensitivities,
+    sensitivities_at,
+)
+from brachis.trajectory.sensitivities import (
+    TIMINGS,
+    BranchBoundary,
+    Sensitivities,
+    Sensitivity,
+    TaskSaving,
+)
+
+__all__ = [
+    "TIMINGS",
+    "ActiveSet",
+    "BranchBoundary",
+    "LimitBound",
+    "Multipliers",
+    "Sensitivities",
+    "Sensitivity",
+    "TaskSaving",
+    "explain_motion",
+    "figures_of",
+    "jacobian_matrix",
+    "multipliers_of",
+    "sensitivities",
+    "sensitivities_at",
+]

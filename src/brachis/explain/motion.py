@@ -1,0 +1,84 @@
+"""What holds a planned motion back, from the multipliers of its own optimum: no solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from brachis.explain.given_speeds import Lagrangian, speed_sensitivities
+from brachis.explain.multipliers import multipliers_of
+from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
+from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.retiming import SOLVER
+from brachis.problem.problem import Problem
+from brachis.trajectory.sensitivities import Sensitivities, Sensitivity, TaskSaving
+
+_BALANCED = 0.02
+"""Part of the gradient that multipliers may leave unbalanced before the timings of the motion say more than they."""
+
+
+def explain_motion(
+    problem: Problem, motion: SolvedProgram, optimum: SolvedProgram
+) -> Sensitivities:
+    """Derive what limits, process speeds and dwells cost.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of which the programs are made.
+    motion : SolvedProgram
+        `FinishedCandidate.refined`.
+    optimum : SolvedProgram
+        `FinishedCandidate.optimum`: what limits cost is the same part of its end time as of the motion's.
+
+    Returns
+    -------
+    Sensitivities
+        From timings of the motion's joint path where it was laid along one, and the optimum is none.
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    dwells = _list_dwells(problem)
+    program = optimum.program
+    report = optimum.report
+    is_timed = motion.report.solver == SOLVER
+    if report.solver == SOLVER:
+        return replace(sensitivities_of_timing(motion), task=dwells)
+    multipliers = multipliers_of(program, report.x, report.multipliers)
+    if is_timed and multipliers.residual > _BALANCED:
+        return replace(sensitivities_of_timing(motion), task=dwells)
+    costs = sensitivities_at(program, multipliers)
+    lagrangian = Lagrangian(program, report.x, multipliers)
+    speeds = speed_sensitivities(problem, lagrangian)
+    faster = motion.t_end / optimum.t_end
+    of_limits = (
+        replace(entry, derivative=faster * entry.derivative) for entry in costs.limits
+    )
+    return replace(costs, limits=_join(of_limits, speeds), task=dwells)
+
+
+def _join(
+    of_limits: Iterable[Sensitivity], of_speeds: Iterable[Sensitivity]
+) -> tuple[Sensitivity, ...]:
+    """Join what the limits in the leads of process speeds cost with what these speeds cost themselves."""
+    joined = {(entry.label, entry.side): entry for entry in of_speeds}
+    for entry in of_limits:
+        figure = entry.label, entry.side
+        derivative = entry.derivative
+        if figure in joined:
+            derivative += joined[figure].derivative
+        joined[figure] = replace(entry, derivative=derivative)
+    return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))
+
+
+def _list_dwells(problem: Problem) -> tuple[TaskSaving, ...]:
+    """List what the task's waits take, the longest first."""
+    waits = [
+        TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
+        for leg in problem.legs
+        if leg.dwell
+    ]
+    return tuple(sorted(waits, key=lambda wait: -wait.saved))

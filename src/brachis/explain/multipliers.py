@@ -1,0 +1,212 @@
+"""Multipliers of a program at its answer, and how well they balance the gradient.
+
+At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
+
+    grad t_E = sum_i w_i p_i,    w_i >= 0,
+
+with p_i the gradient of a row or variable at its lower bound, or minus that at its upper bound. The norm of what is
+left over, relative to the gradient's, measures how far an answer is from being stationary. The multipliers are the
+solver's if they balance the gradient, otherwise those by least squares.
+
+If the slopes are linearly dependent, many sets of multipliers balance the gradient. The one that holds for a relaxation
+is the one that promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.optimise.program import Program
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+
+def jacobian_matrix(program: Program, x: np.ndarray) -> sparse.csr_array:
+    """Differentiate the rows of a program at x, (v,): a matrix, (c, v).
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    from scipy import sparse
+
+    places = (program.jacobian_rows, program.jacobian_columns)
+    shape = (len(program.lower), len(x))
+    return sparse.coo_array((program.jacobian(x), places), shape=shape).tocsr()
+
+
+@dataclass(frozen=True, eq=False)
+class ActiveSet:
+    """Rows and variables at their bounds at a point x.
+
+    Attributes
+    ----------
+    slopes : (p, v) ndarray
+        Gradients of active rows, then of active variables; negative ones at upper bounds.
+    rows : (a,) int ndarray
+        Rows to which the first a slopes belong.
+    signs : (a,) ndarray
+        1 at a lower bound, -1 at an upper one.
+    equalities : int
+        Number of rows and variables that are at both bounds, each with two slopes.
+    """
+
+    slopes: np.ndarray
+    rows: np.ndarray
+    signs: np.ndarray
+    equalities: int = 0
+
+    @classmethod
+    def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
+        """Collect rows and variables that are nearer to their bounds than `near`, dimensionless, at x, (v,).
+
+        Rows that no variable changes, such as those at a given start posture, are left out.
+
+        Raises
+        ------
+        UnreachableError
+            A collocation point is out of the branch's reach.
+        """
+        values = program.rows(x)
+        jacobian = jacobian_matrix(program, x)
+        low = np.flatnonzero(values <= program.lower + near)
+        high = np.flatnonzero(values >= program.upper - near)
+        rows = np.concatenate([low, high])
+        signs = np.repeat([1.0, -1.0], [len(low), len(high)])
+        slopes = signs[:, None] * jacobian[rows].toarray()
+        kept = slopes.any(axis=1)
+        unit = np.eye(len(x))
+        at_lower = x <= program.x_lower + near
+        at_upper = x >= program.x_upper - near
+        slopes = np.vstack([slopes[kept], unit[at_lower], -unit[at_upper]])
+        rows = rows[kept]
+        twice = len(rows) - len(np.unique(rows)) + int((at_lower & at_upper).sum())
+        return cls(slopes, rows, signs[kept], twice)
+
+    @cached_property
+    def dependent(self) -> bool:
+        """Whether several sets of multipliers may balance a gradient; those of equalities have either sign."""
+        count = len(self.slopes) - self.equalities
+        return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < count)
+
+    def weights_of(
+        self, gradient: np.ndarray, multipliers: np.ndarray | None
+    ) -> np.ndarray:
+        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can.
+
+        Without multipliers, the weights that balance the gradient best: non-negative least squares (Lawson and Hanson).
+        """
+        if multipliers is not None:
+            of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
+            rest = gradient - of_rows @ self.slopes[: len(of_rows)]
+            of_variables = np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)
+            return np.concatenate([of_rows, of_variables])
+        from scipy.optimize import nnls
+
+        if not len(self.slopes):
+            return np.empty(0)
+        return np.asarray(nnls(self.slopes.T, gradient)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers at an answer, and how well they balance the gradient.
+
+    Attributes
+    ----------
+    active_set : ActiveSet
+    weights : (p,) ndarray
+        Multipliers of the active_set, >= 0; s for a row, whose values are dimensionless.
+    source : str
+        ``"solver"`` or ``"least squares"``.
+    residual : float
+        Norm of what the weights leave of the gradient, relative to the gradient's; 1 if nothing balances.
+    """
+
+    active_set: ActiveSet
+    weights: np.ndarray
+    source: str
+    residual: float
+
+    def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
+        """Directional derivative of t_E if bounds are relaxed.
+
+        The residual is the part of the gradient that the weights leave. Multipliers that make up no larger part of what
+        the weights balance cannot be told from zero, and count as 0.
+
+        Parameters
+        ----------
+        relaxation : (c,) ndarray
+            Rates >= 0 at which the bounds of every row move outwards, dimensionless.
+        side : {1, -1}, optional
+            Only lower, or only upper bounds move.
+
+        Returns
+        -------
+        float
+            <= 0, s.
+        """
+        rates = np.zeros(len(self.weights))
+        of_rows = relaxation[self.active_set.rows]
+        if side is not None:
+            of_rows = np.where(self.active_set.signs == side, of_rows, 0.0)
+        rates[: len(of_rows)] = of_rows
+        slopes = self.active_set.slopes
+        balanced = np.linalg.norm(self.weights @ slopes)
+        by_these = np.linalg.norm(np.where(rates > 0.0, self.weights, 0.0) @ slopes)
+        if by_these <= self.residual * balanced:
+            return 0.0
+        saved = float(rates @ self.weights)
+        if not self.active_set.dependent:
+            return -saved
+        from scipy.optimize import linprog
+
+        # Of all weights that balance as much, those that promise the least.
+        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes)
+        return -float(rates @ (self.weights if found.x is None else found.x))
+
+
+def multipliers_of(
+    program: Program, x: np.ndarray, given: np.ndarray | None = None
+) -> Multipliers:
+    """Find the multipliers at an answer.
+
+    Parameters
+    ----------
+    program : Program
+    x : (v,) ndarray
+    given : (c,) ndarray, optional
+        The solver's own multipliers of the rows; L = t_E - given . rows.
+
+    Returns
+    -------
+    Multipliers
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    gradient = program.gradient(x)
+    sources = {"solver": given, "least squares": None}
+    if given is None:
+        del sources["solver"]
+    tried = []
+    # A row that is near its bound without being active would count as one that takes over within any step.
+    for near in (1e-8, 1e-7, 1e-6, 1e-5):
+        active_set = ActiveSet.at(program, x, near)
+        for source, own in sources.items():
+            weights = active_set.weights_of(gradient, own)
+            rest = np.linalg.norm(gradient - weights @ active_set.slopes)
+            residual = float(rest / np.linalg.norm(gradient))
+            found = Multipliers(active_set, weights, source, residual)
+            if residual <= 1e-5:
+                return found
+            tried.append(found)
+    return min(tried, key=lambda multipliers: multipliers.residual)

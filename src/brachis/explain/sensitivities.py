@@ -1,0 +1,171 @@
+"""What a limit costs: the derivative of t_E with respect to every limit, from the multipliers.
+
+Every limit lists the figures that a user could change, and the rates d at which the bounds of its rows move outwards if
+one of them is relaxed (`brachis.limits.Bound`). With the multipliers w of these rows (see `multipliers`)
+
+    dt_E / d(figure) = -sum w d.
+
+A motion along the timing of its joint path has the multipliers of the program over time that improved this joint path.
+Where there was none, the joint path is timed again with every limit a little raised.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+
+from brachis.explain.multipliers import Multipliers, multipliers_of
+from brachis.limits import Bound, Label, Limit
+from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.phase_timing import PhaseTiming
+from brachis.optimise.program import Program, is_safeguard
+from brachis.optimise.retiming import SOLVER
+from brachis.trajectory.sensitivities import (
+    TIMINGS,
+    BranchBoundary,
+    Sensitivities,
+    Sensitivity,
+)
+
+Figure = tuple[Label, str | None]
+"""A figure that a user could change: what is limited, and the end of its range."""
+LimitBound = tuple[Limit, Bound]
+_RAISED = 1e-3
+"""Part by which limits are raised."""
+_NEAR = 0.02
+"""Part of a limit within which a joint path may be held back by it."""
+_COSTS = 1e-9
+"""s; a branch boundary that costs less is not listed."""
+
+
+def figures_of(program: Program) -> dict[Figure, list[LimitBound]]:
+    """List the figures of a program's limits; phases that keep a part of a limit each have an object of their own."""
+    figures: defaultdict[Figure, list[LimitBound]] = defaultdict(list)
+    for limit in program.limits:
+        for bound in limit.bounds:
+            figures[_figure(limit, bound)].append((limit, bound))
+    return figures
+
+
+def _figure(limit: Limit, bound: Bound) -> Figure:
+    """Name what a user would change to move a bound."""
+    label = limit.labels[bound.column]
+    if label.cause:
+        label = label_of_speed(label.cause, bound.figure, label.key)
+    return label, bound.side
+
+
+def label_of_speed(cause: str, speed: float, key: str) -> Label:
+    """Name a speed, m/s, that holds on several parts of the path."""
+    return Label("tool", f"{cause} of {speed:.4g} m/s", "m/s", key, cause=cause)
+
+
+def sensitivities(solved: SolvedProgram) -> Sensitivities:
+    """Derive from an answer what every limit costs.
+
+    Parameters
+    ----------
+    solved : SolvedProgram
+        ``result.candidate.optimum``.
+
+    Returns
+    -------
+    Sensitivities
+        Of the answer before its end time was lengthened to meet the limits between collocation points.
+    """
+    report = solved.report
+    if report.solver == SOLVER:
+        return sensitivities_of_timing(solved)
+    multipliers = multipliers_of(solved.program, report.x, report.multipliers)
+    return sensitivities_at(solved.program, multipliers)
+
+
+def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
+    """Derive what every limit costs from a problem and the multipliers of its answer."""
+    costs = []
+    boundaries = []
+    for (label, side), bounds in figures_of(program).items():
+        rates = np.zeros(len(program.lower))
+        for limit, bound in bounds:
+            rates[program.rows_of(limit)[:, bound.column]] = bound.per_unit
+        if is_safeguard(limit):
+            cost = -multipliers.change(rates)
+            if cost > _COSTS:
+                boundaries.append(BranchBoundary(label.subject, bound.figure, cost))
+            continue
+        rows_side = {None: None, "lower": 1.0, "upper": -1.0}[side]
+        saved = multipliers.change(rates, rows_side)
+        costs.append(_sensitivity(label, bound, saved))
+    return Sensitivities(
+        _costliest_first(costs),
+        tuple(boundaries),
+        multipliers.source,
+        multipliers.residual,
+        not multipliers.active_set.dependent,
+    )
+
+
+def _sensitivity(label: Label, bound: Bound, saved_per_unit: float) -> Sensitivity:
+    """Write down what a figure costs whose relaxation by a unit changes t_E by `saved_per_unit`, s."""
+    outwards = -1.0 if bound.side == "lower" else 1.0
+    derivative = outwards * saved_per_unit
+    return Sensitivity(label, bound.side, bound.figure, bound.full_scale, derivative)
+
+
+def _costliest_first(costs: list[Sensitivity]) -> tuple[Sensitivity, ...]:
+    """Sort what figures cost."""
+    return tuple(sorted(costs, key=lambda entry: entry.change(1.0)))
+
+
+def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
+    """Time the joint path of a motion again with each limit raised by 0.1 %.
+
+    This is right where the joint path is given. Where it is free, two limits may be active at once all along it: then
+    raising one of them saves nothing unless the joint path changes too.
+
+    Parameters
+    ----------
+    solved : SolvedProgram
+        Timed by the phase plane.
+
+    Returns
+    -------
+    Sensitivities
+        Those of limits that a slower motion does not relieve are zero.
+    """
+    changes: defaultdict[Figure, float] = defaultdict(float)
+    bounds: dict[Figure, Bound] = {}
+    for phase, x in solved.program.split(solved.x):
+        timing = PhaseTiming.of(phase, x)
+        if timing is None or timing.timing is None:
+            continue
+        evaluation = phase.evaluate(x)
+        for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
+            if is_safeguard(limit):
+                continue
+            nearest = limit.violation(values).max(axis=0)
+            for bound in limit.bounds:
+                figure = _figure(limit, bound)
+                is_near = nearest[bound.column] > -_NEAR
+                is_relieved = is_near and limit.longer_time == "relieves"
+                bounds[figure] = bound
+                changes[figure] += (
+                    _time_raised(timing, limit, bound) if is_relieved else 0.0
+                )
+    costs = [
+        _sensitivity(label, bound, changes[label, side] / (_RAISED * bound.full_scale))
+        for (label, side), bound in bounds.items()
+    ]
+    return Sensitivities(_costliest_first(costs), (), TIMINGS, 0.0, unique=True)
+
+
+def _time_raised(timing: PhaseTiming, limit: Limit, bound: Bound) -> float:
+    """Change of the least time of a joint path, s, if a bound is moved outwards."""
+    before = timing.timing
+    assert before is not None
+    sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]
+    nearer = np.zeros((2, len(before.acceleration), len(limit.labels)))
+    nearer[sides, :, bound.column] = -_RAISED * bound.full_scale * bound.per_unit
+    raised = timing.course.solve(timing.rates, {limit: nearer})
+    return 0.0 if raised is None else raised.t_end - before.t_end
