@@ -45,14 +45,22 @@ def knot_times(trajectory: Trajectory) -> np.ndarray:
     return np.unique(trajectory.knots) * trajectory.t_end
 
 
+_MOST_TIMES = 6000
+"""Times at which a motion is looked at, about: a scene of 120 pairs of bodies takes 0.05 s for every thousand."""
+_FEWEST_TIMES = 4
+"""Times in every knot interval, no fewer."""
+
+
 def dense_samples(trajectory: Trajectory) -> Samples:
     """Evaluate the trajectory at its knots, at its nodes and at some points in every knot interval."""
     return trajectory.at(_dense_times(trajectory, 16))
 
 
 def _dense_times(trajectory: Trajectory, per_interval: int) -> np.ndarray:
-    """Return the times of knots and nodes, and `per_interval` times in every knot interval, s."""
-    grid = spread(knot_times(trajectory), per_interval)
+    """Return the times of knots and nodes, and `per_interval` times in every knot interval, s; fewer of very many."""
+    knots = knot_times(trajectory)
+    most = max(_FEWEST_TIMES, _MOST_TIMES // len(knots))
+    grid = spread(knots, min(per_interval, most))
     return np.union1d(grid, trajectory.times)
 
 
