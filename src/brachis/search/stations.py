@@ -12,6 +12,7 @@ from brachis.common.arrays import spread
 from brachis.path import Path
 from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
+from brachis.robot.plausibility import link_lengths
 
 _STATIONS = 401
 """Stations along a joint path of a guess."""
@@ -22,7 +23,9 @@ _FEWEST_STEPS = 24.0
 _MOST_STEPS = 600
 """Most steps of a lattice."""
 _LONGEST_STEP = 0.05
-"""Longest step of a lattice, m."""
+"""Longest step of a lattice, m, of arms up to 2 m long."""
+_LONGEST_SHARE = 0.025
+"""Part of the length of longer arms that a step may be."""
 _LARGEST_TURN = 0.25
 """Largest turn in a step of a lattice, rad, of the direction of motion or of the tool."""
 _PLACES = 2000
@@ -41,7 +44,9 @@ def measure(path: Path, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
     bends = np.linalg.norm(np.diff(along, axis=0, prepend=along[:1]), axis=1)
     change = task_map.difference(targets[1:], targets[:-1])
     turns = np.maximum(task_map.norms(change)[1], bends) / _LARGEST_TURN
-    steps = np.max([_FEWEST_STEPS * np.diff(s), sizes / _LONGEST_STEP, turns], axis=0)
+    arm = sum(link_lengths(task_map.robot))
+    longest = max(_LONGEST_STEP, _LONGEST_SHARE * arm)
+    steps = np.max([_FEWEST_STEPS * np.diff(s), sizes / longest, turns], axis=0)
     return s, np.append(0.0, np.cumsum(steps))
 
 
