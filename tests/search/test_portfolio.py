@@ -621,6 +621,8 @@ def test_a_motion_no_faster_over_all_knots_is_not_refined(robot, monkeypatch):
     assert slow
     assert all(each.adapted > (1.0 - 2e-4) * best.adapted for each in slow)
     assert f"uno: {SLOW}" in map(str, said)
+    begun = f"best so far: t_E = {best.t_end:.4f} s, "
+    assert [line for line in map(str, said) if line.startswith(begun)]
     assert f"uno: t_E = {best.t_end:.4f} s, verified" in map(str, said)
 
 

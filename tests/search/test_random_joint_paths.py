@@ -7,10 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brachis.common.deadline import Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import guesses as module
-from brachis.search.guesses import SEARCH_LEVELS, random_joint_paths
+from brachis.search.guesses import (
+    SEARCH_LEVELS,
+    chart_guesses,
+    random_joint_paths,
+)
 from brachis.task import load_task
 
 URDF = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
@@ -89,3 +94,18 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     for guess in guesses:
         q = guess.joint_map.postures(guess.joint_path)
         np.testing.assert_allclose(q[[0, -1]], [START, end], atol=1e-8)
+
+
+class LateLattice(Deadline):
+    """A deadline of which every part is over at once."""
+
+    def part(self, _share: float) -> Deadline:
+        return Deadline(0.0)
+
+
+def test_they_are_tried_alone_where_the_lattice_has_no_time():
+    level = SEARCH_LEVELS["fast"][0]
+    problem = problem_of()
+    guesses = chart_guesses(problem, [], level, LateLattice())
+    assert guesses
+    assert all(guess.origin.startswith("random") for guess in guesses)

@@ -84,6 +84,8 @@ class SearchLevel:
     fallback: bool = False
 
 
+_LATTICE_SHARE = 0.5
+"""Part of the time left after which the lattice is given up, and only random joint paths are tried."""
 _RANDOM = 4
 """Random joint paths for each one that a level plans."""
 _RANDOM_STATIONS = 97
@@ -283,13 +285,16 @@ def chart_guesses(
             density=float(finer),
             nodes=finer * level.nodes // 2,
             only_minima=level.only_minima,
-            deadline=deadline,
+            deadline=deadline.part(_LATTICE_SHARE),
         )
         joint_paths = lattice.joint_paths(SCREENED * level.in_charts)
-        if not isinstance(joint_paths, DeadEnd):
+        is_late = isinstance(joint_paths, DeadEnd) and joint_paths.cause == NO_TIME
+        if is_late or not isinstance(joint_paths, DeadEnd):
             break
     if isinstance(joint_paths, DeadEnd):
-        return joint_paths
+        if not (is_late and problem.r):
+            return joint_paths
+        joint_paths = []
     named = [
         (
             f"lattice {number}"
@@ -301,16 +306,16 @@ def chart_guesses(
     # Backwards from a given end the lattice of one redundant joint has a single joint path.
     is_backwards = problem.start is None and problem.end is not None
     is_sampled = problem.r > 1 or is_backwards
-    if is_sampled and level.in_charts > 1:
+    if is_late or (is_sampled and level.in_charts > 1):
         drawn = random_joint_paths(problem, _RANDOM * level.in_charts, deadline)
         named += [
             (f"random {number}", joint_path)
             for number, joint_path in enumerate(drawn, 1)
         ]
     newton = Newton(problem.task_map)
-    guesses = []
+    guesses: list[InitialGuess] = []
     for origin, joint_path in named:
-        if joint_path is not joint_paths[0] and deadline.passed:
+        if guesses and deadline.passed:
             break
         guess = guess_in_chart(newton, joint_path, origin)
         if guess is not None:

@@ -17,12 +17,13 @@ import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
-from brachis.common.progress import Listener, ignore
+from brachis.common.progress import Iteration, Listener, ignore
 from brachis.common.words import name_first, write_count
 from brachis.errors import BrachisError, UnreachableError
 from brachis.optimise.backends import SolveStatus
@@ -114,7 +115,7 @@ class Search:
         self._problem = problem
         self._decompositions = decompositions
         self._deadline = deadline
-        self._listener = listener
+        self._listener = partial(self._report, listener)
         self._dead_ends: dict[str, DeadEnd] = {}
         self._unfinished_lattices: dict[str, None] = {}
         self._given_motion = ""
@@ -134,6 +135,13 @@ class Search:
         if candidate.is_settled or not self._problem.task.refinement.max_rounds:
             return -np.inf, candidate.t_end
         return candidate.verification.worst_ratio - 1.0, candidate.t_end
+
+    def _report(self, listener: Listener, text: str) -> None:
+        """Tell a listener what is being done, with every iteration the best motion so far and the time left."""
+        if isinstance(text, Iteration) and self.best is not None and self.is_satisfied:
+            best = f"best so far: t_E = {self.best.t_end:.4f} s"
+            text = Iteration(f"{best}, {self._deadline.left:.0f} s left; {text}")
+        listener(text)
 
     def run(
         self,
@@ -308,7 +316,8 @@ class Search:
     def explain(self) -> BrachisError:
         """Return the error that tells why no motion was found."""
         failure = explain_holding(self.guesses) or explain_postures(self.guesses)
-        failure = failure or explain_speeds(self.guesses, are_tried=True)
+        if not self.interrupted:
+            failure = failure or explain_speeds(self.guesses, are_tried=True)
         if failure is not None:
             return failure
         # The time for the search may have ended every solve, of which each has a time limit of its own.
