@@ -66,11 +66,12 @@ Key = tuple[str, str]
 
 def plan_once(task: AblationTask) -> Line:
     """Plan a task, and return what is kept of the plan."""
-    content = task.load()
-    motion = task.motion
     line: Line = {"task": task.name, "verified": False}
     began = processor_time()
     try:
+        content = task.load()
+        motion = task.motion
+        began = processor_time()
         result = brachis.plan(content, start_from=motion, check_advice=False)
         line |= {"t_end": result.t_end, "verified": result.verified}
     except BrachisError as error:

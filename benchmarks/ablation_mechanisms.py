@@ -342,6 +342,15 @@ MECHANISMS = (
         {_SEARCH + "pipeline.improve_over_path": rank_as_it_is},
     ),
     Mechanism(
+        "improve_before_ranking",
+        "guesses are chosen and ranked by the timings of joint paths that are not improved yet",
+        {
+            _SEARCH + "pipeline.improve_over_path": rank_as_it_is,
+            _SEARCH + "guesses.screen": choose_by_estimate,
+        },
+        use=_SEARCH + "over_path.improve_joint_paths",
+    ),
+    Mechanism(
         "child_process",
         "large solves in this process",
         {_BACKENDS + "child_process.Solver.solve": solve_here},

@@ -159,8 +159,9 @@ class AblationTask:
 
 @cache
 def folder() -> Path:
-    """Return where the files of drawn tasks are kept from one run to the next."""
-    path = Path(tempfile.gettempdir()) / "brachis-ablation"
+    """Return where the files of drawn tasks are kept from one run to the next; they name the URDFs of this clone."""
+    name = "-".join(("brachis-ablation", *ROOT.parts[1:]))
+    path = Path(tempfile.gettempdir()) / name
     path.mkdir(exist_ok=True)
     return path
 
