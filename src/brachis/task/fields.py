@@ -335,21 +335,6 @@ def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterVal
     return AfterValidator(check)
 
 
-def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
-    """Return what adds a form of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
-
-    def add(schema: dict[str, Any]) -> None:
-        """Add the form to a schema."""
-        kept = {
-            key: schema.pop(key)
-            for key in ("$ref", "type", "items", "minItems")
-            if key in schema
-        }
-        schema["anyOf"] = [kept, *([kept["items"]] if "items" in kept else []), form]
-
-    return add
-
-
 @dataclass(frozen=True)
 class ByForm:
     """Chooses a union's member by the form of the value: a word, a number, a list, a mapping or null.

@@ -161,6 +161,15 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     return named
 
 
+class SceneSource(Model):
+    """A scene whose bodies are in a file."""
+
+    file: Name
+    """Scene file, relative to the task file."""
+    frame: Name | None = None
+    """Name of the frame, out of frames, of the bodies that state neither frame nor link. Null: the world."""
+
+
 class SceneFile(Model):
     """What a scene file says."""
 
