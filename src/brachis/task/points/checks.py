@@ -6,7 +6,7 @@ Scatter is about a smooth curve, and matters by what it does to the curvature of
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from brachis.task.point_data import FitTolerance
 from brachis.task.points.points import (
     Array,
     Points,
-    PointsAndNotes,
     angles_between,
     is_repeated,
     project_on_sides,
@@ -139,8 +138,8 @@ def _residuals(values: Array, chords: Array) -> Array:
     return (values[inner] - foreseen) / scale[:, None]
 
 
-def without_repetitions(points: Points, tolerance: float = 0.0) -> PointsAndNotes:
-    """Leave out points that repeat their predecessors, much more exactly than a tolerance, m, and say which.
+def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
+    """Leave out points that repeat their predecessors, much more exactly than a tolerance, m, and note which.
 
     Raises
     ------
@@ -165,12 +164,11 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> PointsAndNote
             where=points.source,
         )
     if not again.size:
-        return points, ()
+        return points
     count = write_count(len(again), "row")
     rows = name_first([str(row) for row in points.rows[again]], ", ", most=5)
-    return kept, (
-        f"left out {count} at the place of the row before: {points.row}s {rows}",
-    )
+    note = f"left out {count} at the place of the row before: {points.row}s {rows}"
+    return replace(kept, notes=(*kept.notes, note))
 
 
 def refuse_repetitions(points: Points) -> None:

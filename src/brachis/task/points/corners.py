@@ -14,7 +14,7 @@ from brachis.common.arrays import interpolate_columns, spread, with_like_signs
 from brachis.common.words import write_count
 from brachis.task.points.checks import Scatter
 from brachis.task.points.fit import lengths_along
-from brachis.task.points.points import Array, Indices, Points, PointsAndNotes
+from brachis.task.points.points import Array, Indices, Points
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
@@ -227,14 +227,14 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
     return bool(np.linalg.norm(foreseen - position[i]) <= allowed)
 
 
-def fill_gaps(points: Points) -> PointsAndNotes:
-    """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
+def fill_gaps(points: Points) -> Points:
+    """Put points on the straight ways that are five times longer than usual, and note how many ways there are."""
     chords = points.steps
     usual = float(np.median(chords))
     times = 5.0
     long = chords > times * usual
     if len(points) < 20 or not np.any(long):
-        return points, ()
+        return points
     parts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
     index = np.arange(len(points))
     at = spread(index, np.where(long, parts, 1).astype(int))
@@ -245,7 +245,8 @@ def fill_gaps(points: Points) -> PointsAndNotes:
     ways = write_count(int(np.count_nonzero(long)), "way")
     note = f"taken as straight: {ways} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
-    return replace(rows, position=position, turning=turning), (note,)
+    notes = (*points.notes, note)
+    return replace(rows, position=position, turning=turning, notes=notes)
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:

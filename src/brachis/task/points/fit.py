@@ -76,6 +76,15 @@ class Fit:
         turning = self.turning_errors / tolerance.orientation
         return np.maximum(self.position_errors / tolerance.position, turning)
 
+    def only(self, rows: slice) -> Fit:
+        """Return the fit with the errors of some of the points."""
+        return replace(
+            self,
+            sigma=self.sigma[rows],
+            position_errors=self.position_errors[rows],
+            turning_errors=self.turning_errors[rows],
+        )
+
     def worst(self, tolerance: FitTolerance) -> Array:
         """Return the largest of `ratios` in every interval, (N,)."""
         worst = np.zeros(len(self.breaks) - 1)
