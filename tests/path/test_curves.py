@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from brachis.errors import PathError
 from brachis.path import Array, Curve, Path, build_path
-from brachis.path.blends import septic
 from brachis.path.context import SegmentContext
+from brachis.path.curves import septic
 from brachis.task import ArcSegment, load_task
 
 

@@ -53,11 +53,12 @@ from brachis.task.settings import (
     check_frames,
     expand_solver_name,
 )
-from brachis.task.task_space import EACH_ONCE, TaskSpace
 from brachis.task.tolerances import (
+    EACH_ONCE,
     Margins,
     OrientationTolerance,
     PositionTolerance,
+    TaskSpace,
     Tolerances,
 )
 

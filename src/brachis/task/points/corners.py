@@ -253,7 +253,7 @@ def blend_size(angle: float, distance: float, shortest: float) -> float:
     """Return what a blend takes from either side, m, that passes a corner of straight lines at a distance, m.
 
     With `size` from either side and unit tangents a, b the ends lie at -size a and size b of the corner, and the
-    blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.blends`. Its middle is
+    blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.joins`. Its middle is
     ``(b - a) (size / 2 - 11/64 length)`` away, and ``|b - a| = 2 sin(angle / 2)``.
 
     Parameters
