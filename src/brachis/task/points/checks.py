@@ -237,18 +237,13 @@ def plausibility_note(points: Points) -> str | None:
 
 def _refuse_factors(points: Points) -> None:
     """Refuse a step after which all coordinates are a thousand times larger or smaller."""
-    sizes = np.linalg.norm(points.position, axis=1)
-    ratios = sizes[1:] / np.maximum(sizes[:-1], SAME)
-    growth = np.maximum(ratios, 1.0 / np.maximum(ratios, SAME))
-    steps = points.steps
-    far = steps > 20.0 * np.median(steps)
-    by_thousand = far & (growth > 900.0) & (growth < 1100.0)
-    for i in np.flatnonzero(by_thousand).tolist():
-        one = points.position[i]
-        other = points.position[i + 1]
-        small, large = (one, other) if ratios[i] > 1.0 else (other, one)
-        if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):
-            word = "larger" if ratios[i] > 1.0 else "smaller"
+    before = points.position[:-1]
+    after = points.position[1:]
+    is_far = points.steps > 20.0 * np.median(points.steps)
+    for factor, word in ((1e3, "larger"), (1e-3, "smaller")):
+        off = np.linalg.norm(after - factor * before, axis=1)
+        is_scaled = off < 0.1 * factor * np.linalg.norm(before, axis=1)
+        for i in np.flatnonzero(is_far & is_scaled).tolist():
             raise points.wrong(
                 i + 1,
                 f"the coordinates are a thousand times {word} than in {points.name_row(i)}",

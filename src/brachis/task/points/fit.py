@@ -85,7 +85,11 @@ class Fit:
             turning_errors=self.turning_errors[rows],
         )
 
-    def worst(self, tolerance: FitTolerance) -> Array:
+    def worst(self, tolerance: FitTolerance) -> float:
+        """Return the largest of `ratios`."""
+        return float(self.ratios(tolerance).max())
+
+    def worst_between_knots(self, tolerance: FitTolerance) -> Array:
         """Return the largest of `ratios` in every interval, (N,)."""
         worst = np.zeros(len(self.breaks) - 1)
         interval = np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
@@ -245,18 +249,18 @@ def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
     for least in _least_points(tolerance, scatter):
         rough = _Fitter(points.only(some), lengths[some], _scale(tolerance, share))
         fit = _add_knots(rough, lengths[[0, -1]], least)
-        worst = float(fit.ratios(tolerance).max())
+        worst = fit.worst(tolerance)
         if worst <= 1.0:
             aim = _scale(tolerance, max(worst, share))
             rough = replace(rough, tolerance=aim)
             fit = _remove_knots(rough, fit)
         fit = _add_knots(fitter, fit.breaks, least)
-        if fit.ratios(tolerance).max() <= 1.0:
+        if fit.worst(tolerance) <= 1.0:
             return fit
         fits.append(fit)
     if least == 1 and len(points) <= 2_000:
         return fitter.interpolate()
-    return min(fits, key=lambda fit: float(fit.ratios(tolerance).max()))
+    return min(fits, key=lambda fit: fit.worst(tolerance))
 
 
 def _scale(tolerance: FitTolerance, share: float) -> FitTolerance:
@@ -302,7 +306,7 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
         fit = fitter.fit(breaks)
         firsts = np.searchsorted(lengths, breaks)
         firsts[-1] = len(lengths)
-        bad = fit.worst(fitter.tolerance) > 1.0
+        bad = fit.worst_between_knots(fitter.tolerance) > 1.0
         has_points = np.diff(firsts) >= 2 * least
         stuck = np.pad(bad & ~has_points, 1)
         halved = (bad | stuck[:-2] | stuck[2:]) & has_points
@@ -326,7 +330,7 @@ def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
     """Take knots away, many at a time, as long as all points stay within the tolerance."""
     needed = np.empty(0)
     while True:
-        worst = fit.worst(fitter.tolerance)
+        worst = fit.worst_between_knots(fitter.tolerance)
         beside = np.maximum(worst[:-1], worst[1:])
         beside[np.isin(fit.breaks[1:-1], needed)] = np.inf
         # No two neighbours at once: of every pair the one that has more of the tolerance to spare.
@@ -337,7 +341,7 @@ def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
             return fit
         while removed.size:
             trial = fitter.fit(np.setdiff1d(fit.breaks, removed))
-            bad = np.pad(trial.worst(fitter.tolerance) > 1.0, 1)
+            bad = np.pad(trial.worst_between_knots(fitter.tolerance) > 1.0, 1)
             if not bad.any():
                 fit = trial
                 break
