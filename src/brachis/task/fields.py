@@ -89,17 +89,26 @@ class Model(BaseModel):
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
-    def __repr_args__(self) -> list[tuple[str | None, Any]]:
-        """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
-        return [
-            (name, _Shown(getattr(self, name)))
-            for name, field in type(self).model_fields.items()
-            if name in self.model_fields_set and getattr(self, name) != field.default
-        ]
+    def __repr__(self) -> str:
+        """Show it as a program makes it."""
+        return f"{type(self).__name__}({', '.join(show_arguments(self))})"
 
     def __str__(self) -> str:
         """Show it as `repr` does."""
         return repr(self)
+
+
+def show_arguments(model: Model, without: str = "") -> list[str]:
+    """Show the keys of a model that are not as by default as a program gives them: ``to=[1, 2]``."""
+    arguments = []
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        is_stated = name in model.model_fields_set and value != field.default
+        if is_stated and name != without:
+            is_plain = not isinstance(value, str | Model)
+            text = show_value(value) if is_plain else repr(value)
+            arguments.append(f"{name}={text}")
+    return arguments
 
 
 Mistake = tuple[str, str, str]
@@ -156,18 +165,6 @@ def _docstrings_of(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
                 ast.Expr(value=ast.Constant(value=str(text))),
             ):
                 yield name, inspect.cleandoc(text)
-
-
-@dataclass(frozen=True)
-class _Shown:
-    """A value that is shown as in summaries."""
-
-    value: object
-
-    def __repr__(self) -> str:
-        if isinstance(self.value, str | Model):
-            return repr(self.value)
-        return show_value(self.value)
 
 
 _NUMBER_AND_UNIT = re.compile(
