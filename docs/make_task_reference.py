@@ -10,25 +10,10 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from brachis.task import (
-    BoundarySettings,
-    FrictionSettings,
-    InertiaMatrix,
-    LimitScale,
-    LimitsFile,
-    LimitSpec,
-    Payload,
-    Placement,
-    ProcessSpeed,
-    RefinementSettings,
-    RobotSettings,
-    SearchSettings,
-    SolverSettings,
-    SpeedTable,
-    SplineSettings,
-    Task,
-    ToolLimits,
-)
+from brachis.task import FrictionSettings, LimitSpec, Payload, Placement, ProcessSpeed, RefinementSettings, RobotSettings, SolverSettings, SpeedTable, SplineSettings, Task, ToolLimits
+from brachis.task.limit_kinds import LimitScale
+from brachis.task.limits_file import LimitsFile
+from brachis.task.settings import BoundarySettings, InertiaMatrix, SearchSettings
 from brachis.task.fields import describe_fields
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
