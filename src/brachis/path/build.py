@@ -163,7 +163,7 @@ class JointCoordinates(RowCoordinates):
         own = joints_of(self.rows)
         where = f"path[{index}].{segment.kind}.joints"
         check_names("joint", names, own, where)
-        if len(names) != len(own):
+        if sorted(names) != sorted(own):
             raise PathError(
                 "joints are missing",
                 found=list(names),
