@@ -255,11 +255,9 @@ def plain(
     Numbers with names, such as a row of a pandas table, become a mapping, because their order may be any.
     """
     # An array is known by its method and not by its class: this stage has no need for NumPy.
-    to_list = getattr(value, "tolist", None)
-    if callable(to_list):
-        keys = getattr(value, "keys", None)
-        names = list(keys()) if callable(keys) else []
-        value = to_list()
+    if hasattr(value, "tolist"):
+        names = list(value.keys()) if hasattr(value, "keys") else []
+        value = value.tolist()
         if names and all(isinstance(name, str) for name in names):
             value = dict(zip(names, value, strict=True))
     if isinstance(value, Mapping):

@@ -203,7 +203,7 @@ def _locate(
     (one, a), (other, b) = sides
     steps, *_ = np.linalg.lstsq(np.stack([a, -b], axis=1), other - one, rcond=None)
     place = (one + steps[0] * a + other + steps[1] * b) / 2.0
-    gap = u[min(i + 1, len(u) - 1)] - u[max(i - 1, 0)]
+    gap = u[i + 1] - u[i - 1]  # a corner is not at an end
     after = float((position[i] - place) @ (a + b)) > 0.0
     far = np.linalg.norm(place - position[i]) > max(width, gap)
     if far or (least == 1 and after != from_after):
