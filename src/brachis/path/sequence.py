@@ -54,7 +54,7 @@ class PathFrame:
         block = rotation[np.ix_(axes, axes)]
         stays = np.eye(3)[[ANGLES.index(row) for row in rows if row in ANGLES]]
         angle = stays @ rotation_of(rotation).as_rotvec()
-        turning = np.eye(len(stays))
+        turning: np.ndarray = np.eye(len(stays))
         if tuple(rows[-3:]) == TURN_ROWS:
             angle = np.zeros(9)
             turning = np.kron(rotation, np.eye(3))  # of a matrix row by row
