@@ -10,11 +10,23 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from brachis.task import FrictionSettings, LimitSpec, Payload, Placement, ProcessSpeed, RefinementSettings, RobotSettings, SolverSettings, SpeedTable, SplineSettings, Task, ToolLimits
+from brachis.task import (
+    FrictionSettings,
+    LimitSpec,
+    Payload,
+    Placement,
+    ProcessSpeed,
+    RefinementSettings,
+    RobotSettings,
+    SolverSettings,
+    SpeedTable,
+    SplineSettings,
+    Task,
+    ToolLimits,
+)
+from brachis.task.fields import describe_fields
 from brachis.task.limit_kinds import LimitScale
 from brachis.task.limits_file import LimitsFile
-from brachis.task.settings import BoundarySettings, InertiaMatrix, SearchSettings
-from brachis.task.fields import describe_fields
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
 from brachis.task.scene import CollisionSettings, HalfSpaceShape, Round, SceneBody
@@ -31,7 +43,12 @@ from brachis.task.segments import (
     MovingSegment,
     SplineThrough,
 )
-from brachis.task.settings import FramePlacement
+from brachis.task.settings import (
+    BoundarySettings,
+    FramePlacement,
+    InertiaMatrix,
+    SearchSettings,
+)
 
 PAGE = Path(__file__).parent / "task_files.md"
 
