@@ -227,7 +227,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
 
 def plausibility_note(points: Points) -> str | None:
     """Say that the whole path looks like mm where m are stated, or the other way round; None where it does not."""
-    extent = points.extent
+    extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
     if extent > 100.0:  # paths of robots are shorter
         return f"the path is {extent:.4g} m long and wide: mm for m? Set units: {{length: mm}}"
     if extent < 1e-4:

@@ -139,7 +139,7 @@ def _fit_one(
     ------
     TaskError
     """
-    fit = fit_points(points, tolerance, scatter)
+    fit = fit_points(points, tolerance, scatter).over_length(points.dimension)
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + 1e-6:

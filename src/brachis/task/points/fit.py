@@ -85,6 +85,21 @@ class Fit:
             turning_errors=self.turning_errors[rows],
         )
 
+    def over_length(self, dimension: int) -> Fit:
+        """Return the fit over a sigma that ends with the length of its curve, of this many position rows."""
+        from scipy.integrate import simpson
+        from scipy.interpolate import BSpline
+
+        fine = spread(self.breaks, 32)
+        speed = np.linalg.norm(self.spline(fine, nu=1)[:, :dimension], axis=1)
+        scale = float(simpson(speed, x=fine)) / self.breaks[-1]
+        return replace(
+            self,
+            spline=BSpline(scale * self.spline.t, self.spline.c, DEGREE),
+            breaks=scale * self.breaks,
+            sigma=scale * self.sigma,
+        )
+
     def worst(self, tolerance: FitTolerance) -> float:
         """Return the largest of `ratios`."""
         return float(self.ratios(tolerance).max())
@@ -219,7 +234,9 @@ def _block(position: Array, deviation: float) -> int:
 
 
 def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
-    """Return a curve within the tolerance of points, or the one that is nearest to it.
+    """Return a curve within the tolerance of points, with few knots, or the one that is nearest to it.
+
+    Knots are found for some of the points if there are many, and are then added for all of them if needed.
 
     Parameters
     ----------
@@ -228,15 +245,6 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
     tolerance : FitTolerance
     scatter : Scatter
         Of the points.
-    """
-    fit = _find_fit(points, tolerance, scatter)
-    return _over_length(fit, points.dimension)
-
-
-def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
-    """Return a curve within the tolerance, with few knots, or the one that is nearest to it.
-
-    Knots are found for some of the points if there are many, and are then added for all of them if needed.
     """
     lengths = lengths_along(points.position, scatter.deviation)
     fitter = _Fitter(points, lengths, tolerance)
@@ -266,20 +274,6 @@ def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
 def _scale(tolerance: FitTolerance, share: float) -> FitTolerance:
     """Return a part of the tolerance of positions."""
     return tolerance.model_copy(update={"position": share * tolerance.position})
-
-
-def _over_length(fit: Fit, dimension: int) -> Fit:
-    """Return the fit over a sigma that ends with the length of its curve."""
-    from scipy.integrate import simpson
-    from scipy.interpolate import BSpline
-
-    fine = spread(fit.breaks, 32)
-    speed = np.linalg.norm(fit.spline(fine, nu=1)[:, :dimension], axis=1)
-    scale = float(simpson(speed, x=fine)) / fit.breaks[-1]
-    spline = BSpline(scale * fit.spline.t, fit.spline.c, DEGREE)
-    return replace(
-        fit, spline=spline, breaks=scale * fit.breaks, sigma=scale * fit.sigma
-    )
 
 
 def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:

@@ -72,11 +72,6 @@ class Points:
         return np.hstack([self.position, self.turning])
 
     @property
-    def extent(self) -> float:
-        """Diagonal of the box around all positions, m."""
-        return float(np.linalg.norm(np.ptp(self.position, axis=0)))
-
-    @property
     def steps(self) -> Array:
         """Distances of successive points, (n - 1,), m."""
         return steps_of(self.position)
