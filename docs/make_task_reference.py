@@ -11,18 +11,13 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from brachis.task import (
-    BoundarySettings,
     FrictionSettings,
-    InertiaMatrix,
-    LimitScale,
-    LimitsFile,
     LimitSpec,
     Payload,
     Placement,
     ProcessSpeed,
     RefinementSettings,
     RobotSettings,
-    SearchSettings,
     SolverSettings,
     SpeedTable,
     SplineSettings,
@@ -30,6 +25,8 @@ from brachis.task import (
     ToolLimits,
 )
 from brachis.task.fields import describe_fields
+from brachis.task.limit_kinds import LimitScale
+from brachis.task.limits_file import LimitsFile
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
 from brachis.task.scene import CollisionSettings, HalfSpaceShape, Round, SceneBody
@@ -46,7 +43,12 @@ from brachis.task.segments import (
     MovingSegment,
     SplineThrough,
 )
-from brachis.task.settings import FramePlacement
+from brachis.task.settings import (
+    BoundarySettings,
+    FramePlacement,
+    InertiaMatrix,
+    SearchSettings,
+)
 
 PAGE = Path(__file__).parent / "task_files.md"
 

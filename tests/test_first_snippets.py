@@ -17,16 +17,15 @@ import brachis
 from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import bind
 from brachis.task import (
-    BoundarySettings,
     LimitKeywords,
     LimitSpec,
     RobotSettings,
-    SearchSettings,
     SplineSettings,
     Task,
     TaskKeywords,
     task_with,
 )
+from brachis.task.settings import BoundarySettings, SearchSettings
 
 ROOT = Path(__file__).parents[1]
 Q0 = [0.5236, -2.0944, 2.0944]

@@ -10,7 +10,7 @@ from brachis.limits.safeguards import build_branch_margins
 from brachis.path import build_path
 from brachis.robot.task_map import task_map_of
 from brachis.robot.task_map.protocol import joint_rows
-from brachis.task import SplineSegment, SplineThrough
+from brachis.task.segments import SplineSegment, SplineThrough
 from support.chains import planar_robot
 
 H = 1e-5

@@ -18,8 +18,9 @@ from brachis.limits import (
     limits_of,
 )
 from brachis.robot import dynamics
-from brachis.task import LimitSpec, Margins, SpeedTable, Tolerances, ToolLimits
+from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
+from brachis.task.tolerances import Margins
 from support.chains import planar_robot
 from support.phases import FRICTION
 

@@ -13,7 +13,8 @@ from brachis.errors import PathError, TaskError
 from brachis.path import build_path
 from brachis.path.from_curve import feed_tables
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import BSplineCurve, Task, ToolPose, fit_path, load_task
+from brachis.task import Task, ToolPose, fit_path, load_task
+from brachis.task.segments import BSplineCurve
 from support.poses import pose
 from support.seams import bent, brute_distances, wave
 

@@ -10,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from brachis.errors import PathError
-from brachis.path import Array, Curve, Path, build_path
-from brachis.path.blends import septic
+from brachis.path import Path, build_path
 from brachis.path.context import SegmentContext
-from brachis.task import ArcSegment, load_task
+from brachis.path.curves import septic
+from brachis.path.protocol import Array, Curve
+from brachis.task import load_task
+from brachis.task.segments import ArcSegment
 
 
 def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> Path:

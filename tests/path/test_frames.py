@@ -12,7 +12,8 @@ import pytest
 
 import brachis
 from brachis.errors import PathError, StartError, TaskError
-from brachis.path import PathFrame, build_path
+from brachis.path import build_path
+from brachis.path.sequence import PathFrame
 from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import Placement, load_task
 from brachis.task.settings import place_frame

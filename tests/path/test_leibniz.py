@@ -17,7 +17,7 @@ from brachis.path.rotations import (
     sine_cosine,
     unit,
 )
-from brachis.task import Attitude
+from brachis.task.orientation import Attitude
 from brachis.task.points.units import quaternions_of
 
 ORDER = 4

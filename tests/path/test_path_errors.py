@@ -9,8 +9,7 @@ import pytest
 
 from brachis.errors import PathError
 from brachis.path import build_path
-from brachis.path.blends import septic
-from brachis.path.joins import Join, row_corner
+from brachis.path.joins import Join, row_corner, septic
 from brachis.task import load_task
 
 X, XY, XYZ, XYW = ["x"], ["x", "y"], ["x", "y", "z"], ["x", "y", "yaw"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.path import PosePath
+from brachis.path.pose import PosePath
 from support.poses import START, TURNED, pose_path, rotations
 
 RANDOM = np.random.default_rng(8)

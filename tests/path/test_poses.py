@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from brachis.path import PathSample, PosePath, build_path
+from brachis.path import PathSample, build_path
+from brachis.path.pose import PosePath
 from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import LineBy, LineSegment
 from support.poses import (

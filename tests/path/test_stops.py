@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from brachis.errors import PathError
-from brachis.path import Path, PathFrame, build_path
+from brachis.path import Path, build_path
+from brachis.path.sequence import PathFrame
 from brachis.task import Placement, load_task
 
 RIGHT: dict[str, Any] = {"line": {"by": [0.3, 0.0, 0.0]}}

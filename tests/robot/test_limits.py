@@ -149,8 +149,8 @@ def test_scale_that_is_not_positive(factor):
 
 @pytest.mark.parametrize("factors", [2.0, "half", [1.0]])
 def test_a_scale_that_is_no_mapping(factors):
-    with pytest.raises(InputError, match=r"robot\.limits\.scale: .* not a mapping"):
-        LimitSpec(scale=factors)
+    with pytest.raises(InputError, match=r"limits\.scale: .* allowed: a mapping"):
+        limits_of(scale=factors)
 
 
 def test_what_a_program_says_of_limits_is_what_a_task_keeps():

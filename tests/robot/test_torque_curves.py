@@ -8,7 +8,8 @@ import pytest
 from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.robot import bind
 from brachis.robot.from_task import robot_for
-from brachis.task import LimitScale, LimitSpec, RobotSettings
+from brachis.task import LimitSpec, RobotSettings
+from brachis.task.limit_kinds import LimitScale
 from support.chains import planar_robot
 from support.spatial import rail_arm
 

@@ -150,7 +150,7 @@ def test_bodies_and_path_of_a_plan_move_together() -> None:
         ),
         (
             {"scene": {"file": "cell.yaml", "frames": "user1"}},
-            r"allowed: .*\{file: cell\.yaml, frame: NAME\}",
+            r"scene: frames: unknown key; .*allowed: file, frame",
         ),
     ],
 )

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from brachis.path import PosePath, build_path
+from brachis.path import build_path
+from brachis.path.pose import PosePath
 from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import load_task
 

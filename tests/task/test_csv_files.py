@@ -14,7 +14,8 @@ from brachis.errors import PathError, TaskError
 from brachis.path import Path as TaskPath
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import CsvSegment, SplineSegment, SplineThrough, Task, load_task
+from brachis.task import CsvSegment, Task, load_task
+from brachis.task.segments import SplineSegment, SplineThrough
 from support.poses import pose
 
 TURNS = Rotation.from_rotvec(

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
-from brachis.task import load_task, read_assignment, set_key, with_keys
+from brachis.task import load_task, read_assignment, with_keys
+from brachis.task.load import set_key
 
 TASK = {
     "brachis": 1,

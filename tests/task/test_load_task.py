@@ -595,8 +595,13 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
             "robot: {limits: {torque: 1, torque: 2}}",
             ["line 1, column 29", "'torque' occurs twice"],
         ),
-        ("[1, 2]", ["the task is not a mapping of keys; found [1, 2] (a list)"]),
-        ("", ["the task is not a mapping of keys; found null"]),
+        (
+            "[1, 2]",
+            [
+                "wrong type; found [1, 2] (a list); allowed: a mapping with keys out of brachis"
+            ],
+        ),
+        ("", ["wrong type; found null; allowed: a mapping with keys"]),
         ("a: 1\n---\nb: 2", ["not valid YAML"]),
         ("a: !!python/object:os.system {}", ["not valid YAML"]),
         ("when: 2024-13-45", ["not valid YAML"]),

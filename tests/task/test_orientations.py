@@ -14,21 +14,17 @@ import brachis
 from brachis.errors import TaskError
 from brachis.task import (
     AlongTangent,
-    Attitude,
     LineSegment,
     Rotate,
-    Rotation,
-    SplineSegment,
-    Tangent,
-    Target,
     Task,
     ToolPose,
-    TurnSegment,
     TurnTo,
     json_schema,
     load_task,
     task_with,
 )
+from brachis.task.orientation import Attitude, Rotation, Tangent, Target
+from brachis.task.segments import SplineSegment, TurnSegment
 
 LINE: dict[str, Any] = {"line": {"to": [1, 0, 0]}}
 ROTATE: dict[str, Any] = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}

@@ -11,8 +11,8 @@ import pytest
 
 from brachis.errors import TaskError
 from brachis.path import build_path
-from brachis.task import BSplineSegment, Task, load_task
-from brachis.task.segments import SplineSegment
+from brachis.task import Task, load_task
+from brachis.task.segments import BSplineSegment, SplineSegment
 from support.seams import bent, wave
 
 MM = 1e-3

@@ -52,6 +52,25 @@ class SplineCurve:
         return np.stack([self.spline(sigma, nu=k) for k in range(order + 1)])
 
 
+def septic(start: Array, end: Array, length: float) -> SplineCurve:
+    """Return the septic polynomial with given values and three derivatives at both ends.
+
+    Parameters
+    ----------
+    start, end : ndarray, shape (4, m)
+        Value, first, second and third derivative by sigma.
+    length : float
+        Range of sigma.
+    """
+    from scipy.interpolate import BPoly, BSpline
+
+    ends = np.array([0.0, length])
+    polynomial = BPoly.from_derivatives(ends, [start, end])
+    # As a spline without inner knots it has the same control points, and is evaluated faster.
+    spline = BSpline(np.repeat(ends, 8), polynomial.c[:, 0], 7)
+    return SplineCurve(spline, length, ends)
+
+
 @dataclass(frozen=True, eq=False)
 class LineCurve:
     """A straight line ``start + slope sigma``.

@@ -11,9 +11,8 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.kernel import rotation_derivatives
-from brachis.path.blends import septic
 from brachis.path.context import place
-from brachis.path.curves import ArcCurve, LineCurve
+from brachis.path.curves import ArcCurve, LineCurve, septic
 from brachis.path.pose import smallest
 from brachis.path.protocol import Array, Curve, Orientation
 from brachis.path.rotations import hat, product, rotation_of, sine_cosine, unit

@@ -47,23 +47,17 @@ class PathFrame:
         PathError
             The frame turns the rows out of their line or plane.
         """
+        from scipy.linalg import block_diag
+
         rotation = rotation_by("rpy", np.radians(placement.rpy_deg)).as_matrix()
         axes = [AXES.index(row) for row in position_rows(rows)]
         block = rotation[np.ix_(axes, axes)]
         stays = np.eye(3)[[ANGLES.index(row) for row in rows if row in ANGLES]]
-        origin = np.array(placement.xyz)[axes]
-        count = len(axes)
-        turn = block
+        angle = stays @ rotation_of(rotation).as_rotvec()
+        turning: np.ndarray = np.eye(len(stays))
         if tuple(rows[-3:]) == TURN_ROWS:
-            origin = np.pad(origin, (0, 9))
-            turn = np.eye(len(origin))
-            turn[count:, count:] = np.kron(
-                rotation, np.eye(3)
-            )  # of a matrix row by row
-        elif len(stays):
-            origin = np.append(origin, stays @ rotation_of(rotation).as_rotvec())
-            turn = np.eye(len(origin))
-        turn[:count, :count] = block
+            angle = np.zeros(9)
+            turning = np.kron(rotation, np.eye(3))  # of a matrix row by row
         if (
             np.abs(block @ block.T - np.eye(len(axes))).max(initial=0.0) > 1e-9
             or np.linalg.det(block) < 0.0
@@ -76,7 +70,8 @@ class PathFrame:
                 allowed="a turn within these rows",
                 hint="Set task_space: position, or turn the frame only about the axis that leaves these rows in place",
             )
-        return cls(turn, origin)
+        origin = np.append(np.array(placement.xyz)[axes], angle)
+        return cls(block_diag(block, turning), origin)
 
     def to_world(self, coordinates: Array) -> Array:
         """Return coordinates in the world, (c,)."""
@@ -96,6 +91,12 @@ def integrate(function: Callable[[Array], Array], bounds: Array) -> Array:
     nodes = bounds[:-1, None] + half * (_NODES + 1.0)
     values = function(nodes.ravel()).reshape(nodes.shape)
     return (values * half) @ _WEIGHTS
+
+
+def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
+    """Return the length of a curve with velocities (K, p) by s, (K,), analytic between knots, (N + 1,)."""
+    lengths = integrate(lambda s: np.linalg.norm(velocity(s), axis=1), knots)
+    return float(lengths.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,13 +166,9 @@ class Path:
     @cached_property
     def length(self) -> float:
         """Arc length of the position rows, m, by Gauss quadrature between the knots."""
-
-        def speeds(s: Array) -> Array:
-            """Return how far the position moves per unit s, (K,), m."""
-            slope = self.derivatives(s, 1)[1, :, : self.positions]
-            return np.linalg.norm(slope, axis=1)
-
-        return float(integrate(speeds, self.knots).sum())
+        return arc_length(
+            lambda s: self.derivatives(s, 1)[1, :, : self.positions], self.knots
+        )
 
     @property
     def knots(self) -> Array:
@@ -276,12 +273,7 @@ def tool_derivatives(task_map: TaskMap, path: Path, s: Array) -> Array:
 
 def tool_distance(task_map: TaskMap, path: Path) -> float:
     """Return how far the tool moves along a path, m."""
-
-    def speeds(s: Array) -> Array:
-        """Return how far it moves per unit s, (K,), m."""
-        return np.linalg.norm(tool_derivatives(task_map, path, s)[0], axis=1)
-
-    return float(integrate(speeds, path.knots).sum())
+    return arc_length(lambda s: tool_derivatives(task_map, path, s)[0], path.knots)
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:

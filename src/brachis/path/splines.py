@@ -160,9 +160,7 @@ def _repeats_start(steps: Array) -> bool:
 
     It is, where it is within the tolerance and within 1 % of the distance to the next waypoint.
     """
-    if len(steps) < 2:
-        return False
-    return bool(steps[0] < START_TOLERANCE and steps[0] <= 0.01 * steps[1])
+    return len(steps) > 1 and bool(is_repeated(steps, START_TOLERANCE)[0])
 
 
 def _check_start(key: str, off: Array, context: SegmentContext) -> None:

@@ -2,7 +2,7 @@
 
 from brachis.task.fitted import fit_path
 from brachis.task.keywords import RobotKeywords, TaskKeywords, check_keywords, task_with
-from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
+from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords
 from brachis.task.limit_models import (
     FROM_URDF,
     LimitSpec,
@@ -10,76 +10,53 @@ from brachis.task.limit_models import (
     SpeedTable,
     ToolLimits,
 )
-from brachis.task.limits_file import LimitsFile, read_limits
+from brachis.task.limits_file import read_limits
 from brachis.task.load import (
     Source,
     check_robot_settings,
     load_task,
     name_task_file,
     read_assignment,
-    set_key,
     with_keys,
 )
 from brachis.task.models import Posture, Task
 from brachis.task.orientation import (
     AlongTangent,
-    Attitude,
     Rotate,
-    Rotation,
-    Tangent,
-    Target,
     ToolPose,
     TurnTo,
 )
 from brachis.task.point_data import FitReport, FitTolerance, PointFile
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
-    ArcSegment,
-    BSplineCurve,
-    BSplineSegment,
     CsvSegment,
     LineBy,
     LineSegment,
     Segment,
-    SplineSegment,
-    SplineThrough,
-    TurnSegment,
 )
 from brachis.task.settings import (
-    BoundarySettings,
     FrictionSettings,
-    InertiaMatrix,
     Payload,
     Placement,
     RefinementSettings,
     RobotSettings,
-    SearchSettings,
     SolverSettings,
     SplineSettings,
 )
-from brachis.task.tolerances import Margins, Tolerances
+from brachis.task.tolerances import Tolerances
 
 __all__ = [
     "FROM_URDF",
     "LIMIT_KINDS",
     "AlongTangent",
-    "ArcSegment",
-    "Attitude",
-    "BSplineCurve",
-    "BSplineSegment",
-    "BoundarySettings",
     "CsvSegment",
     "FitReport",
     "FitTolerance",
     "FrictionSettings",
-    "InertiaMatrix",
     "LimitKeywords",
-    "LimitScale",
     "LimitSpec",
-    "LimitsFile",
     "LineBy",
     "LineSegment",
-    "Margins",
     "Payload",
     "Placement",
     "PointFile",
@@ -89,23 +66,16 @@ __all__ = [
     "RobotKeywords",
     "RobotSettings",
     "Rotate",
-    "Rotation",
-    "SearchSettings",
     "Segment",
     "SolverSettings",
     "Source",
     "SpeedTable",
-    "SplineSegment",
     "SplineSettings",
-    "SplineThrough",
-    "Tangent",
-    "Target",
     "Task",
     "TaskKeywords",
     "Tolerances",
     "ToolLimits",
     "ToolPose",
-    "TurnSegment",
     "TurnTo",
     "check_keywords",
     "check_robot_settings",
@@ -115,7 +85,6 @@ __all__ = [
     "name_task_file",
     "read_assignment",
     "read_limits",
-    "set_key",
     "task_with",
     "with_keys",
 ]

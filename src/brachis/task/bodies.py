@@ -6,8 +6,8 @@ All lengths are in m, angles in degrees. A body is fixed to the world, or to the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike, fspath
-from typing import Any, TypedDict, Unpack
+from os import PathLike
+from typing import TypedDict, Unpack
 
 from brachis.task.messages import validate
 from brachis.task.scene import SceneBody
@@ -37,7 +37,7 @@ def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N8
     >>> brachis.Box([0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])
     SceneBody(box=[0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])
     """
-    return _make("Box", box=size, **where)
+    return validate(SceneBody, {"box": size, **where}, "Box")
 
 
 def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
@@ -49,7 +49,7 @@ def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
     >>> brachis.Sphere(0.04, position=[0.35, 0.16, 0.53])
     SceneBody(sphere=0.04, position=[0.35, 0.16, 0.53])
     """
-    return _make("Sphere", sphere=radius, **where)
+    return validate(SceneBody, {"sphere": radius, **where}, "Sphere")
 
 
 def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
@@ -62,7 +62,7 @@ def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:
     'cylinder'
     """
     shape = {"radius": radius, "length": length}
-    return _make("Cylinder", cylinder=shape, **where)
+    return validate(SceneBody, {"cylinder": shape, **where}, "Cylinder")
 
 
 def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
@@ -75,15 +75,11 @@ def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody: 
     'tool0'
     """
     shape = {"radius": radius, "length": length}
-    return _make("Capsule", capsule=shape, **where)
+    return validate(SceneBody, {"capsule": shape, **where}, "Capsule")
 
 
 def HalfSpace(  # noqa: N802
-    normal: Sequence[float],
-    offset: float = 0.0,
-    *,
-    name: str | None = None,
-    frame: str | None = None,
+    normal: Sequence[float], offset: float = 0.0, **where: Unpack[Where]
 ) -> SceneBody:
     """Make all that is behind a plane, such as a floor.
 
@@ -93,9 +89,8 @@ def HalfSpace(  # noqa: N802
         Direction out of the half-space, any length.
     offset : float, optional
         Distance of the plane from the origin along the normal, m.
-    name : str, optional
-    frame : str, optional
-        Frame of the task in which the plane is; left out: the world.
+    **where
+        See `Where`: ``name`` and ``frame``.
 
     Examples
     --------
@@ -103,12 +98,8 @@ def HalfSpace(  # noqa: N802
     >>> brachis.HalfSpace([0, 0, 1], offset=-0.1).half_space.offset
     -0.1
     """
-    return _make(
-        "HalfSpace",
-        half_space={"normal": normal, "offset": offset},
-        name=name,
-        frame=frame,
-    )
+    shape = {"normal": normal, "offset": offset}
+    return validate(SceneBody, {"half_space": shape, **where}, "HalfSpace")
 
 
 def Mesh(  # noqa: N802
@@ -122,9 +113,4 @@ def Mesh(  # noqa: N802
     >>> brachis.Mesh("body.stl", scale=0.001, name="body").mesh
     'body.stl'
     """
-    return _make("Mesh", mesh=fspath(file), scale=scale, **where)
-
-
-def _make(maker: str, **keys: Any) -> SceneBody:
-    given = {key: value for key, value in keys.items() if value is not None}
-    return validate(SceneBody, given, maker)
+    return validate(SceneBody, {"mesh": file, "scale": scale, **where}, "Mesh")

@@ -89,17 +89,26 @@ class Model(BaseModel):
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
-    def __repr_args__(self) -> list[tuple[str | None, Any]]:
-        """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
-        return [
-            (name, _Shown(getattr(self, name)))
-            for name, field in type(self).model_fields.items()
-            if name in self.model_fields_set and getattr(self, name) != field.default
-        ]
+    def __repr__(self) -> str:
+        """Show it as a program makes it."""
+        return f"{type(self).__name__}({', '.join(show_arguments(self))})"
 
     def __str__(self) -> str:
         """Show it as `repr` does."""
         return repr(self)
+
+
+def show_arguments(model: Model, without: str = "") -> list[str]:
+    """Show the keys of a model that are not as by default as a program gives them: ``to=[1, 2]``."""
+    arguments = []
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        is_stated = name in model.model_fields_set and value != field.default
+        if is_stated and name != without:
+            is_plain = not isinstance(value, str | Model)
+            text = show_value(value) if is_plain else repr(value)
+            arguments.append(f"{name}={text}")
+    return arguments
 
 
 Mistake = tuple[str, str, str]
@@ -156,18 +165,6 @@ def _docstrings_of(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
                 ast.Expr(value=ast.Constant(value=str(text))),
             ):
                 yield name, inspect.cleandoc(text)
-
-
-@dataclass(frozen=True)
-class _Shown:
-    """A value that is shown as in summaries."""
-
-    value: object
-
-    def __repr__(self) -> str:
-        if isinstance(self.value, str | Model):
-            return repr(self.value)
-        return show_value(self.value)
 
 
 _NUMBER_AND_UNIT = re.compile(
@@ -258,11 +255,9 @@ def plain(
     Numbers with names, such as a row of a pandas table, become a mapping, because their order may be any.
     """
     # An array is known by its method and not by its class: this stage has no need for NumPy.
-    to_list = getattr(value, "tolist", None)
-    if callable(to_list):
-        keys = getattr(value, "keys", None)
-        names = list(keys()) if callable(keys) else []
-        value = to_list()
+    if hasattr(value, "tolist"):
+        names = list(value.keys()) if hasattr(value, "keys") else []
+        value = value.tolist()
         if names and all(isinstance(name, str) for name in names):
             value = dict(zip(names, value, strict=True))
     if isinstance(value, Mapping):
@@ -333,21 +328,6 @@ def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterVal
         return value
 
     return AfterValidator(check)
-
-
-def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
-    """Return what adds a form of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
-
-    def add(schema: dict[str, Any]) -> None:
-        """Add the form to a schema."""
-        kept = {
-            key: schema.pop(key)
-            for key in ("$ref", "type", "items", "minItems")
-            if key in schema
-        }
-        schema["anyOf"] = [kept, *([kept["items"]] if "items" in kept else []), form]
-
-    return add
 
 
 @dataclass(frozen=True)

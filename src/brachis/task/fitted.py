@@ -38,7 +38,7 @@ _HAS_UNIT = re.compile(r"[_ (\[](deg|degrees|mm|cm)[)\]]?$", re.IGNORECASE)
 
 
 def segments_along(
-    points: Points, segment: CsvSegment, where: str, notes: tuple[str, ...] = ()
+    points: Points, segment: CsvSegment, where: str
 ) -> list[SplineSegment | BSplineSegment]:
     """Return the segments along points, whose first one is where they start.
 
@@ -49,8 +49,6 @@ def segments_along(
         What is asked of the path along them. Its file is what the user calls the points.
     where : str
         Where the task names them, for messages.
-    notes : tuple of str, optional
-        What was found out when the points were read.
 
     Raises
     ------
@@ -68,7 +66,7 @@ def segments_along(
     stops = settings.corner == "stop"
     parts: Sequence[Points | FittedCurve]
     if settings.tolerance is not None:
-        parts, report = fit_curves(points, settings.tolerance, notes, stops=stops)
+        parts, report = fit_curves(points, settings.tolerance, stops=stops)
     elif points.speed is not None and segment.speed is None:
         raise TaskError(
             "feed rates need a fitted path",
@@ -78,7 +76,7 @@ def segments_along(
             hint="Set csv.tolerance, or remove the feed rates",
         )
     else:
-        parts, report = cut_at_corners(points, notes, stops=stops)
+        parts, report = cut_at_corners(points, stops=stops)
     _check_corners(report, segment, where)
     fit: FitReport | None = report.model_copy(update={"source": settings.file})
     segments: list[SplineSegment | BSplineSegment] = []
@@ -203,11 +201,11 @@ def _read(
                 allowed="no csv.orientation",
                 where=f"{where}.csv.file",
             )
-        points, notes = read_gcode(text, rows, str(path))
+        points = read_gcode(text, rows, str(path))
     else:
-        points, notes = read_points(text, rows, segment.csv, str(path))
+        points = read_points(text, rows, segment.csv, str(path))
     _check_count(len(points), path)
-    return segments_along(points, segment, where, notes)
+    return segments_along(points, segment, where)
 
 
 def _along_joints(

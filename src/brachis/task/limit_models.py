@@ -155,20 +155,10 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
     def __post_init__(self) -> None:
         """Take arrays for plain numbers, and a mapping for the scale."""
-        given: Any = self.scale
-        if not isinstance(given, LimitScale):
-            given = {} if given is None else given
-            if not isinstance(given, Mapping):
-                raise InputError(
-                    "the factors on limits are not a mapping",
-                    where="robot.limits.scale",
-                    found=given,
-                    allowed="factors by kind of limit, such as {torque: 0.8}",
-                )
-            scale = LimitScale().model_copy(update=plain(given))
-            object.__setattr__(self, "scale", scale)
         for each in fields(self):
-            value = plain(getattr(self, each.name), tuple)
+            value: Any = plain(getattr(self, each.name), tuple)
+            if each.name == "scale" and isinstance(value, Mapping | None):
+                value = LimitScale().model_copy(update=value)
             object.__setattr__(self, each.name, value)
 
 

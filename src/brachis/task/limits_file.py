@@ -24,7 +24,7 @@ from brachis.task.fields import (
     merge,
     plain,
 )
-from brachis.task.limit_kinds import LimitScale
+from brachis.task.limit_kinds import LIMIT_KINDS, LimitScale
 from brachis.task.limit_models import (
     FROM_URDF,
     LimitSpec,
@@ -210,7 +210,7 @@ def with_limits_of_file(
     path = folder / name
     file = _read_file(path, f"{source}: robot.limits_file", folder, name)
     if isinstance(file, RosLimitsFile) and settings.urdf is not None:
-        _check_joints(file, settings, own, folder, str(path))
+        _check_joints(file, settings, folder, str(path))
     rest = {key: value for key, value in robot.items() if key != "limits_file"}
     limits = merge(file.by_kind(str(path)), own)
     return {**content, "robot": {**rest, "limits": limits}}
@@ -230,11 +230,10 @@ def _read_file(
 def _check_joints(
     file: RosLimitsFile,
     robot: RobotSettings,
-    own: Mapping[str, Any],
     folder: Path,
     where: str,
 ) -> None:
-    """Refuse joints that the URDF does not have, and joints that move the tool and have no limits there or in `own`.
+    """Refuse joints that the URDF does not have, and joints that move the tool and have no limits there or in the task.
 
     Raises
     ------
@@ -245,11 +244,13 @@ def _check_joints(
     names, moving = _joints_of(urdf, robot.tool_frame, robot.base_frame)
     if names:
         check_names("URDF joint", limited, names, f"{where}: joint_limits")
-    given = [each for kind, each in own.items() if kind != "scale"]
-    if any(isinstance(each, int | float | list | tuple) for each in given):
-        return  # of all joints
-    by_name = [each for each in given if isinstance(each, Mapping)]
-    stated = set(limited).union(robot.locked_joints, *by_name)
+    stated = {*limited, *robot.locked_joints}
+    for kind in LIMIT_KINDS:
+        limits = getattr(robot.limits, kind)
+        if isinstance(limits, float | tuple):
+            return  # of all joints
+        if isinstance(limits, Mapping):
+            stated |= set(limits)
     missing = [name for name in moving if name not in stated]
     if missing:
         raise TaskError(

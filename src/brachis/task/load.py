@@ -280,24 +280,13 @@ def task_from(
         See `load_task`.
     """
     if not isinstance(content, Mapping):
-        raise TaskError(
-            "the task is not a mapping of keys",
-            found=show(content),
-            allowed=", ".join(Task.model_fields),
-            where=source,
-        )
+        return validate(Task, content, source)  # which refuses it
     if changes:
         content = with_keys(content, changes)
     source = _name_source(source, changes)
-    try:
-        content = with_limits_of_file(content, source, folder)
-        content = with_scene_of_file(content, source, folder)
-        task = validate(Task, content, source)
-    except RecursionError:
-        raise TaskError(
-            "the task contains itself (a YAML alias inside its own anchor)",
-            where=source,
-        ) from None
+    content = with_limits_of_file(content, source, folder)
+    content = with_scene_of_file(content, source, folder)
+    task = validate(Task, content, source)
     task = _with_start(expand_csv_files(task, source, folder), source)
     return _with_absolute_files(task, folder)
 

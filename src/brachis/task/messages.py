@@ -118,13 +118,12 @@ def _names_in(location: _Location) -> list[str]:
 
 def _write_location(location: _Location, key: str) -> str:
     """Return a location, and a key below it, as ``path[0].line.to``, without the tags of unions."""
-    text = "".join(
-        f"[{part}]" if isinstance(part, int) else f".{part}"
+    keys = [
+        f"[{part}]" if isinstance(part, int) else part
         for part in location
         if not _is_tag(part) and part != "[key]"
-    )
-    below = key if key.startswith(("[", ".")) or not key else f".{key}"
-    return f"{text}{below}".removeprefix(".")
+    ]
+    return ".".join(filter(None, [*keys, key])).replace(".[", "[")
 
 
 def models_in(annotation: object) -> Iterator[type]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from operator import attrgetter
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -29,10 +29,10 @@ from brachis.task.fields import (
     Name,
     NonEmpty,
     Number,
+    Vector,
     Version,
     check_defined,
     must,
-    or_form,
     plain,
     refuse,
 )
@@ -40,7 +40,7 @@ from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import StartPlace, ToolPose
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
-from brachis.task.scene import CollisionSettings, SceneBody, name_bodies
+from brachis.task.scene import CollisionSettings, SceneBody, SceneSource, name_bodies
 from brachis.task.segments import CsvSegment, Segment, SegmentModel, are_matrices
 from brachis.task.settings import (
     BoundarySettings,
@@ -53,11 +53,12 @@ from brachis.task.settings import (
     check_frames,
     expand_solver_name,
 )
-from brachis.task.task_space import EACH_ONCE, TaskSpace
 from brachis.task.tolerances import (
+    EACH_ONCE,
     Margins,
     OrientationTolerance,
     PositionTolerance,
+    TaskSpace,
     Tolerances,
 )
 
@@ -94,26 +95,14 @@ RedundantJoints = Annotated[
 ]
 
 
-_SCENE_FILE: Final[dict[str, Any]] = {
-    "type": "object",
-    "required": ["file"],
-    "additionalProperties": False,
-    "properties": {"file": {"type": "string"}, "frame": {"type": "string"}},
-}
+Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
 
 
-def _add_forms_of_paths(schema: dict[str, Any]) -> None:
-    """Add to the JSON schema of a path that it may be points, or segments in a frame of their own."""
-    numbers = {"type": "array", "items": {"type": "number"}}
-    or_form({"type": "array", "minItems": 2, "items": numbers})(schema)
-    parts = {"frame": {"type": "string"}, "segments": schema["anyOf"][0]}
-    in_frame = {
-        "type": "object",
-        "required": list(parts),
-        "additionalProperties": False,
-        "properties": parts,
-    }
-    schema["anyOf"].append(in_frame)
+class PathInFrame(Model):
+    """A path that names its frame."""
+
+    frame: Name
+    segments: Segments
 
 
 class Task(CheckedModel):
@@ -149,9 +138,7 @@ class Task(CheckedModel):
     joints, or a list of coordinates out of x, y, z. Behind these may be yaw, pitch or roll, rad: the angle about the
     world's z, y or x axis of a tool that turns about no other axis; or axis, the direction of the tool's z axis. A path
     of joints gives all joint positions (rad, m) in chain order, and only its timing is planned."""
-    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)] = Field(
-        json_schema_extra=_add_forms_of_paths
-    )
+    path: Segments
     """Segments of the path, in order. A list of points, each with all task coordinates, is the spline through them from
     the first one on. For a file of points: [{csv: {file: ...}}]. For another frame: {frame: NAME, segments: [...]}."""
     frames: dict[Name, FramePlacement] = Field(default={})
@@ -172,10 +159,11 @@ class Task(CheckedModel):
     scene: Annotated[
         tuple[SceneBody, ...],
         BeforeValidator(
-            lambda scene: (scene,) if isinstance(scene, SceneBody) else scene
+            lambda scene: (scene,) if isinstance(scene, SceneBody) else scene,
+            json_schema_input_type=tuple[SceneBody, ...] | SceneSource,
         ),
         AfterValidator(name_bodies),
-    ] = Field(default=(), json_schema_extra=or_form(_SCENE_FILE))
+    ] = ()
     """Bodies around the robot and on it, which it keeps clear of; or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
     """The clearance, which pairs of bodies keep it, and whether it is a limit of the plan."""
@@ -196,9 +184,12 @@ class Task(CheckedModel):
     """Search for the fastest motion."""
     spline: SplineSettings = Field(default_factory=SplineSettings)
     """B-splines of the motion."""
-    solver: Annotated[SolverSettings, BeforeValidator(expand_solver_name)] = Field(
-        default_factory=SolverSettings, json_schema_extra=or_form({"type": "string"})
-    )
+    solver: Annotated[
+        SolverSettings,
+        BeforeValidator(
+            expand_solver_name, json_schema_input_type=SolverSettings | str
+        ),
+    ] = Field(default_factory=SolverSettings)
     """Solver: its name or a mapping."""
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
@@ -234,7 +225,14 @@ class Task(CheckedModel):
             )
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
-    @field_validator("path", mode="before")
+    @field_validator(
+        "path",
+        mode="before",
+        json_schema_input_type=Segments
+        | Segment
+        | Annotated[tuple[Vector, ...], Field(min_length=2)]
+        | PathInFrame,
+    )
     @classmethod
     def _points_and_one_segment_are_paths(cls, path: object) -> object:
         if isinstance(path, SegmentModel | Mapping):

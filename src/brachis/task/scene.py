@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field
 
 from brachis.common.files import absolute_path, read_text
-from brachis.errors import TaskError
 from brachis.task.fields import (
     CheckedModel,
     Flag,
@@ -23,7 +22,7 @@ from brachis.task.fields import (
     Version,
     refuse,
 )
-from brachis.task.messages import show, validate
+from brachis.task.messages import validate
 from brachis.task.orientation import Direction, Vector3
 from brachis.task.settings import Placement
 from brachis.task.yaml_reader import read_yaml
@@ -161,6 +160,15 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     return named
 
 
+class SceneSource(Model):
+    """A scene whose bodies are in a file."""
+
+    file: Name
+    """Scene file, relative to the task file."""
+    frame: Name | None = None
+    """Name of the frame, out of frames, of the bodies that state neither frame nor link. Null: the world."""
+
+
 class SceneFile(Model):
     """What a scene file says."""
 
@@ -185,27 +193,18 @@ def with_scene_of_file(
         What the file's path is relative to.
     """
     scene = content.get("scene")
-    if not isinstance(scene, Mapping):
+    if not isinstance(scene, Mapping) or "file" not in scene:
         return content
-    if set(scene) not in ({"file"}, {"file", "frame"}):
-        raise TaskError(
-            "scene must be a list of bodies or a file",
-            where=f"{source}: scene",
-            found=show(scene),
-            allowed="[{box: [...], position: [...]}, ...], {file: cell.yaml} or {file: cell.yaml, frame: NAME}",
-        )
-    name = str(scene["file"])
-    path = folder / name
-    where = f"{source}: scene.file"
-    text = read_text(path, where=where, folder=folder, found=name)
+    where = f"{source}: scene"
+    settings = validate(SceneSource, scene, where)
+    path = folder / settings.file
+    text = read_text(path, where=f"{where}.file", folder=folder, found=settings.file)
     file = validate(SceneFile, read_yaml(text, str(path)), str(path))
-    bodies = with_paths(file.bodies, path.absolute().parent)
-    if "frame" in scene:
-        frame = {"frame": scene["frame"]}
-        bodies = tuple(
-            body if body.link or body.frame else body.model_copy(update=frame)
-            for body in bodies
-        )
+    frame = {"frame": settings.frame}
+    bodies = tuple(
+        body if body.link or body.frame else body.model_copy(update=frame)
+        for body in with_paths(file.bodies, path.absolute().parent)
+    )
     return {**content, "scene": bodies}
 
 

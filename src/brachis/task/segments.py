@@ -35,6 +35,7 @@ from brachis.task.fields import (
     must,
     refuse,
     required_keys,
+    show_arguments,
 )
 from brachis.task.orientation import (
     Attitude,
@@ -341,10 +342,9 @@ class SegmentModel(CheckedModel):
 
     def __repr__(self) -> str:
         """Show it as a program makes it."""
-        rest = [pair for pair in self.__repr_args__() if pair[0] != self.kind]
-        pairs = [*self.shape.__repr_args__(), *rest]
-        given = ", ".join(f"{name}={value!r}" for name, value in pairs)
-        return f"{type(self).__name__.removesuffix('Segment')}({given})"
+        arguments = show_arguments(self.shape) + show_arguments(self, self.kind)
+        name = type(self).__name__.removesuffix("Segment")
+        return f"{name}({', '.join(arguments)})"
 
     @property
     def start(self) -> _Start | None:

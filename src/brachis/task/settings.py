@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
@@ -90,20 +91,19 @@ def check_frames(
     ------
     PydanticCustomError
     """
-    outer = {name: frame.frame for name, frame in frames.items()}
-    inner = {f"frames.{name}.frame": each for name, each in outer.items()}
+    inner = {f"frames.{name}.frame": frame.frame for name, frame in frames.items()}
     check_defined("frame", {**uses, **inner}, frames)
-    for name in frames:
-        chain = [name]
-        while (last := outer[chain[-1]]) and len(chain) <= len(frames):
-            chain.append(last)
-        if last:
-            raise refuse(
-                "the frame is placed in itself",
-                key=f"frames.{name}.frame",
-                found=" in ".join(chain[:4]),
-                allowed="frames that lead to the world",
-            )
+    outer = {name: [frame.frame] for name, frame in frames.items()}
+    try:
+        TopologicalSorter(outer).prepare()
+    except CycleError as error:
+        cycle = error.args[1][::-1]
+        raise refuse(
+            "the frame is placed in itself",
+            key=f"frames.{cycle[0]}.frame",
+            found=" in ".join(cycle[:4]),
+            allowed="frames that lead to the world",
+        ) from None
 
 
 class InertiaMatrix(Model):

@@ -5,57 +5,35 @@ from __future__ import annotations
 from itertools import pairwise
 
 _UNITS = {
-    "frames.xyz": "m",
-    "scene.position": "m",
-    "path.speed": "m/s",
-    "tool_offset.xyz": "m",
-    "mounting.xyz": "m",
-    "robot.gravity": "m/s^2",
-    "robot.locked_joints": "rad (m)",
-    "payload.mass": "kg",
-    "payload.com": "m",
-    "payload.inertia": "kg m^2",
-    "limits.torque": "N m (force, N)",
-    "limits.velocity": "rad/s (m/s)",
-    "limits.acceleration": "rad/s^2 (m/s^2)",
-    "limits.position": "rad (m)",
-    "limits.power": "W",
-    "limits.total_power": "W",
-    "limits.rms_torque": "N m (force, N)",
-    "limits.jerk": "rad/s^3 (m/s^3)",
-    "limits.torque_rate": "N m/s (force, N/s)",
-    "friction.armature": "kg m^2 (kg)",
-    "friction.rotor_inertia": "kg m^2",
-    "friction.viscous": "N m s/rad (N s/m)",
-    "friction.coulomb": "N m (N)",
-    "friction.coulomb_velocity": "rad/s (m/s)",
-    "start.joints": "rad (m)",
-    "end.joints": "rad (m)",
-    "path_start.position": "m",
-    "path.dwell": "s",
-    "path.blend": "m",
-    "path_start.rotation_vector": "rad",
-    "to.rotation_vector": "rad",
-    "line.to": "m",
-    "line.by": "m",
-    "line.length": "m",
-    "arc.center": "m",
-    "arc.via": "m",
-    "arc.to": "m",
-    "circle.center": "m",
-    "helix.center": "m",
-    "helix.pitch": "m",
-    "spline.through": "m",
-    "bspline.control_points": "m",
-    "boundary.start_speed": "m/s",
-    "boundary.end_speed": "m/s",
-    "tool_limits.speed": "m/s",
-    "speed.s": "",
-    "tool_limits.acceleration": "m/s^2",
-    "tool_limits.angular_speed": "rad/s",
-    "process_speed.speed": "m/s",
-    "search.time_limit": "s",
-    "solver.time_limit": "s",
+    name: unit
+    for unit, names in {
+        "m": """
+            frames.xyz scene.position tool_offset.xyz mounting.xyz payload.com path_start.position
+            path.blend line.to line.by line.length arc.center arc.via arc.to circle.center helix.center
+            helix.pitch spline.through bspline.control_points
+        """,
+        "m/s": """
+            path.speed boundary.start_speed boundary.end_speed tool_limits.speed process_speed.speed
+        """,
+        "m/s^2": "robot.gravity tool_limits.acceleration",
+        "rad (m)": "robot.locked_joints limits.position start.joints end.joints",
+        "kg": "payload.mass",
+        "kg m^2": "payload.inertia friction.rotor_inertia",
+        "N m (force, N)": "limits.torque limits.rms_torque",
+        "rad/s (m/s)": "limits.velocity friction.coulomb_velocity",
+        "rad/s^2 (m/s^2)": "limits.acceleration",
+        "W": "limits.power limits.total_power",
+        "rad/s^3 (m/s^3)": "limits.jerk",
+        "N m/s (force, N/s)": "limits.torque_rate",
+        "kg m^2 (kg)": "friction.armature",
+        "N m s/rad (N s/m)": "friction.viscous",
+        "N m (N)": "friction.coulomb",
+        "s": "path.dwell search.time_limit solver.time_limit",
+        "rad": "path_start.rotation_vector to.rotation_vector",
+        "": "speed.s",
+        "rad/s": "tool_limits.angular_speed",
+    }.items()
+    for name in names.split()
 }
 """Units by the last two names of a key; in brackets that of prismatic joints."""
 

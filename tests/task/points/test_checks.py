@@ -76,10 +76,12 @@ def test_a_whole_file_in_other_units_is_doubted():
 
 def test_repeated_rows_are_left_out_and_listed():
     position = np.repeat(wave(10), [1, 2, 1, 1, 1, 3, 1, 1, 1, 1], axis=0)
-    kept, told = without_repetitions(points(position))
+    kept = without_repetitions(points(position))
     np.testing.assert_array_equal(kept.position, wave(10))
-    assert told == ("left out 3 rows at the place of the row before: rows 2, 7, 8",)
-    assert without_repetitions(points(wave(10)))[1] == ()
+    assert kept.notes == (
+        "left out 3 rows at the place of the row before: rows 2, 7, 8",
+    )
+    assert without_repetitions(points(wave(10))).notes == ()
 
 
 def test_a_turn_on_the_spot_is_refused():

@@ -12,7 +12,8 @@ from brachis.task.points.gcode import read_gcode
 
 
 def points_of(text, rows="position"):
-    return read_gcode(text, rows if rows != "position" else ("x", "y", "z"), "a.nc")
+    points = read_gcode(text, rows if rows != "position" else ("x", "y", "z"), "a.nc")
+    return points, points.notes
 
 
 PROGRAM = """%

@@ -16,7 +16,8 @@ def read(text, rows="pose", units=None, orientation=None):
     settings = PointFile(
         file="a.csv", units=units or FileUnits(), orientation=orientation
     )
-    return read_points(text, rows, settings, "a.csv")
+    points = read_points(text, rows, settings, "a.csv")
+    return points, points.notes
 
 
 @pytest.mark.parametrize(

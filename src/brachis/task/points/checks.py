@@ -6,7 +6,7 @@ Scatter is about a smooth curve, and matters by what it does to the curvature of
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from brachis.task.point_data import FitTolerance
 from brachis.task.points.points import (
     Array,
     Points,
-    PointsAndNotes,
     angles_between,
     is_repeated,
     project_on_sides,
@@ -139,8 +138,8 @@ def _residuals(values: Array, chords: Array) -> Array:
     return (values[inner] - foreseen) / scale[:, None]
 
 
-def without_repetitions(points: Points, tolerance: float = 0.0) -> PointsAndNotes:
-    """Leave out points that repeat their predecessors, much more exactly than a tolerance, m, and say which.
+def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
+    """Leave out points that repeat their predecessors, much more exactly than a tolerance, m, and note which.
 
     Raises
     ------
@@ -165,12 +164,11 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> PointsAndNote
             where=points.source,
         )
     if not again.size:
-        return points, ()
+        return points
     count = write_count(len(again), "row")
     rows = name_first([str(row) for row in points.rows[again]], ", ", most=5)
-    return kept, (
-        f"left out {count} at the place of the row before: {points.row}s {rows}",
-    )
+    note = f"left out {count} at the place of the row before: {points.row}s {rows}"
+    return replace(kept, notes=(*kept.notes, note))
 
 
 def refuse_repetitions(points: Points) -> None:
@@ -229,7 +227,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
 
 def plausibility_note(points: Points) -> str | None:
     """Say that the whole path looks like mm where m are stated, or the other way round; None where it does not."""
-    extent = points.extent
+    extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
     if extent > 100.0:  # paths of robots are shorter
         return f"the path is {extent:.4g} m long and wide: mm for m? Set units: {{length: mm}}"
     if extent < 1e-4:
@@ -239,18 +237,13 @@ def plausibility_note(points: Points) -> str | None:
 
 def _refuse_factors(points: Points) -> None:
     """Refuse a step after which all coordinates are a thousand times larger or smaller."""
-    sizes = np.linalg.norm(points.position, axis=1)
-    ratios = sizes[1:] / np.maximum(sizes[:-1], SAME)
-    growth = np.maximum(ratios, 1.0 / np.maximum(ratios, SAME))
-    steps = points.steps
-    far = steps > 20.0 * np.median(steps)
-    by_thousand = far & (growth > 900.0) & (growth < 1100.0)
-    for i in np.flatnonzero(by_thousand).tolist():
-        one = points.position[i]
-        other = points.position[i + 1]
-        small, large = (one, other) if ratios[i] > 1.0 else (other, one)
-        if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):
-            word = "larger" if ratios[i] > 1.0 else "smaller"
+    before = points.position[:-1]
+    after = points.position[1:]
+    is_far = points.steps > 20.0 * np.median(points.steps)
+    for factor, word in ((1e3, "larger"), (1e-3, "smaller")):
+        off = np.linalg.norm(after - factor * before, axis=1)
+        is_scaled = off < 0.1 * factor * np.linalg.norm(before, axis=1)
+        for i in np.flatnonzero(is_far & is_scaled).tolist():
             raise points.wrong(
                 i + 1,
                 f"the coordinates are a thousand times {word} than in {points.name_row(i)}",

@@ -14,7 +14,7 @@ from brachis.common.arrays import interpolate_columns, spread, with_like_signs
 from brachis.common.words import write_count
 from brachis.task.points.checks import Scatter
 from brachis.task.points.fit import lengths_along
-from brachis.task.points.points import Array, Indices, Points, PointsAndNotes
+from brachis.task.points.points import Array, Indices, Points
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
@@ -203,7 +203,7 @@ def _locate(
     (one, a), (other, b) = sides
     steps, *_ = np.linalg.lstsq(np.stack([a, -b], axis=1), other - one, rcond=None)
     place = (one + steps[0] * a + other + steps[1] * b) / 2.0
-    gap = u[min(i + 1, len(u) - 1)] - u[max(i - 1, 0)]
+    gap = u[i + 1] - u[i - 1]  # a corner is not at an end
     after = float((position[i] - place) @ (a + b)) > 0.0
     far = np.linalg.norm(place - position[i]) > max(width, gap)
     if far or (least == 1 and after != from_after):
@@ -227,14 +227,14 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
     return bool(np.linalg.norm(foreseen - position[i]) <= allowed)
 
 
-def fill_gaps(points: Points) -> PointsAndNotes:
-    """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
+def fill_gaps(points: Points) -> Points:
+    """Put points on the straight ways that are five times longer than usual, and note how many ways there are."""
     chords = points.steps
     usual = float(np.median(chords))
     times = 5.0
     long = chords > times * usual
     if len(points) < 20 or not np.any(long):
-        return points, ()
+        return points
     parts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
     index = np.arange(len(points))
     at = spread(index, np.where(long, parts, 1).astype(int))
@@ -245,14 +245,15 @@ def fill_gaps(points: Points) -> PointsAndNotes:
     ways = write_count(int(np.count_nonzero(long)), "way")
     note = f"taken as straight: {ways} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
-    return replace(rows, position=position, turning=turning), (note,)
+    notes = (*points.notes, note)
+    return replace(rows, position=position, turning=turning, notes=notes)
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:
     """Return what a blend takes from either side, m, that passes a corner of straight lines at a distance, m.
 
     With `size` from either side and unit tangents a, b the ends lie at -size a and size b of the corner, and the
-    blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.blends`. Its middle is
+    blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.joins`. Its middle is
     ``(b - a) (size / 2 - 11/64 length)`` away, and ``|b - a| = 2 sin(angle / 2)``.
 
     Parameters

@@ -42,16 +42,17 @@ class FittedCurve:
     ----------
     points : Points
         With the corners, at their places, as first and last ones.
-    given : slice
-        Those that are the user's, without the corners.
     fit : Fit
+        Its errors are those of the user's points, without the corners.
+    speeds : tuple of Run
+        Tables of the speeds that are prescribed along it.
     blend : float or None
         What the blend at its end takes from it and from the next curve, m; None at the last one.
     """
 
     points: Points
-    given: slice
     fit: Fit
+    speeds: tuple[Run, ...]
     blend: float | None = None
 
     @property
@@ -63,26 +64,6 @@ class FittedCurve:
     def length(self) -> float:
         """Range of sigma, about the arc length, m."""
         return float(self.fit.breaks[-1])
-
-    @property
-    def sigma(self) -> Array:
-        """Where the given points are."""
-        return self.fit.sigma[self.given]
-
-    @property
-    def distances(self) -> Array:
-        """How far the given points are from the curve, m."""
-        return self.fit.position_errors[self.given]
-
-    @property
-    def angles(self) -> Array:
-        """How far the given orientations are from the curve's, rad."""
-        return self.fit.turning_errors[self.given]
-
-    @property
-    def speeds(self) -> tuple[Run, ...]:
-        """Tables of the speeds that are prescribed along it."""
-        return speed_runs(self.fit.sigma, self.points.speed)
 
 
 def _fit_between(
@@ -107,14 +88,15 @@ def _fit_between(
         after = [end.index] if end else []
         first = start.after if start else 0
         rows = range(first, end.before if end else len(points))
-        given = slice(len(before), len(before) + len(rows))
+        of_user = slice(len(before), len(before) + len(rows))
         whole = points.only([*before, *rows, *after])  # copies
         if start is not None:
             whole.position[0] = start.place
         if end is not None:
             whole.position[-1] = end.place
         fit = _fit_one(whole, tolerance, scatter, note)
-        curves.append(FittedCurve(whole, given, fit))
+        speeds = speed_runs(fit.sigma, whole.speed)
+        curves.append(FittedCurve(whole, fit.only(of_user), speeds))
     return curves
 
 
@@ -130,9 +112,11 @@ def _blend_between(
     """
     shortest = min(first.length, second.length)
     widest = blend_size(corner.angle, tolerance.at_corners, shortest)
+    is_last = first.fit.sigma > first.length - widest
+    is_first = second.fit.sigma < widest
     taken = max(
-        float(first.distances[first.sigma > first.length - widest].max(initial=0.0)),
-        float(second.distances[second.sigma < widest].max(initial=0.0)),
+        float(first.fit.position_errors[is_last].max(initial=0.0)),
+        float(second.fit.position_errors[is_first].max(initial=0.0)),
     )
     left = tolerance.at_corners - taken
     if left < 0.05 * tolerance.at_corners:
@@ -155,7 +139,7 @@ def _fit_one(
     ------
     TaskError
     """
-    fit = fit_points(points, tolerance, scatter)
+    fit = fit_points(points, tolerance, scatter).over_length(points.dimension)
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + 1e-6:
@@ -215,7 +199,6 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
 def fit_curves(
     points: Points,
     tolerance: FitTolerance,
-    notes: tuple[str, ...] = (),
     *,
     stops: bool = False,
 ) -> tuple[tuple[FittedCurve, ...], FitReport]:
@@ -225,8 +208,6 @@ def fit_curves(
     ----------
     points : Points
     tolerance : FitTolerance
-    notes : tuple of str, optional
-        What was found out before.
     stops : bool, optional
         Whether the tool stops at corners, which are rounded otherwise.
 
@@ -236,10 +217,10 @@ def fit_curves(
         Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     count = len(points)
-    points, repeated = without_repetitions(points, tolerance.position)
+    points = without_repetitions(points, tolerance.position)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
-    points, filled = fill_gaps(points)
+    points = fill_gaps(points)
     corners = find_corners(points, scatter, tolerance.at_corners)
     for corner in () if stops else corners:
         degrees = np.rad2deg(corner.angle)
@@ -260,10 +241,12 @@ def fit_curves(
             blend = _blend_between(curves[i], curves[i + 1], corner, tolerance)
             curves[i] = replace(curves[i], blend=blend)
         found.append(_report_corner(points, corner, starts[i + 1], blend))
-    sigmas = [start + curve.sigma for start, curve in zip(starts, curves, strict=False)]
+    sigmas = [
+        start + curve.fit.sigma for start, curve in zip(starts, curves, strict=False)
+    ]
     along = np.maximum.accumulate(np.concatenate(sigmas))
-    distances = np.concatenate([curve.distances for curve in curves])
-    angles = np.concatenate([curve.angles for curve in curves])
+    distances = np.concatenate([curve.fit.position_errors for curve in curves])
+    angles = np.concatenate([curve.fit.turning_errors for curve in curves])
     report = FitReport(
         source=points.source,
         points=count,
@@ -275,7 +258,7 @@ def fit_curves(
         orientation_tolerance=tolerance.orientation,
         intervals=sum(len(curve.fit.breaks) - 1 for curve in curves),
         corners=tuple(found),
-        told=(*notes, *repeated, *filled, *[str(scatter)] * (scatter.deviation > 0.0)),
+        told=(*points.notes, *[str(scatter)] * (scatter.deviation > 0.0)),
         doubt=note,
         profile=_profile(along, distances, angles),
     )
@@ -299,7 +282,7 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
 
 
 def cut_at_corners(
-    points: Points, notes: tuple[str, ...] = (), *, stops: bool = False
+    points: Points, *, stops: bool = False
 ) -> tuple[tuple[Points, ...], FitReport]:
     """Return the parts of points through which one curve each is to go, and what is said of them.
 
@@ -308,8 +291,6 @@ def cut_at_corners(
     Parameters
     ----------
     points : Points
-    notes : tuple of str, optional
-        What was found out before.
     stops : bool, optional
         Whether the tool stops at corners, which are then the first and last points of parts. All points are one part
         otherwise.
@@ -344,7 +325,7 @@ def cut_at_corners(
             _report_corner(points, corner, distances[corner.index], 0.0)
             for corner in corners
         ),
-        told=notes,
+        told=points.notes,
         doubt=plausibility_note(points),
     )
     parts = (points.only(slice(first, last + 1)) for first, last in pairwise(cuts))

@@ -76,7 +76,35 @@ class Fit:
         turning = self.turning_errors / tolerance.orientation
         return np.maximum(self.position_errors / tolerance.position, turning)
 
-    def worst(self, tolerance: FitTolerance) -> Array:
+    def only(self, rows: slice) -> Fit:
+        """Return the fit with the errors of some of the points."""
+        return replace(
+            self,
+            sigma=self.sigma[rows],
+            position_errors=self.position_errors[rows],
+            turning_errors=self.turning_errors[rows],
+        )
+
+    def over_length(self, dimension: int) -> Fit:
+        """Return the fit over a sigma that ends with the length of its curve, of this many position rows."""
+        from scipy.integrate import simpson
+        from scipy.interpolate import BSpline
+
+        fine = spread(self.breaks, 32)
+        speed = np.linalg.norm(self.spline(fine, nu=1)[:, :dimension], axis=1)
+        scale = float(simpson(speed, x=fine)) / self.breaks[-1]
+        return replace(
+            self,
+            spline=BSpline(scale * self.spline.t, self.spline.c, DEGREE),
+            breaks=scale * self.breaks,
+            sigma=scale * self.sigma,
+        )
+
+    def worst(self, tolerance: FitTolerance) -> float:
+        """Return the largest of `ratios`."""
+        return float(self.ratios(tolerance).max())
+
+    def worst_between_knots(self, tolerance: FitTolerance) -> Array:
         """Return the largest of `ratios` in every interval, (N,)."""
         worst = np.zeros(len(self.breaks) - 1)
         interval = np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
@@ -206,7 +234,9 @@ def _block(position: Array, deviation: float) -> int:
 
 
 def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
-    """Return a curve within the tolerance of points, or the one that is nearest to it.
+    """Return a curve within the tolerance of points, with few knots, or the one that is nearest to it.
+
+    Knots are found for some of the points if there are many, and are then added for all of them if needed.
 
     Parameters
     ----------
@@ -215,15 +245,6 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
     tolerance : FitTolerance
     scatter : Scatter
         Of the points.
-    """
-    fit = _find_fit(points, tolerance, scatter)
-    return _over_length(fit, points.dimension)
-
-
-def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
-    """Return a curve within the tolerance, with few knots, or the one that is nearest to it.
-
-    Knots are found for some of the points if there are many, and are then added for all of them if needed.
     """
     lengths = lengths_along(points.position, scatter.deviation)
     fitter = _Fitter(points, lengths, tolerance)
@@ -236,37 +257,23 @@ def _find_fit(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
     for least in _least_points(tolerance, scatter):
         rough = _Fitter(points.only(some), lengths[some], _scale(tolerance, share))
         fit = _add_knots(rough, lengths[[0, -1]], least)
-        worst = float(fit.ratios(tolerance).max())
+        worst = fit.worst(tolerance)
         if worst <= 1.0:
             aim = _scale(tolerance, max(worst, share))
             rough = replace(rough, tolerance=aim)
             fit = _remove_knots(rough, fit)
         fit = _add_knots(fitter, fit.breaks, least)
-        if fit.ratios(tolerance).max() <= 1.0:
+        if fit.worst(tolerance) <= 1.0:
             return fit
         fits.append(fit)
     if least == 1 and len(points) <= 2_000:
         return fitter.interpolate()
-    return min(fits, key=lambda fit: float(fit.ratios(tolerance).max()))
+    return min(fits, key=lambda fit: fit.worst(tolerance))
 
 
 def _scale(tolerance: FitTolerance, share: float) -> FitTolerance:
     """Return a part of the tolerance of positions."""
     return tolerance.model_copy(update={"position": share * tolerance.position})
-
-
-def _over_length(fit: Fit, dimension: int) -> Fit:
-    """Return the fit over a sigma that ends with the length of its curve."""
-    from scipy.integrate import simpson
-    from scipy.interpolate import BSpline
-
-    fine = spread(fit.breaks, 32)
-    speed = np.linalg.norm(fit.spline(fine, nu=1)[:, :dimension], axis=1)
-    scale = float(simpson(speed, x=fine)) / fit.breaks[-1]
-    spline = BSpline(scale * fit.spline.t, fit.spline.c, DEGREE)
-    return replace(
-        fit, spline=spline, breaks=scale * fit.breaks, sigma=scale * fit.sigma
-    )
 
 
 def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
@@ -293,7 +300,7 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
         fit = fitter.fit(breaks)
         firsts = np.searchsorted(lengths, breaks)
         firsts[-1] = len(lengths)
-        bad = fit.worst(fitter.tolerance) > 1.0
+        bad = fit.worst_between_knots(fitter.tolerance) > 1.0
         has_points = np.diff(firsts) >= 2 * least
         stuck = np.pad(bad & ~has_points, 1)
         halved = (bad | stuck[:-2] | stuck[2:]) & has_points
@@ -317,7 +324,7 @@ def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
     """Take knots away, many at a time, as long as all points stay within the tolerance."""
     needed = np.empty(0)
     while True:
-        worst = fit.worst(fitter.tolerance)
+        worst = fit.worst_between_knots(fitter.tolerance)
         beside = np.maximum(worst[:-1], worst[1:])
         beside[np.isin(fit.breaks[1:-1], needed)] = np.inf
         # No two neighbours at once: of every pair the one that has more of the tolerance to spare.
@@ -328,7 +335,7 @@ def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
             return fit
         while removed.size:
             trial = fitter.fit(np.setdiff1d(fit.breaks, removed))
-            bad = np.pad(trial.worst(fitter.tolerance) > 1.0, 1)
+            bad = np.pad(trial.worst_between_knots(fitter.tolerance) > 1.0, 1)
             if not bad.any():
                 fit = trial
                 break

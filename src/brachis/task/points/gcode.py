@@ -20,7 +20,7 @@ import numpy as np
 from brachis.common.words import write_count
 from brachis.errors import TaskError
 from brachis.task.fields import POSITION
-from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
+from brachis.task.points.points import Array, Points, Rows
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(
@@ -95,8 +95,8 @@ class _Machine:
         return TaskError(problem, found=found, allowed=allowed, where=where, hint=hint)
 
 
-def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
-    """Return the points of a program, and notes on what was skipped.
+def read_gcode(text: str, rows: Rows, source: str) -> Points:
+    """Return the points of a program, with notes on what was skipped.
 
     Parameters
     ----------
@@ -142,13 +142,6 @@ def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
     moves, speeds, lines = zip(*machine.moves, strict=True)
     places = np.concatenate(moves)
     speed = np.repeat(speeds, counts)
-    points = Points(
-        places[:, chosen],
-        places[:, :0],
-        speed if np.any(np.isfinite(speed)) else None,
-        np.repeat(lines, counts),
-        source,
-    )
     notes = ["G-code"]
     if not machine.unit_stated:
         notes.append(
@@ -156,7 +149,14 @@ def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
         )
     if machine.skipped:
         notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
-    return points, tuple(notes)
+    return Points(
+        places[:, chosen],
+        places[:, :0],
+        speed if np.any(np.isfinite(speed)) else None,
+        np.repeat(lines, counts),
+        source,
+        notes=tuple(notes),
+    )
 
 
 def _obey(machine: _Machine, code: str) -> None:

@@ -40,6 +40,8 @@ class Points:
         File or argument, for messages.
     row : str
         What `rows` counts: ``line`` or ``row``.
+    notes : tuple of str
+        What was found out about the points.
     """
 
     position: Array
@@ -48,6 +50,7 @@ class Points:
     rows: Indices
     source: str
     row: str = "line"
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of points, n."""
@@ -67,11 +70,6 @@ class Points:
     def columns(self) -> Array:
         """Position and turning side by side, (n, p + q)."""
         return np.hstack([self.position, self.turning])
-
-    @property
-    def extent(self) -> float:
-        """Diagonal of the box around all positions, m."""
-        return float(np.linalg.norm(np.ptp(self.position, axis=0)))
 
     @property
     def steps(self) -> Array:
@@ -102,10 +100,6 @@ class Points:
         details.setdefault("found", self.describe(i))
         details["where"] = f"{self.source}: {self.name_row(i)}"
         return TaskError(problem, **details)
-
-
-PointsAndNotes = tuple[Points, tuple[str, ...]]
-"""Points, and notes on what was found out about them."""
 
 
 def steps_of(position: Array) -> Array:

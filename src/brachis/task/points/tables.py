@@ -19,7 +19,7 @@ from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.fields import LARGEST, POSITION
 from brachis.task.point_data import PointFile
-from brachis.task.points.points import Array, Indices, Points, PointsAndNotes, Rows
+from brachis.task.points.points import Array, Indices, Points, Rows
 from brachis.task.points.units import (
     CONVENTIONS,
     UNITS,
@@ -330,10 +330,8 @@ def _factor_of(
     return factors[unit]
 
 
-def read_points(
-    text: str, rows: Rows, settings: PointFile, source: str
-) -> PointsAndNotes:
-    """Return the points of a table in SI units, and notes on how it was read.
+def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Points:
+    """Return the points of a table in SI units, with notes on how it was read.
 
     Parameters
     ----------
@@ -404,7 +402,7 @@ def read_points(
                 found=f"{speed[i]:g} m/s",
                 allowed="more than 0",
             )
-    return points, tuple(notes)
+    return replace(points, notes=tuple(notes))
 
 
 def _check_lengths(points: Points, name: str) -> None:
