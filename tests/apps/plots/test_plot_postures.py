@@ -156,10 +156,10 @@ def test_no_legend_entry_for_redundant_joints_where_there_are_none(line_trajecto
         text.get_text()
         for text in plot_postures(line_trajectory).axes[0].get_legend().get_texts()
     ]
-    assert labels == ["start", "end", "tool path", "redundant"]
+    assert labels == ["tool path", "start", "end", "redundant"]
     without = dataclasses.replace(line_trajectory, redundant_joints=())
     labels = [
         text.get_text()
         for text in plot_postures(without).axes[0].get_legend().get_texts()
     ]
-    assert labels == ["start", "end", "tool path"]
+    assert labels == ["tool path", "start", "end"]

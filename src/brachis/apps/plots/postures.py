@@ -97,7 +97,7 @@ def plot_postures(trajectory: Trajectory) -> Figure:
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
     place = figure.add_gridspec()[0]
     ax = draw_postures(figure, trajectory, dense_samples(trajectory), place)
-    legend_postures(ax, trajectory, style.COLUMN_WIDTH - 5.0)
+    style.legend_above(ax, style.COLUMN_WIDTH - 5.0)
     return figure
 
 
@@ -112,11 +112,15 @@ def draw_postures(
     tool = samples.tool_position[:, view]
     times = np.linspace(0.0, trajectory.t_end, len(_SHADES))
     postures = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
+    ax.plot(*tool.T, label="tool path", zorder=20.0, gid="tool path", **_PATH)
+    last = len(_SHADES) - 1
+    labels = {0: "start", last: "end"}
     for k, (bones, shade) in enumerate(zip(postures, _SHADES, strict=True)):
         ax.plot(
             *bones.T,
             color=shade,
-            linewidth=2.2 if k in {0, len(_SHADES) - 1} else 1.0,
+            label=labels.get(k),
+            linewidth=2.2 if k in labels else 1.0,
             solid_capstyle="round",
             solid_joinstyle="round",
             zorder=2.0 + k,
@@ -126,13 +130,13 @@ def draw_postures(
             is_redundant = name in trajectory.redundant_joints
             ax.plot(
                 *bones[2 * joint + 2, :, None],
+                label="redundant" if is_redundant and k == last else None,
                 marker="o" if trajectory.robot.revolute[joint] else "s",
                 markeredgecolor=shade,
                 markerfacecolor=_REDUNDANT if is_redundant else "white",
                 zorder=2.5 + k,
                 **_JOINT,
             )
-    ax.plot(*tool.T, zorder=20.0, gid="tool path", **_PATH)
     ax.plot(*tool[-1:].T, "o", color=_PATH["color"], markersize=3.0, zorder=21.0)
     ground = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
     base = postures[0, :1].T
@@ -144,26 +148,6 @@ def draw_postures(
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.06)
     return ax
-
-
-def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
-    """Put the legend above the axes; `width` is its room, mm."""
-    from matplotlib.lines import Line2D
-
-    looks: dict[str, dict[str, Any]] = {
-        "start": {"color": _SHADES[0], "linewidth": 2.2},
-        "end": {"color": _SHADES[-1], "linewidth": 2.2},
-        "tool path": _PATH,
-    }
-    if trajectory.redundant_joints:
-        looks["redundant"] = {
-            "marker": "o",
-            "markerfacecolor": _REDUNDANT,
-            "markeredgecolor": _SHADES[-1],
-            **_JOINT,
-        }
-    lines = {name: Line2D([], [], **look) for name, look in looks.items()}
-    style.legend_above(ax, width, lines)
 
 
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
