@@ -69,13 +69,13 @@ def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
         ["path.0.line.length", "1", "2", "3"],
     ]
     assert "1 failed with PathError, for example: out of reach" in lines
-    assert "planning took 2 min 00 s in all processes together" in lines
+    assert "planning took 0:02:00 in all processes together" in lines
     assert [line for line in lines if line.startswith("wrote")] == [
         f"wrote lengths/{name}" for name in ("table.parquet", "table.csv", "sweep.png")
     ]
     assert (tmp_path / "lengths/sweep.png").read_bytes().startswith(b"\x89PNG")
     assert "brachis: 0 of 4 plans\n" in done.err
-    assert "4 of 4 plans, 1 failed; 0 s left" in done.err
+    assert "4 of 4 plans, 1 failed; 0:00:00 left" in done.err
 
 
 def test_a_sweep_as_json(run, sweep_file, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -311,7 +312,6 @@ def sweep(
 def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
     from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
-    from brachis.apps.sweeps.run import write_duration
 
     found = result.summary()
     counts = ", ".join(
@@ -333,9 +333,8 @@ def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
         print_lines(
             f"{cause['plans']} failed with {error}, for example: {cause['message']}"
         )
-    print_lines(
-        f"planning took {write_duration(found['wall_time_s'])} in all processes together"
-    )
+    wall_time = timedelta(seconds=round(found["wall_time_s"]))
+    print_lines(f"planning took {wall_time} in all processes together")
     print_lines(*(f"wrote {name}" for name in files))
 
 
