@@ -331,7 +331,7 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     from brachis.robot.joints import UNITS, shown_unit
     from brachis.robot.limits import MAGNITUDES
 
-    geometry = brachis.ik.ChainGeometry.of(robot)
+    chain = robot.chain
     limits = robot.limits
     columns = {"range": "position"}
     columns |= {kind.replace("_", " "): kind for kind in MAGNITUDES}
@@ -339,10 +339,10 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     for i, (name, unit) in enumerate(
         zip(robot.joint_names, robot.position_units, strict=True)
     ):
-        axis = geometry.axes[i].round(6) + 0.0
+        axis = chain.axes[i].round(6) + 0.0
         row = {
             "joint": name,
-            "type": "revolute" if geometry.revolute[i] else "prismatic",
+            "type": "revolute" if chain.revolute[i] else "prismatic",
             "axis at zero": " ".join(f"{component:.4g}" for component in axis),
         }
         for key, kind in columns.items():

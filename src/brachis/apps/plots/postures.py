@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
+from brachis.common import tolerances
 from brachis.robot import Robot, task_map_of
 from brachis.trajectory import Samples, Trajectory, of_motion
 
@@ -38,30 +39,24 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     return bones
 
 
-def drawing_plane(
-    robot: Robot, q: np.ndarray, axes: Sequence[int]
-) -> tuple[int, int] | None:
+def drawing_plane(robot: Robot, axes: Sequence[int]) -> tuple[int, int] | None:
     """World axes (0, 1, 2) of the plane in which a planar chain moves; None for other chains.
 
     Parameters
     ----------
     robot : Robot
-    q : (n,) ndarray
-        Any posture: joint axes that are parallel in one are so in all.
     axes : sequence of int
         World axes of the task space's position rows. Two of them fix the plane; one leaves a choice.
     """
-    data = robot.model.createData()
-    jacobian = pin.computeJointJacobians(robot.model, data, q)
-    columns = np.reshape(jacobian, (6, robot.n))  # it is (6,) for one joint
-    turning = columns[3:, robot.revolute]
-    sliding = columns[:3, ~robot.revolute]
+    chain = robot.chain
+    sizes = np.abs(chain.axes)
+    # How far a joint turns about another direction than a world axis, or slides along it.
+    tilts = np.where(chain.revolute[:, None], 1.0 - sizes, sizes)
+    is_normal = np.all(tilts < tolerances.LENGTH, axis=0)
     for normal in (2, 1, 0):
-        in_plane = [axis for axis in range(3) if axis != normal]
-        turns_about = np.abs(turning[in_plane]).max(initial=0.0) < 1e-6
-        slides_in = np.abs(sliding[normal]).max(initial=0.0) < 1e-6
-        if normal not in axes[:2] and turns_about and slides_in:
-            return in_plane[0], in_plane[1]
+        if normal not in axes[:2] and is_normal[normal]:
+            first, second = (axis for axis in range(3) if axis != normal)
+            return first, second
     return None
 
 
@@ -153,7 +148,7 @@ def draw_postures(
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
     """World axes of the plane in which a motion is drawn; None if it is drawn in space."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-    return drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes)
+    return drawing_plane(trajectory.robot, task_map.axes)
 
 
 def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:

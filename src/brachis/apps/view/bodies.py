@@ -270,7 +270,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
 
 
 def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
-    """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
+    """Draw every joint along its axis, the link from it to the next one, and what a prismatic joint slides on."""
     import trimesh
 
     robot = trajectory.robot
@@ -280,36 +280,28 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
     ranges = robot.limits.both_ways("position")
     used = trajectory.q.min(axis=0), trajectory.q.max(axis=0)
     ranges = np.where(np.isfinite(ranges), ranges, used)
-    drawn: Meshes = {}
-
-    def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
-        """Add a mesh in the colour of its kind to what a joint moves."""
-        drawn.setdefault(joint, []).append(with_colour(mesh, _COLOURS[kind]))
-
-    def draw_rod(
-        joint: int, first: np.ndarray, last: np.ndarray, thick: float, kind: str
-    ) -> None:
-        """Draw a cylinder between two points if they are apart; `thick` as a multiple of the radius."""
-        if np.linalg.norm(last - first) >= 1e-9:
-            ends = [first, last]
-            rod = trimesh.creation.cylinder(thick * radius, segment=ends, sections=24)
-            draw(joint, rod, kind)
-
     chain = Chain.of(model)
+    rods = []  # moving joint, two ends, thickness as a multiple of the radius, colour
     for joint, axis in enumerate(chain.axes):
         origin = chain.placements[joint, :3, 3]
-        draw_rod(joint, begin, origin, 1.0, "bone")
-        if chain.revolute[joint]:
-            half = 2.0 * radius * axis
-            draw_rod(joint + 1, -half, half, 1.7, "joint")
-        else:
+        half = 2.0 * radius * axis
+        rods.append((joint, begin, origin, 1.0, "bone"))
+        rods.append((joint + 1, -half, half, 1.7, "joint"))
+        if not chain.revolute[joint]:
             direction = chain.placements[joint, :3, :3] @ axis
             low, high = origin + np.outer(ranges[:, joint], direction)
-            draw_rod(joint, low, high, 0.5, "axis")
-            draw(joint + 1, trimesh.creation.box((3.0 * radius,) * 3), "joint")
+            rods.append((joint, low, high, 0.5, "axis"))
         begin = np.zeros(3)
     tool = model.frames[robot.frame_id]
-    draw_rod(tool.parentJoint, begin, tool.placement.translation, 1.0, "bone")
+    rods.append((tool.parentJoint, begin, tool.placement.translation, 1.0, "bone"))
+    drawn: Meshes = {}
+    for joint, first, last, thickness, kind in rods:
+        if np.linalg.norm(last - first) >= 1e-9:
+            ends = [first, last]
+            rod = trimesh.creation.cylinder(
+                thickness * radius, segment=ends, sections=24
+            )
+            drawn.setdefault(joint, []).append(with_colour(rod, _COLOURS[kind]))
     return drawn
 
 
