@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.cells import cell_len
@@ -180,6 +180,7 @@ def print_json(data: Mapping[str, object]) -> None:
 
 def print_failure(message: str, code: int, *, as_json: bool) -> int:
     """Print what went wrong on standard error, and with `as_json` also as JSON on standard output; return the code."""
+    print_error(message)
     if as_json:
         failure = {
             "verified": False,
@@ -188,9 +189,7 @@ def print_failure(message: str, code: int, *, as_json: bool) -> int:
             "t_end": None,
             "exit_code": code,
         }
-        with suppress(OSError):  # `StandardOutput.finish` says so
-            print_json(failure)
-    print_error(message)
+        print_json(failure)
     return code
 
 
@@ -207,55 +206,15 @@ def print_usage_error(error: Any, *, as_json: bool) -> int:
     return print_failure(message, InputError.exit_code, as_json=as_json)
 
 
-class StandardOutput:
-    """Standard output that remembers why it could not be written.
+def report_closed_output(error: OSError) -> None:
+    """Say why standard output cannot be written, unless a pipe was closed.
 
-    Parameters
-    ----------
-    stream : text stream
+    What is left of it goes to the null device, so that the interpreter does not try again when it ends.
     """
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self.failure: OSError | None = None
-
-    def __getattr__(self, name: str) -> Any:
-        """Pass everything else on."""
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write as the stream does."""
-        with self._remember_failure():
-            return self._stream.write(text)
-
-    def flush(self) -> None:
-        """Write out what the stream still holds."""
-        with self._remember_failure():
-            self._stream.flush()
-
-    @contextmanager
-    def _remember_failure(self) -> Iterator[None]:
-        """Keep the error that ends the block."""
-        try:
-            yield
-        except OSError as error:
-            self.failure = error
-            raise
-
-    def finish(self) -> bool:
-        """Write out the rest; False if something could not be written, which is printed unless a pipe was closed.
-
-        The rest goes to the null device then, so that the interpreter does not try again when it ends.
-        """
-        with suppress(OSError):
-            self.flush()
-        if self.failure is None:
-            return True
-        with suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
-        if not isinstance(self.failure, BrokenPipeError):
-            print_error(f"standard output cannot be written: {self.failure.strerror}")
-        return False
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if not isinstance(error, BrokenPipeError):
+        print_error(f"standard output cannot be written: {error.strerror}")
 
 
 def open_streams() -> None:
