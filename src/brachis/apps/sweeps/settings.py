@@ -102,13 +102,11 @@ class Distribution(_OneKey):
         ((key, values),) = self.given.items()
         if key == "choice":
             return [values[i] for i in generator.integers(len(values), size=count)]
-        first, second = values
-        if key == "normal":
-            return generator.normal(first, second, count).tolist()
-        if key == "uniform":
-            return generator.uniform(first, second, count).tolist()
-        logarithms = generator.uniform(math.log(first), math.log(second), count)
-        return np.exp(logarithms).tolist()
+        if key == "log_uniform":
+            low, high = map(math.log, values)
+            return np.exp(generator.uniform(low, high, count)).tolist()
+        draw = generator.normal if key == "normal" else generator.uniform
+        return draw(*values, count).tolist()
 
 
 class RandomSettings(Model):

@@ -52,7 +52,8 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
                 super().stop()
 
     _check(host, port or 0)
-    logging.getLogger("websockets.server").addFilter(_is_of_a_page)
+    # Probes, such as HEAD, are refused without a word.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     first = FIRST_PORT if port is None else port  # viser takes the next free one
     with contextlib.redirect_stdout(io.StringIO()):
         return Server(host=host, port=first, label="brachis", verbose=False)
@@ -73,13 +74,6 @@ def is_local(host: str) -> bool:
     """Tell whether an address that was listened on is reached from this machine alone."""
     found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     return all(ipaddress.ip_address(each[4][0]).is_loopback for each in found)
-
-
-def _is_of_a_page(record: logging.LogRecord) -> bool:
-    """Whether a record of the server is about a page's request; probes, such as HEAD, are refused without a word."""
-    from websockets.exceptions import InvalidMessage
-
-    return record.exc_info is None or not isinstance(record.exc_info[1], InvalidMessage)
 
 
 def _check(host: str, port: int) -> None:
