@@ -54,7 +54,7 @@ def sweep_file(tmp_path, write, task, monkeypatch):
 
 def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = run("sweep", sweep_file)
+    done = run("sweep", sweep_file, "--verbose")
     assert done.code == 0
     lines = done.out.splitlines()
     assert lines[0].strip() == "sweep: 4 plans, 3 verified, 0 unverified, 1 failed"
@@ -74,7 +74,7 @@ def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
         f"wrote lengths/{name}" for name in ("table.parquet", "table.csv", "sweep.png")
     ]
     assert (tmp_path / "lengths/sweep.png").read_bytes().startswith(b"\x89PNG")
-    assert "brachis: 0 of 4 plans\n" in done.err
+    assert " s: 0 of 4 plans\n" in done.err
     assert "4 of 4 plans, 1 failed; 0:00:00 left" in done.err
 
 

@@ -345,4 +345,4 @@ def urdf_of(given: Path) -> Path:
     UnknownNameError
         There is no file of this name, but a robot of a name like it.
     """
-    return Path(brachis.robots.locate(str(given)))
+    return Path(brachis.robots.locate(str(given)))  # type: ignore[arg-type]

@@ -17,7 +17,6 @@ from typing import Any
 
 import brachis
 from brachis.apps.cli.output import (
-    WRITING,
     json_text,
     print_error,
     print_json,
@@ -295,7 +294,7 @@ def finish(
         files[data_file] = partial(write_text, json_text(data))
         drawings = {own(name): partial(draw, make) for name, make in figures.items()}
         stale = {*names, *map(_unverified, names)} - {*files}
-        with show_progress(WRITING) as listener:
+        with show_progress() as listener:
             data["files"], failures = write_files(
                 out, files, drawings, listener=listener, stale=stale
             )

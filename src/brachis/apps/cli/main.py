@@ -100,7 +100,7 @@ def _run(*, as_json: bool) -> int | str | None:
         return print_failure(str(error), error.exit_code, as_json=as_json)
     except _UsageError as error:
         return print_usage_error(error, as_json=as_json)
-    except Exception as error:  # noqa: BLE001  (reported, not raised)
+    except Exception as error:
         if isinstance(error, OSError) and error.filename is None:
             raise
         if get_verbosity() is Verbosity.VERBOSE:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +27,6 @@ if TYPE_CHECKING:
 
 _BEGAN = time.perf_counter()
 """When the command line was loaded, s, so that all steps of a command are counted from one instant."""
-
-WRITING = "writing the results"
-"""First words of the progress while files are written."""
 
 
 def print_table(
@@ -271,44 +267,22 @@ def show_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def show_progress(
-    first: str = "reading the task", *, in_logs: bool = False
-) -> Iterator[Callable[[str], None]]:
+def show_progress() -> Iterator[Callable[[str], None]]:
     """Give a listener that shows what is done, and that notices Ctrl-C.
 
     On a terminal it shows the present step; a verbose command prints every step with its time since the command line
-    was loaded. Otherwise nothing is shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``;
-    texts without a count are not shown then.
-
-    Parameters
-    ----------
-    first : str, optional
-        What a terminal shows before the first step.
-    in_logs : bool, optional
+    was loaded.
     """
-    console = Console(stderr=True)
     verbosity = get_verbosity()
-    last_step = -1
-    with ExitStack() as stack:
-        status = None
-        if verbosity is Verbosity.NORMAL and console.is_terminal:
-            status = stack.enter_context(console.status(first))
+    console = Console(stderr=True, quiet=verbosity is not Verbosity.NORMAL)
+    with console.status("working") as status:
 
         def show(text: str) -> None:
             """Show what is done, as the verbosity asks for."""
-            nonlocal last_step
             interrupts.check()
-            if status is not None:
-                status.update(Text(text))  # a name may hold brackets
-            elif verbosity is Verbosity.VERBOSE:
+            if verbosity is Verbosity.VERBOSE:
                 print_error(f"{time.perf_counter() - _BEGAN:.2f} s: {text}")
-            elif in_logs and verbosity is Verbosity.NORMAL:
-                done = re.match(r"(\d+) of (\d+)", text)
-                if done is None:
-                    return
-                step = int(done[1]) * 20 // max(1, int(done[2]))
-                if step != last_step:
-                    print_error(text)
-                last_step = step
+            else:
+                status.update(Text(text))  # a name may hold brackets
 
         yield show

@@ -284,7 +284,7 @@ def sweep(
     """
     from brachis.apps.sweeps.plans import VERIFIED
 
-    with end_cleanly(), show_progress(in_logs=True) as listener:
+    with end_cleanly(), show_progress() as listener:
         result = brachis.sweep(
             source,
             out,

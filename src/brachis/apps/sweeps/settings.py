@@ -102,11 +102,12 @@ class Distribution(_OneKey):
         ((key, values),) = self.given.items()
         if key == "choice":
             return [values[i] for i in generator.integers(len(values), size=count)]
+        first, second = values
         if key == "log_uniform":
-            low, high = map(math.log, values)
-            return np.exp(generator.uniform(low, high, count)).tolist()
+            logarithms = generator.uniform(math.log(first), math.log(second), count)
+            return np.exp(logarithms).tolist()
         draw = generator.normal if key == "normal" else generator.uniform
-        return draw(*values, count).tolist()
+        return draw(first, second, count).tolist()
 
 
 class RandomSettings(Model):

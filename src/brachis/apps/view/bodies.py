@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections import defaultdict
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -242,15 +243,14 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
 
     robot = trajectory.robot
     shapes, unread = link_shapes(robot.urdf, Path(robot.source).absolute().parent)
-    links: Meshes = {}
+    links: Meshes = defaultdict(list)
     for name, meshes in shapes.items():
         frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.BODY)]
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
-        links.setdefault(int(frame.parentJoint), []).extend(meshes)
+        links[int(frame.parentJoint)] += meshes
     for joint, meshes in scene_meshes(trajectory).items():
-        coloured = [with_colour(mesh, _COLOURS["scene"]) for mesh in meshes]
-        links.setdefault(joint, []).extend(coloured)
+        links[joint] += [with_colour(mesh, _COLOURS["scene"]) for mesh in meshes]
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
     size = np.ptp(positions, axis=(0, 1)).max()
@@ -294,14 +294,14 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
         begin = np.zeros(3)
     tool = model.frames[robot.frame_id]
     rods.append((tool.parentJoint, begin, tool.placement.translation, 1.0, "bone"))
-    drawn: Meshes = {}
+    drawn: Meshes = defaultdict(list)
     for joint, first, last, thickness, kind in rods:
         if np.linalg.norm(last - first) >= 1e-9:
             ends = [first, last]
             rod = trimesh.creation.cylinder(
                 thickness * radius, segment=ends, sections=24
             )
-            drawn.setdefault(joint, []).append(with_colour(rod, _COLOURS[kind]))
+            drawn[joint].append(with_colour(rod, _COLOURS[kind]))
     return drawn
 
 
@@ -321,13 +321,13 @@ def scene_meshes(trajectory: Trajectory) -> Meshes:
     """Make the meshes of the bodies of a task's scene, without the robot's own, in the frames of their joints, m."""
     task = trajectory.task
     found = scene_of(trajectory.robot, task)
-    meshes: Meshes = {}
+    meshes: Meshes = defaultdict(list)
     if found is None:
         return meshes
     for number, solid in enumerate(found.solids[found.own :], found.own):
         mesh = _mesh_of(solid)
         mesh.apply_transform(found.placements[number])
-        meshes.setdefault(int(found.joints[number]), []).append(mesh)
+        meshes[int(found.joints[number])].append(mesh)
     return meshes
 
 
