@@ -117,16 +117,11 @@ def _widths(least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
     """Print the checks, one a row."""
-    from brachis.verify import POSITION_SCALE
-
     verdict = "passed" if verification.passed else "FAILED"
     rows = []
-    scales = []
     for check in verification.checks:
         outcome = "ok" if check.passed else "FAILED"
-        if check.remark == POSITION_SCALE:
-            scales.append(f"{check.name}: {check.remark}")
-        elif check.remark:
+        if check.remark:
             outcome += f" ({check.remark})"
         time_text = "" if check.time is None else f"{check.time:.4f}"
         figures = check.figures(degrees=degrees)
@@ -137,7 +132,6 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
         rows,
         numbers=("worst", "allowed", "time [s]"),
     )
-    print_lines(*scales)
     print_lines(*(f"{each.name}: {each.in_words()}" for each in verification.margins))
 
 

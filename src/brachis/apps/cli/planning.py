@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -311,35 +310,20 @@ def sweep(
 
 def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
-    from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
+    from brachis.common.summary import show_value
 
-    found = result.summary()
-    counts = ", ".join(
-        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
-    )
-    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
-    if "best" in found:
-        shown = ("best", "median", "worst")
-        headings = {"t_end_s": "t_end [s]", "plan": "plan"}
-        headings |= {key: key for key in result.keys}
-        rows = [
-            (heading, *(_write_value(found[name][key]) for name in shown))
-            for key, heading in headings.items()
-        ]
-        print_table(title, ("", *shown), rows, numbers=shown)
-    else:
-        print_lines(title)
-    for error, cause in found["failures"].items():
+    summary = result.summary()
+    failures = summary.pop("failures")
+    rows = []
+    for name, value in summary.items():
+        if isinstance(value, dict):
+            entries = (f"{key}: {show_value(entry)}" for key, entry in value.items())
+            rows.append((name, ", ".join(entries)))
+        else:
+            rows.append((name, show_value(value)))
+    print_table("sweep", ("", ""), rows)
+    for error, cause in failures.items():
         print_lines(
             f"{cause['plans']} failed with {error}, for example: {cause['message']}"
         )
-    wall_time = timedelta(seconds=round(found["wall_time_s"]))
-    print_lines(f"planning took {wall_time} in all processes together")
     print_lines(*(f"wrote {name}" for name in files))
-
-
-def _write_value(value: object) -> str:
-    """Write a cell of the table: nothing for None."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return "" if value is None else str(value)

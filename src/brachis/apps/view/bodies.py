@@ -77,18 +77,18 @@ def link_shapes(
     materials = tree.robot.findall("material")
     for visual in tree.robot.iterfind("link/visual"):
         name = visual.getparent().get("name")
-        meshes = list(visual.iter("mesh"))
-        files = [str(mesh.get("filename")) for mesh in meshes]
-        paths = [path for file in files if (path := mesh_file(file, folder))]
-        if len(paths) < len(files):
-            absent += [file for file in files if not mesh_file(file, folder)]
-            continue
+        mesh = visual.find("geometry/mesh")
         try:
-            for mesh, path in zip(meshes, paths, strict=True):
+            if mesh is not None:
+                file = str(mesh.get("filename"))
+                path = mesh_file(file, folder)
+                if path is None:
+                    absent.append(file)
+                    continue
                 room -= _check_size(path, room)
                 mesh.set("filename", str(path))
-            found = _meshes(name, visual, materials)
-            shapes.setdefault(name, []).extend(found)
+            meshes = _meshes(name, visual, materials)
+            shapes.setdefault(name, []).extend(meshes)
         except InputError as error:
             unread.append(f"{name}: {error}")
         except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
@@ -156,9 +156,9 @@ def _meshes(
             bare = trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual)
             found.append(_paint(bare))
     if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
-        file = next((mesh.get("filename") for mesh in visual.iter("mesh")), None)
         raise InputError(
-            "the mesh has no faces, or corners that are not finite", where=file
+            "the mesh has no faces, or corners that are not finite",
+            where=visual.xpath("string(geometry/mesh/@filename)"),
         )
     return found
 
