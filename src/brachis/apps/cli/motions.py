@@ -156,13 +156,13 @@ def plot(
 
     plots = brachis.plots
     check_names("figure", [kind], plots.PLOTS, "--kind")
-    beginning = BEGINNINGS[f".{check_suffix(out)}"]
+    check_suffix(out)
     result, trajectory = _load(result)
 
     write = partial(draw, partial(plots.PLOTS[kind], trajectory))
     with show_progress() as listener:
         listener(f"drawing {out}")
-        write_one(out, write, _inputs(result, trajectory), beginning)
+        write_one(out, write, _inputs(result, trajectory))
     print_lines(f"wrote {out}")
 
 
