@@ -31,24 +31,24 @@ from brachis.errors import BrachisError
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
 """Base class of Typer's errors for wrong options; Typer does not export it."""
 
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "robots": starting.list_robots,
-    "new": starting.new,
-    "plan": planning.plan,
-    "bottleneck": planning.bottleneck,
-    "verify": motions.verify,
-    "export": motions.export,
-    "plot": motions.plot,
-    "report": motions.report,
-    "view": motions.view,
-    "inspect": inspection.inspect,
-    "compose": starting.compose,
-    "import": recordings.import_,
-    "compare": recordings.compare,
-    "sweep": planning.sweep,
-    "schema": motions.schema,
-}
-"""Commands by name, in the order of the help."""
+_COMMANDS: tuple[Callable[..., None], ...] = (
+    starting.robots,
+    starting.new,
+    planning.plan,
+    planning.bottleneck,
+    motions.verify,
+    motions.export,
+    motions.plot,
+    motions.report,
+    motions.view,
+    inspection.inspect,
+    starting.compose,
+    recordings.import_,
+    recordings.compare,
+    planning.sweep,
+    motions.schema,
+)
+"""Commands in the order of the help; their names are those of the functions."""
 
 
 def _prepare(command: Callable[..., None]) -> Callable[..., None]:
@@ -68,7 +68,8 @@ def _prepare(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for _name, _command in _COMMANDS.items():
+for _command in _COMMANDS:
+    _name = _command.__name__.removesuffix("_")
     app.command(_name, cls=DocumentedCommand)(_prepare(_command))
 
 
