@@ -8,7 +8,6 @@ from __future__ import annotations
 import shutil
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -184,15 +183,12 @@ def write_text(text: str, path: Path) -> None:
 
 @contextmanager
 def end_cleanly() -> Iterator[None]:
-    """Let SIGTERM leave the block as an exception does, so that temporary files are removed; not in other threads."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
     before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+        signal.signal(signal.SIGTERM, before)
 
 
 _UNVERIFIED = {

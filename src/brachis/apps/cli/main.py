@@ -85,7 +85,7 @@ def main() -> None:
     sys.exit(code)
 
 
-def _run(*, as_json: bool) -> int | str | None:
+def _run(*, as_json: bool) -> int:
     """Run a command and return its exit code.
 
     Raises
@@ -95,8 +95,6 @@ def _run(*, as_json: bool) -> int | str | None:
     """
     try:
         return app(prog_name="brachis", standalone_mode=False) or 0
-    except SystemExit as stop:
-        return stop.code
     except BrachisError as error:
         return print_failure(str(error), error.exit_code, as_json=as_json)
     except _UsageError as error:
