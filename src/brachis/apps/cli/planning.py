@@ -125,35 +125,24 @@ def _plan_task(
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
-    from brachis.kinematics import CHART
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
     from brachis.search.stages import describe_coordinates
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
     trajectory = result.trajectory
-    named: dict[str, str] = {}
-    if trajectory.branch not in {"", CHART}:
-        named["branch"] = trajectory.branch
-        if trajectory.branch != result.family:
-            named["branch"] += f" ({result.family})"
     solves = write_count(len(candidate.reports), "solve")
     least_motion = result.least_motion
     rows = {
-        "end time t_E": f"{result.t_end:.4f} s",
+        **result.summary(),
         "redundant joints": describe_coordinates(trajectory),
-        **named,
+        "family": result.family,
         "start posture": write_posture(data, "start_posture", degrees=degrees),
         "end posture": write_posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
         "iterations": f"{data['iterations']} in {solves} (refined to {data['collocation_points']} collocation points)",
-        "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "least motion": "off" if least_motion is None else least_motion.status,
-        "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
-        "path error": f"{result.verification.path_error:.1e} m or rad",
-        "verified": "yes" if result.verified else "NO",
-        "timing": str(result.timing_gap or "no timing of this joint path is known"),
     }
     if candidate.time_scaled > 1.0:
         rows["end time lengthened by"] = (
