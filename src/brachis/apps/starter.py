@@ -21,6 +21,7 @@ import yaml
 from brachis import planner
 from brachis.common.deadline import Deadline
 from brachis.common.files import locate_urdf
+from brachis.common.progress import ignore
 from brachis.common.words import write_count
 from brachis.errors import InputError, PlanningError
 from brachis.ik.newton import Newton
@@ -371,7 +372,7 @@ def starter_task(
     >>> starter.text.splitlines()[2]
     'brachis: 1'
     """
-    tell = listener or (lambda _text: None)
+    tell = listener or ignore
     path = Path(urdf)
     text = read_file(path)
     if tool_frame is None:

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.apps.cli.output import WRITING, show_progress
+from brachis.apps.cli.output import show_progress
 from support.effort import QUICK
 
 from .conftest import SCARA
@@ -349,26 +349,6 @@ def test_progress_takes_names_with_brackets(monkeypatch, capfd):
     with show_progress() as listener:
         listener("looking at [/red]:x:")
     assert "[/red]:x:" in capfd.readouterr().err
-
-
-def test_progress_begins_with_the_words_of_its_work(monkeypatch, capfd):
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("TERM", "xterm")
-    with show_progress(WRITING):
-        pass
-    shown = capfd.readouterr().err
-    assert "writing the results" in shown
-    assert "reading the task" not in shown
-
-
-def test_logs_have_counts_alone(monkeypatch, capfd):
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
-    with show_progress(in_logs=True) as listener:
-        for text in ("opening", "0 of 40 plans", "1 of 40 plans", "40 of 40 plans"):
-            listener(text)
-        listener("drawing sweep.png")
-    shown = capfd.readouterr().err.splitlines()
-    assert shown == ["brachis: 0 of 40 plans", "brachis: 40 of 40 plans"]
 
 
 def test_endless_inputs_are_refused(endless, run, saved, tmp_path):

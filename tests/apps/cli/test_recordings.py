@@ -91,7 +91,7 @@ def test_compare(run, recorded, tmp_path):
     data = json.loads((out / "comparison.json").read_text())
     assert data["t_end_today"] == pytest.approx(trajectory.t_end)
     assert outcome.out.startswith(f"{100 * data['saved']:.1f} % faster: ")
-    assert "kept and verified" in outcome.out
+    assert "used by the recorded motion" in outcome.out
     assert {path.name for path in out.iterdir()} == {
         "today.npz",
         "result.npz",

@@ -148,7 +148,7 @@ SLIDE = {axis: ("prismatic", axis, "0.5 0 0.1") for axis in ("1 0 0", "0 1 0", "
 )
 def test_drawing_plane(chain, joints, axes, plane):
     robot = chain({f"j{i}": joint for i, joint in enumerate(joints)})
-    assert drawing_plane(robot, np.full(len(joints), 0.3), axes) == plane
+    assert drawing_plane(robot, axes) == plane
 
 
 def test_no_legend_entry_for_redundant_joints_where_there_are_none(line_trajectory):
@@ -156,10 +156,10 @@ def test_no_legend_entry_for_redundant_joints_where_there_are_none(line_trajecto
         text.get_text()
         for text in plot_postures(line_trajectory).axes[0].get_legend().get_texts()
     ]
-    assert labels == ["start", "end", "tool path", "redundant"]
+    assert labels == ["tool path", "start", "end", "redundant"]
     without = dataclasses.replace(line_trajectory, redundant_joints=())
     labels = [
         text.get_text()
         for text in plot_postures(without).axes[0].get_legend().get_texts()
     ]
-    assert labels == ["start", "end", "tool path"]
+    assert labels == ["tool path", "start", "end"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import shutil
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -17,7 +16,6 @@ from typing import Any
 
 import brachis
 from brachis.apps.cli.output import (
-    WRITING,
     json_text,
     print_error,
     print_json,
@@ -185,15 +183,12 @@ def write_text(text: str, path: Path) -> None:
 
 @contextmanager
 def end_cleanly() -> Iterator[None]:
-    """Let SIGTERM leave the block as an exception does, so that temporary files are removed; not in other threads."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
     before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+        signal.signal(signal.SIGTERM, before)
 
 
 _UNVERIFIED = {
@@ -295,7 +290,7 @@ def finish(
         files[data_file] = partial(write_text, json_text(data))
         drawings = {own(name): partial(draw, make) for name, make in figures.items()}
         stale = {*names, *map(_unverified, names)} - {*files}
-        with show_progress(WRITING) as listener:
+        with show_progress() as listener:
             data["files"], failures = write_files(
                 out, files, drawings, listener=listener, stale=stale
             )

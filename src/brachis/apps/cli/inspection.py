@@ -99,8 +99,7 @@ def inspect(
     else:
         refuse_options({"--set": changes, "--frame": frame}, "a URDF", "a task file")
         source = urdf_of(source)
-        base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
-        robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
+        robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [], remarks)
     if posture is None:
         refuse_options({"--frame": frame}, "no posture", "--posture")
     else:
@@ -331,7 +330,7 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     from brachis.robot.joints import UNITS, shown_unit
     from brachis.robot.limits import MAGNITUDES
 
-    geometry = brachis.ik.ChainGeometry.of(robot)
+    chain = robot.chain
     limits = robot.limits
     columns = {"range": "position"}
     columns |= {kind.replace("_", " "): kind for kind in MAGNITUDES}
@@ -339,10 +338,10 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     for i, (name, unit) in enumerate(
         zip(robot.joint_names, robot.position_units, strict=True)
     ):
-        axis = geometry.axes[i].round(6) + 0.0
+        axis = chain.axes[i].round(6) + 0.0
         row = {
             "joint": name,
-            "type": "revolute" if geometry.revolute[i] else "prismatic",
+            "type": "revolute" if chain.revolute[i] else "prismatic",
             "axis at zero": " ".join(f"{component:.4g}" for component in axis),
         }
         for key, kind in columns.items():
@@ -385,13 +384,34 @@ def _print_fit(fit: FitReport) -> None:
 
 
 def _robot_of_urdf(
-    path: Path, tool_frame: str, base_frame: str | None, lock: Sequence[str]
+    path: Path,
+    tool_frame: str | None,
+    base_frame: str | None,
+    lock: Sequence[str],
+    remarks: list[str],
 ) -> Robot:
-    """Make the robot of a URDF with the limits that the file states; a plan refuses missing ones, inspect does not."""
+    """Make the robot of a URDF with the limits that the file states; a plan refuses missing ones, inspect does not.
+
+    Without a tool frame the chain is the URDF's first limb; `remarks` say which other choices there are.
+    """
     import numpy as np
 
     from brachis.common.arguments import numbers
+    from brachis.robot.urdf import default_chain, read_file
 
+    if tool_frame is None:
+        limb = default_chain(read_file(path), str(path))
+        tool_frame = limb.tool
+        if limb.base and base_frame is None:
+            base_frame = limb.base
+            remarks.append(
+                f"base frame: {limb.base}, from which several limbs part; --base-frame names another one"
+            )
+        if len(limb.leaves) > 1:
+            remarks.append(
+                f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} part; "
+                "--tool-frame names another one"
+            )
     locked = {}
     for text in lock:
         name, equals, value = text.partition("=")
@@ -413,27 +433,6 @@ def _robot_of_urdf(
         stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
         magnitudes[kind] = np.array([np.inf if x is None else x for x in stated])
     return replace(robot, limits=robot.limits.with_magnitudes(**magnitudes))
-
-
-def _frames(
-    urdf: Path, base: str | None, tool: str | None, remarks: list[str]
-) -> tuple[str | None, str]:
-    """Take the ends of the URDF's first limb if no tool frame is given, and say which other choices there are."""
-    from brachis.robot.urdf import default_chain, read_file
-
-    if tool is not None:
-        return base, tool
-    limb = default_chain(read_file(urdf), str(urdf))
-    if limb.base and base is None:
-        remarks.append(
-            f"base frame: {limb.base}, from which several limbs part; --base-frame names another one"
-        )
-    if len(limb.leaves) > 1:
-        remarks.append(
-            f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} part; "
-            "--tool-frame names another one"
-        )
-    return base or limb.base, limb.tool
 
 
 def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:

@@ -9,21 +9,20 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable
-from contextlib import redirect_stdout
 from contextvars import copy_context
 from functools import wraps
 from importlib import import_module
-from typing import TextIO, cast
+from typing import cast
 
 import typer
 
 from brachis.apps.cli import inspection, motions, planning, recordings, starting
 from brachis.apps.cli.app import DocumentedCommand, Verbosity, app, get_verbosity
 from brachis.apps.cli.output import (
-    StandardOutput,
     open_streams,
     print_failure,
     print_usage_error,
+    report_closed_output,
     show_warnings,
 )
 from brachis.common import interrupts
@@ -32,24 +31,24 @@ from brachis.errors import BrachisError
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
 """Base class of Typer's errors for wrong options; Typer does not export it."""
 
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "robots": starting.list_robots,
-    "new": starting.new,
-    "plan": planning.plan,
-    "bottleneck": planning.bottleneck,
-    "verify": motions.verify,
-    "export": motions.export,
-    "plot": motions.plot,
-    "report": motions.report,
-    "view": motions.view,
-    "inspect": inspection.inspect,
-    "compose": starting.compose,
-    "import": recordings.import_,
-    "compare": recordings.compare,
-    "sweep": planning.sweep,
-    "schema": motions.schema,
-}
-"""Commands by name, in the order of the help."""
+_COMMANDS: tuple[Callable[..., None], ...] = (
+    starting.robots,
+    starting.new,
+    planning.plan,
+    planning.bottleneck,
+    motions.verify,
+    motions.export,
+    motions.plot,
+    motions.report,
+    motions.view,
+    inspection.inspect,
+    starting.compose,
+    recordings.import_,
+    recordings.compare,
+    planning.sweep,
+    motions.schema,
+)
+"""Commands in the order of the help; their names are those of the functions."""
 
 
 def _prepare(command: Callable[..., None]) -> Callable[..., None]:
@@ -69,32 +68,40 @@ def _prepare(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for _name, _command in _COMMANDS.items():
+for _command in _COMMANDS:
+    _name = _command.__name__.removesuffix("_")
     app.command(_name, cls=DocumentedCommand)(_prepare(_command))
 
 
 def main() -> None:
     """Run the command line; no exception leaves it as a traceback."""
     open_streams()
-    output = StandardOutput(sys.stdout)
-    with redirect_stdout(cast(TextIO, output)):
-        code = copy_context().run(_run, output, as_json="--json" in sys.argv[1:])
-    sys.exit(code if output.finish() else 1)
+    try:
+        code = copy_context().run(_run, as_json="--json" in sys.argv[1:])
+        sys.stdout.flush()
+    except OSError as error:
+        report_closed_output(error)
+        code = 1
+    sys.exit(code)
 
 
-def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
-    """Run a command and return its exit code."""
+def _run(*, as_json: bool) -> int:
+    """Run a command and return its exit code.
+
+    Raises
+    ------
+    OSError
+        Standard output cannot be written: errors of other files have their names.
+    """
     try:
         return app(prog_name="brachis", standalone_mode=False) or 0
-    except SystemExit as stop:
-        return stop.code
     except BrachisError as error:
         return print_failure(str(error), error.exit_code, as_json=as_json)
     except _UsageError as error:
         return print_usage_error(error, as_json=as_json)
-    except Exception as error:  # noqa: BLE001  (reported, not raised)
-        if error is output.failure:
-            return 1
+    except Exception as error:
+        if isinstance(error, OSError) and error.filename is None:
+            raise
         if get_verbosity() is Verbosity.VERBOSE:
             traceback.print_exc()
         message = (

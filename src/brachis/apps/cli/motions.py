@@ -31,7 +31,6 @@ from brachis.apps.cli.folder import (
     write_text,
 )
 from brachis.apps.cli.output import (
-    WRITING,
     json_text,
     print_error,
     print_json,
@@ -157,13 +156,13 @@ def plot(
 
     plots = brachis.plots
     check_names("figure", [kind], plots.PLOTS, "--kind")
-    beginning = BEGINNINGS[f".{check_suffix(out)}"]
+    check_suffix(out)
     result, trajectory = _load(result)
 
     write = partial(draw, partial(plots.PLOTS[kind], trajectory))
-    with show_progress(WRITING) as listener:
+    with show_progress() as listener:
         listener(f"drawing {out}")
-        write_one(out, write, _inputs(result, trajectory), beginning)
+        write_one(out, write, _inputs(result, trajectory))
     print_lines(f"wrote {out}")
 
 
@@ -196,7 +195,7 @@ def report(
     check_output(out, _inputs(result, trajectory), BEGINNINGS[".html"])
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
-    with show_progress(WRITING) as listener:
+    with show_progress() as listener:
         listener(f"drawing {out}")
         page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
         with end_cleanly():

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.cells import cell_len
@@ -28,9 +27,6 @@ if TYPE_CHECKING:
 
 _BEGAN = time.perf_counter()
 """When the command line was loaded, s, so that all steps of a command are counted from one instant."""
-
-WRITING = "writing the results"
-"""First words of the progress while files are written."""
 
 
 def print_table(
@@ -121,16 +117,11 @@ def _widths(least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
     """Print the checks, one a row."""
-    from brachis.verify import POSITION_SCALE
-
     verdict = "passed" if verification.passed else "FAILED"
     rows = []
-    scales = []
     for check in verification.checks:
         outcome = "ok" if check.passed else "FAILED"
-        if check.remark == POSITION_SCALE:
-            scales.append(f"{check.name}: {check.remark}")
-        elif check.remark:
+        if check.remark:
             outcome += f" ({check.remark})"
         time_text = "" if check.time is None else f"{check.time:.4f}"
         figures = check.figures(degrees=degrees)
@@ -141,7 +132,6 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
         rows,
         numbers=("worst", "allowed", "time [s]"),
     )
-    print_lines(*scales)
     print_lines(*(f"{each.name}: {each.in_words()}" for each in verification.margins))
 
 
@@ -180,6 +170,7 @@ def print_json(data: Mapping[str, object]) -> None:
 
 def print_failure(message: str, code: int, *, as_json: bool) -> int:
     """Print what went wrong on standard error, and with `as_json` also as JSON on standard output; return the code."""
+    print_error(message)
     if as_json:
         failure = {
             "verified": False,
@@ -188,9 +179,7 @@ def print_failure(message: str, code: int, *, as_json: bool) -> int:
             "t_end": None,
             "exit_code": code,
         }
-        with suppress(OSError):  # `StandardOutput.finish` says so
-            print_json(failure)
-    print_error(message)
+        print_json(failure)
     return code
 
 
@@ -207,55 +196,15 @@ def print_usage_error(error: Any, *, as_json: bool) -> int:
     return print_failure(message, InputError.exit_code, as_json=as_json)
 
 
-class StandardOutput:
-    """Standard output that remembers why it could not be written.
+def report_closed_output(error: OSError) -> None:
+    """Say why standard output cannot be written, unless a pipe was closed.
 
-    Parameters
-    ----------
-    stream : text stream
+    What is left of it goes to the null device, so that the interpreter does not try again when it ends.
     """
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self.failure: OSError | None = None
-
-    def __getattr__(self, name: str) -> Any:
-        """Pass everything else on."""
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write as the stream does."""
-        with self._remember_failure():
-            return self._stream.write(text)
-
-    def flush(self) -> None:
-        """Write out what the stream still holds."""
-        with self._remember_failure():
-            self._stream.flush()
-
-    @contextmanager
-    def _remember_failure(self) -> Iterator[None]:
-        """Keep the error that ends the block."""
-        try:
-            yield
-        except OSError as error:
-            self.failure = error
-            raise
-
-    def finish(self) -> bool:
-        """Write out the rest; False if something could not be written, which is printed unless a pipe was closed.
-
-        The rest goes to the null device then, so that the interpreter does not try again when it ends.
-        """
-        with suppress(OSError):
-            self.flush()
-        if self.failure is None:
-            return True
-        with suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
-        if not isinstance(self.failure, BrokenPipeError):
-            print_error(f"standard output cannot be written: {self.failure.strerror}")
-        return False
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if not isinstance(error, BrokenPipeError):
+        print_error(f"standard output cannot be written: {error.strerror}")
 
 
 def open_streams() -> None:
@@ -312,44 +261,22 @@ def show_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def show_progress(
-    first: str = "reading the task", *, in_logs: bool = False
-) -> Iterator[Callable[[str], None]]:
+def show_progress() -> Iterator[Callable[[str], None]]:
     """Give a listener that shows what is done, and that notices Ctrl-C.
 
     On a terminal it shows the present step; a verbose command prints every step with its time since the command line
-    was loaded. Otherwise nothing is shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``;
-    texts without a count are not shown then.
-
-    Parameters
-    ----------
-    first : str, optional
-        What a terminal shows before the first step.
-    in_logs : bool, optional
+    was loaded.
     """
-    console = Console(stderr=True)
     verbosity = get_verbosity()
-    last_step = -1
-    with ExitStack() as stack:
-        status = None
-        if verbosity is Verbosity.NORMAL and console.is_terminal:
-            status = stack.enter_context(console.status(first))
+    console = Console(stderr=True, quiet=verbosity is not Verbosity.NORMAL)
+    with console.status("working") as status:
 
         def show(text: str) -> None:
             """Show what is done, as the verbosity asks for."""
-            nonlocal last_step
             interrupts.check()
-            if status is not None:
-                status.update(Text(text))  # a name may hold brackets
-            elif verbosity is Verbosity.VERBOSE:
+            if verbosity is Verbosity.VERBOSE:
                 print_error(f"{time.perf_counter() - _BEGAN:.2f} s: {text}")
-            elif in_logs and verbosity is Verbosity.NORMAL:
-                done = re.match(r"(\d+) of (\d+)", text)
-                if done is None:
-                    return
-                step = int(done[1]) * 20 // max(1, int(done[2]))
-                if step != last_step:
-                    print_error(text)
-                last_step = step
+            else:
+                status.update(Text(text))  # a name may hold brackets
 
         yield show

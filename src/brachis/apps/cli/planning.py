@@ -125,35 +125,24 @@ def _plan_task(
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
-    from brachis.kinematics import CHART
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
     from brachis.search.stages import describe_coordinates
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
     trajectory = result.trajectory
-    named: dict[str, str] = {}
-    if trajectory.branch not in {"", CHART}:
-        named["branch"] = trajectory.branch
-        if trajectory.branch != result.family:
-            named["branch"] += f" ({result.family})"
     solves = write_count(len(candidate.reports), "solve")
     least_motion = result.least_motion
     rows = {
-        "end time t_E": f"{result.t_end:.4f} s",
+        **result.summary(),
         "redundant joints": describe_coordinates(trajectory),
-        **named,
+        "family": result.family,
         "start posture": write_posture(data, "start_posture", degrees=degrees),
         "end posture": write_posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
         "iterations": f"{data['iterations']} in {solves} (refined to {data['collocation_points']} collocation points)",
-        "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "least motion": "off" if least_motion is None else least_motion.status,
-        "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
-        "path error": f"{result.verification.path_error:.1e} m or rad",
-        "verified": "yes" if result.verified else "NO",
-        "timing": str(result.timing_gap or "no timing of this joint path is known"),
     }
     if candidate.time_scaled > 1.0:
         rows["end time lengthened by"] = (
@@ -283,7 +272,7 @@ def sweep(
     """
     from brachis.apps.sweeps.plans import VERIFIED
 
-    with end_cleanly(), show_progress(in_logs=True) as listener:
+    with end_cleanly(), show_progress() as listener:
         result = brachis.sweep(
             source,
             out,
@@ -310,37 +299,20 @@ def sweep(
 
 def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
-    from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
-    from brachis.apps.sweeps.run import write_duration
+    from brachis.common.summary import show_value
 
-    found = result.summary()
-    counts = ", ".join(
-        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
-    )
-    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
-    if "best" in found:
-        shown = ("best", "median", "worst")
-        headings = {"t_end_s": "t_end [s]", "plan": "plan"}
-        headings |= {key: key for key in result.keys}
-        rows = [
-            (heading, *(_write_value(found[name][key]) for name in shown))
-            for key, heading in headings.items()
-        ]
-        print_table(title, ("", *shown), rows, numbers=shown)
-    else:
-        print_lines(title)
-    for error, cause in found["failures"].items():
+    summary = result.summary()
+    failures = summary.pop("failures")
+    rows = []
+    for name, value in summary.items():
+        if isinstance(value, dict):
+            entries = (f"{key}: {show_value(entry)}" for key, entry in value.items())
+            rows.append((name, ", ".join(entries)))
+        else:
+            rows.append((name, show_value(value)))
+    print_table("sweep", ("", ""), rows)
+    for error, cause in failures.items():
         print_lines(
             f"{cause['plans']} failed with {error}, for example: {cause['message']}"
         )
-    print_lines(
-        f"planning took {write_duration(found['wall_time_s'])} in all processes together"
-    )
     print_lines(*(f"wrote {name}" for name in files))
-
-
-def _write_value(value: object) -> str:
-    """Write a cell of the table: nothing for None."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return "" if value is None else str(value)

@@ -14,7 +14,6 @@ from brachis.apps.cli.folder import Drawing, finish, output_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
     print_lines,
-    print_table,
     print_verification,
     show_progress,
 )
@@ -136,34 +135,7 @@ def compare(
         names=_FILES,
         verified=found.result.verified,
         json=json,
-        show=lambda: _print_comparison(found),
+        show=lambda: print_lines(str(found)),
         result=found.result,
     )
     raise typer.Exit(code)
-
-
-def _print_comparison(found: brachis.Comparison) -> None:
-    """Print the comparison for a person."""
-    print_lines(found.verdict)
-    kept = "kept at all recorded rows"
-    if found.exceeded:
-        kept = f"{len(found.exceeded)} exceeded"
-    if not found.proven:
-        kept = "not known"
-    verified = "kept and verified" if found.result.verified else "NOT verified"
-    recorded = f"{found.recorded.t_end:.4f} s"
-    planned = f"{found.result.t_end:.4f} s"
-    uses = [
-        (
-            f"{use.limit}, used",
-            f"{100 * use.recorded:.2f} % {use.recorded_at}",
-            f"{100 * use.recorded_up_to:.2f} %",
-            f"{100 * use.planned:.2f} % {use.planned_at}",
-        )
-        for use in found.uses
-    ]
-    first = ("end time t_E", recorded, "", planned)
-    last = ("limits", kept, "", verified)
-    columns = ("", "recorded", "between its rows up to", "planned")
-    print_table("", columns, [first, *uses, last], numbers=columns[1:])
-    print_lines(*found.remarks, *found.recovered.told)

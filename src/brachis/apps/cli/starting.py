@@ -22,7 +22,7 @@ from brachis.common.files import is_file, is_folder
 from brachis.errors import InputError
 
 
-def list_robots(json: Json = False) -> None:
+def robots(json: Json = False) -> None:
     """List the included robots.
 
     Examples
@@ -30,16 +30,16 @@ def list_robots(json: Json = False) -> None:
     brachis robots
     brachis robots --json
     """
-    robots = brachis.robots
+    included = brachis.robots
     listed = []
     rows = []
-    for name in robots.names():
-        urdf = robots.path_of(name)
+    for name in included.names():
+        urdf = included.path_of(name)
         page = urdf.with_name("README.md").read_text(encoding="utf-8")
         what = page.splitlines()[0].partition(": ")[
             2
         ]  # the heading "# name: what it is"
-        joints = list(getattr(robots, name).joint_names)
+        joints = list(getattr(included, name).joint_names)
         listed.append({"name": name, "what": what, "joints": joints, "urdf": str(urdf)})
         rows.append((name, what, len(joints), ", ".join(joints)))
     if json:

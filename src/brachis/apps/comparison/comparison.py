@@ -72,6 +72,13 @@ class Use:
             return proven
         return f"{proven}, between the rows up to {possible}"
 
+    def __str__(self) -> str:
+        """How much both motions use, and where."""
+        return (
+            f"{self.limit}: {self.recorded_text} used by the recorded motion ({self.recorded_at}), "
+            f"{100.0 * self.planned:.1f} % in the plan ({self.planned_at})"
+        )
+
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Summary):
@@ -168,23 +175,15 @@ class Comparison(Summary):
 
     def summary(self) -> dict[str, object]:
         """Return what is shown."""
-        uses = (
-            f"{use.limit} {use.recorded_text} recorded, {100.0 * use.planned:.1f} % planned"
-            for use in self.uses
-        )
         return {
             "verdict": self.verdict,
-            "limits used": "; ".join(uses),
+            "limits used": "; ".join(map(str, self.uses)),
             "remarks": "; ".join(self.remarks) or "none",
         }
 
     def __str__(self) -> str:
         """Return all in plain words."""
-        uses = [
-            f"{use.limit}: {use.recorded_text} used by the recorded motion ({use.recorded_at}), "
-            f"{100.0 * use.planned:.1f} % in the plan ({use.planned_at})"
-            for use in self.uses
-        ]
+        uses = map(str, self.uses)
         return "\n".join([self.verdict, *self.remarks, *uses, *self.recovered.told])
 
     def to_dict(self) -> dict[str, Any]:

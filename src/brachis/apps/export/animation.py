@@ -202,28 +202,23 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
     height, width = (2 * (size // 2) for size in first.shape[:2])
     source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * period)} -i -"
     target = "-an -pix_fmt yuv420p -movflags +faststart"
-    with (
-        tempfile.TemporaryDirectory(prefix="brachis-") as folder,
-        tempfile.TemporaryFile() as messages,
-    ):
+    with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
         # A file with a name: MP4 is not written from its beginning to its end.
         file = Path(folder) / "film.mp4"
         arguments = f"-v error -nostdin {source} {target}".split()
         with subprocess.Popen(  # noqa: S603  (no shell, and nothing of the user's in the arguments)
             [program, *arguments, file],
             stdin=subprocess.PIPE,
-            stdout=messages,
-            stderr=messages,
+            stderr=subprocess.PIPE,
         ) as process:
             assert process.stdin is not None
             with suppress(BrokenPipeError):  # the messages say more
                 for picture in chain([first], pictures):
                     process.stdin.write(picture[:height, :width].tobytes())
-                process.stdin.close()
+            _, messages = process.communicate()
         if process.returncode:
-            messages.seek(0)
             raise InputError(
                 "ffmpeg failed to write the film",
-                found=messages.read().decode(errors="replace").strip(),
+                found=messages.decode(errors="replace").strip(),
             )
         stream.write(file.read_bytes())

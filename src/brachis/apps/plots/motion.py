@@ -25,7 +25,7 @@ from brachis.apps.plots.panels import (
     tool_rows_of,
     torque_panels,
 )
-from brachis.apps.plots.postures import draw_postures, legend_postures
+from brachis.apps.plots.postures import draw_postures
 from brachis.limits import Limit
 from brachis.trajectory import Samples, Trajectory, of_motion
 
@@ -143,7 +143,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     figure = style.new_figure(style.PAGE_WIDTH, sum(heights) + 11.0)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     postures = draw_postures(figure, trajectory, samples, grid[0, 0])
-    legend_postures(postures, trajectory, 0.5 * style.PAGE_WIDTH - 10.0)
+    style.legend_above(postures, 0.5 * style.PAGE_WIDTH - 10.0)
     draw_holding(figure, grid[0, 1], trajectory, samples)
     joints = []
     for column, found in enumerate(columns):
@@ -322,8 +322,7 @@ def plot_timeline(
         style.write(ax, 0.5, 0.5, "no limit is used by 50 % or more", ha="center")
     blue = ScalarMappable(Normalize(0.0, 1.0), "Blues")
     bar = figure.colorbar(blue, ax=ax, pad=0.01, fraction=0.03)
-    bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
-    bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
+    style.dress(bar.ax, "", "part of the limit")
     words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"
     style.legend_above(ax, style.PAGE_WIDTH - 20.0, {words: Patch(facecolor=orange)})
     end = style.end_text(trajectory.t_end)

@@ -158,8 +158,6 @@ class Row:
         In Matplotlib's mathematics.
     prismatic : tuple of str
         Title and symbol for prismatic joints if they differ.
-    ratio_title : str
-        Title of the values over their limits if it is not ``... / limit``.
     is_range : bool
         See `Curve`.
     needs_masses : bool
@@ -179,7 +177,6 @@ class Row:
     values: Callable[[Trajectory, Samples], np.ndarray]
     symbol: str
     prismatic: tuple[str, str] | None = None
-    ratio_title: str = ""
     is_range: bool = False
     needs_masses: bool = False
     only_if_limited: bool = False
@@ -205,12 +202,7 @@ def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
 
 
 PANELS = {
-    "position": Row(
-        lambda _, samples: samples.q,
-        "$q$",
-        ratio_title="position in its range",
-        is_range=True,
-    ),
+    "position": Row(lambda _, samples: samples.q, "$q$", is_range=True),
     "velocity": Row(lambda _, samples: samples.qdot, r"$\dot{q}$"),
     "acceleration": Row(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
     "jerk": Row(
@@ -326,7 +318,7 @@ def _joint_panels(
             own = row.prismatic if base == "m" else None
             title, symbol = own or (name, row.symbol)
             unit = unit.replace("^2", "²").replace("^3", "³")
-            ratio = row.ratio_title or f"{title} / limit"
+            ratio = f"{title} in its range" if row.is_range else f"{title} / limit"
             found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return found
 

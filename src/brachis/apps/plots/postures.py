@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
+from brachis.common import tolerances
 from brachis.robot import Robot, task_map_of
 from brachis.trajectory import Samples, Trajectory, of_motion
 
@@ -38,30 +39,24 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     return bones
 
 
-def drawing_plane(
-    robot: Robot, q: np.ndarray, axes: Sequence[int]
-) -> tuple[int, int] | None:
+def drawing_plane(robot: Robot, axes: Sequence[int]) -> tuple[int, int] | None:
     """World axes (0, 1, 2) of the plane in which a planar chain moves; None for other chains.
 
     Parameters
     ----------
     robot : Robot
-    q : (n,) ndarray
-        Any posture: joint axes that are parallel in one are so in all.
     axes : sequence of int
         World axes of the task space's position rows. Two of them fix the plane; one leaves a choice.
     """
-    data = robot.model.createData()
-    jacobian = pin.computeJointJacobians(robot.model, data, q)
-    columns = np.reshape(jacobian, (6, robot.n))  # it is (6,) for one joint
-    turning = columns[3:, robot.revolute]
-    sliding = columns[:3, ~robot.revolute]
+    chain = robot.chain
+    sizes = np.abs(chain.axes)
+    # How far a joint turns about another direction than a world axis, or slides along it.
+    tilts = np.where(chain.revolute[:, None], 1.0 - sizes, sizes)
+    is_normal = np.all(tilts < tolerances.LENGTH, axis=0)
     for normal in (2, 1, 0):
-        in_plane = [axis for axis in range(3) if axis != normal]
-        turns_about = np.abs(turning[in_plane]).max(initial=0.0) < 1e-6
-        slides_in = np.abs(sliding[normal]).max(initial=0.0) < 1e-6
-        if normal not in axes[:2] and turns_about and slides_in:
-            return in_plane[0], in_plane[1]
+        if normal not in axes[:2] and is_normal[normal]:
+            first, second = (axis for axis in range(3) if axis != normal)
+            return first, second
     return None
 
 
@@ -97,7 +92,7 @@ def plot_postures(trajectory: Trajectory) -> Figure:
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
     place = figure.add_gridspec()[0]
     ax = draw_postures(figure, trajectory, dense_samples(trajectory), place)
-    legend_postures(ax, trajectory, style.COLUMN_WIDTH - 5.0)
+    style.legend_above(ax, style.COLUMN_WIDTH - 5.0)
     return figure
 
 
@@ -112,11 +107,15 @@ def draw_postures(
     tool = samples.tool_position[:, view]
     times = np.linspace(0.0, trajectory.t_end, len(_SHADES))
     postures = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
+    ax.plot(*tool.T, label="tool path", zorder=20.0, gid="tool path", **_PATH)
+    last = len(_SHADES) - 1
+    labels = {0: "start", last: "end"}
     for k, (bones, shade) in enumerate(zip(postures, _SHADES, strict=True)):
         ax.plot(
             *bones.T,
             color=shade,
-            linewidth=2.2 if k in {0, len(_SHADES) - 1} else 1.0,
+            label=labels.get(k),
+            linewidth=2.2 if k in labels else 1.0,
             solid_capstyle="round",
             solid_joinstyle="round",
             zorder=2.0 + k,
@@ -126,13 +125,13 @@ def draw_postures(
             is_redundant = name in trajectory.redundant_joints
             ax.plot(
                 *bones[2 * joint + 2, :, None],
+                label="redundant" if is_redundant and k == last else None,
                 marker="o" if trajectory.robot.revolute[joint] else "s",
                 markeredgecolor=shade,
                 markerfacecolor=_REDUNDANT if is_redundant else "white",
                 zorder=2.5 + k,
                 **_JOINT,
             )
-    ax.plot(*tool.T, zorder=20.0, gid="tool path", **_PATH)
     ax.plot(*tool[-1:].T, "o", color=_PATH["color"], markersize=3.0, zorder=21.0)
     ground = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
     base = postures[0, :1].T
@@ -146,30 +145,10 @@ def draw_postures(
     return ax
 
 
-def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
-    """Put the legend above the axes; `width` is its room, mm."""
-    from matplotlib.lines import Line2D
-
-    looks: dict[str, dict[str, Any]] = {
-        "start": {"color": _SHADES[0], "linewidth": 2.2},
-        "end": {"color": _SHADES[-1], "linewidth": 2.2},
-        "tool path": _PATH,
-    }
-    if trajectory.redundant_joints:
-        looks["redundant"] = {
-            "marker": "o",
-            "markerfacecolor": _REDUNDANT,
-            "markeredgecolor": _SHADES[-1],
-            **_JOINT,
-        }
-    lines = {name: Line2D([], [], **look) for name, look in looks.items()}
-    style.legend_above(ax, width, lines)
-
-
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
     """World axes of the plane in which a motion is drawn; None if it is drawn in space."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-    return drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes)
+    return drawing_plane(trajectory.robot, task_map.axes)
 
 
 def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:

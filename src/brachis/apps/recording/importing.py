@@ -25,14 +25,14 @@ from brachis.apps.recording.nodes import (
 from brachis.apps.recording.recording import Recording, check_units, read_recording
 from brachis.common.arguments import check_keywords, numbers
 from brachis.common.arrays import spread, with_like_signs
-from brachis.common.files import file_name, is_task_file
+from brachis.common.files import file_name
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import Path, build_path
 from brachis.planner import Given
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace
-from brachis.robots import locate
+from brachis.robots import is_robot, locate
 from brachis.task import (
     CsvSegment,
     FitTolerance,
@@ -178,24 +178,12 @@ def import_motion(
 
 
 def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
-    """Return the robot with the settings of the task, and the task, which may stand in the robot's place.
-
-    Raises
-    ------
-    InputError
-        There is no robot.
-    """
-    if task is None and _is_task(robot):
+    """Return the robot with the settings of the task, and the task, which may stand in the robot's place."""
+    if task is None and robot is not None and not is_robot(robot):
         task = robot  # type: ignore[assignment]
         robot = None
     settings = None if task is None else load_task(task)
     robot_settings = settings.robot if settings else RobotSettings()
-    if robot is None and robot_settings.urdf is None:
-        raise InputError(
-            "the robot is missing",
-            where="robot",
-            allowed="a URDF file, the name of a robot (brachis.robots), a Robot, or a task file",
-        )
     with name_task_file(None if robot is not None else task):
         return robot_for(locate(robot), robot_settings), settings  # type: ignore[arg-type]
 
@@ -412,13 +400,6 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSplin
         if np.abs(spline.at(t - t[0])[0][:, 0] - s).max() <= 2e-7:
             break
     return spline
-
-
-def _is_task(given: object) -> bool:
-    """Tell a task, or its file, from a robot."""
-    if isinstance(given, str | os.PathLike):
-        return is_task_file(given)
-    return isinstance(given, Task | Mapping)
 
 
 def _deviations(

@@ -132,36 +132,34 @@ def _describe(kind: str, joint: str) -> str:
 
 def _read_column(
     table: Table,
-    columns: Columns,
-    key: tuple[str, str],
+    column: tuple[int, str | None],
+    kind: str,
     base: str,
     units: Mapping[str, str],
-    where: str,
 ) -> tuple[np.ndarray, str, float]:
     """Return a column in SI units, (K,), its unit in the file, and half of its last digit in SI units.
 
     Parameters
     ----------
     table : Table
-    columns : dict
-    key : (str, str)
-        Quantity and joint.
+    column : (int, str or None)
+        Index of the column, and the unit that its header states.
+    kind : str
+        One of the `_QUANTITIES`.
     base : {"s", "rad", "m"}
         SI unit of time, or of the joint's position.
     units : mapping
         Units that the user states.
-    where : str
-        Line of the header, for messages.
 
     Raises
     ------
     TaskError
         A unit is unknown, or the header and the user contradict each other.
     """
-    i, stated = columns[key]
+    i, stated = column
     name, factors = _UNITS[base]
     asked = units.get(name)
-    per = _QUANTITIES[key[0]][1]
+    _, per = _QUANTITIES[kind]
     values = table.values[:, i]
     if stated is None:
         stated = f"{asked or base}{per}"
@@ -171,14 +169,14 @@ def _read_column(
             f"unknown unit of column {table.header[i]}",
             found=stated,
             allowed=", ".join(f"{known}{per}" for known in factors),
-            where=where,
+            where=table.where,
         )
     if asked is not None and factors[asked] != factors[unit]:
         raise TaskError(
             "the unit in the header is not the requested unit",
             found=f"{unit} for {table.header[i]}",
             allowed=asked,
-            where=where,
+            where=table.where,
         )
     rounding = 0.0
     for decimals in range(12):  # more do not matter
@@ -245,21 +243,21 @@ def read_recording(
     check_kind(source, "a CSV file", TaskError)
     text = read_text(source, where=str(source), folder=Path.cwd(), largest=64_000_000)
     table = read_table(text, str(source), _allowed_columns(joints))
-    where = table.where
-    columns = _find_columns(table.header, joints, where)
-    t, time_unit, _ = _read_column(table, columns, ("t", ""), "s", units, where)
+    columns = _find_columns(table.header, joints, table.where)
+    bases = {"": "s", **dict(zip(joints, robot.position_units, strict=True))}
     read = {
-        kind: [
-            _read_column(table, columns, (kind, joint), base, units, where)
-            for joint, base in zip(joints, robot.position_units, strict=True)
-        ]
-        for kind in ("q", "qdot", "qddot")
-        if (kind, joints[0]) in columns
+        (kind, joint): _read_column(table, column, kind, bases[joint], units)
+        for (kind, joint), column in columns.items()
     }
-    parts = {kind: np.column_stack([each[0] for each in read[kind]]) for kind in read}
-    _, position_units, digits = zip(*read["q"], strict=True)
+    t, time_unit, _ = read["t", ""]
+    positions = [read["q", joint] for joint in joints]
+    _, position_units, digits = zip(*positions, strict=True)
     rounding = np.array(digits)
-    q = parts["q"]
+    states = {}
+    for kind in ("q", "qdot", "qddot"):
+        if (kind, joints[0]) in read:
+            states[kind] = np.column_stack([read[kind, joint][0] for joint in joints])
+    q = states["q"]
     _check_times(t, table, source)
     if "angle" not in units:
         _check_angles(q, robot, source)
@@ -270,12 +268,12 @@ def read_recording(
     if ignored:
         notes.append(f"left out the columns {', '.join(ignored)}")
     moving, left_out = _moving_rows(t, q, rounding, source)
-    kept = {kind: part[moving] for kind, part in parts.items()}
+    moved = {kind: values[moving] for kind, values in states.items()}
     return Recording(
         t[moving] - t[moving.start],
-        kept["q"],
-        kept.get("qdot"),
-        kept.get("qddot"),
+        moved["q"],
+        moved.get("qdot"),
+        moved.get("qddot"),
         rounding,
         robot.position_units,
         str(source),
@@ -293,10 +291,15 @@ def _moving_rows(
     TaskError
         The motion has too few rows.
     """
-    first = _first_row(t, q, rounding, source)
-    end = len(t) - _first_row(-t[::-1], q[::-1], rounding, source)
+    first = _first_row(t, q, rounding)
+    end = len(t) - _first_row(-t[::-1], q[::-1], rounding)
     if end - first < FEWEST_ROWS:
-        raise _no_motion(f"the robot moves in fewer than {FEWEST_ROWS} rows", t, source)
+        raise TaskError(
+            f"the robot moves in fewer than {FEWEST_ROWS} rows",
+            found=write_count(len(t), "row"),
+            allowed=f"{FEWEST_ROWS} or more rows in which a joint moves",
+            where=str(source),
+        )
     notes = []
     for when, still in (("before", t[: first + 1]), ("after", t[end - 1 :])):
         if len(still) > 1:
@@ -309,14 +312,7 @@ def _moving_rows(
 
 
 def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
-    """Refuse too few times, and those that do not ascend."""
-    if len(t) < FEWEST_ROWS:
-        raise TaskError(
-            "too few rows for a motion",
-            found=len(t),
-            allowed=f"{FEWEST_ROWS} or more",
-            where=str(source),
-        )
+    """Refuse times that do not ascend."""
     for i in np.flatnonzero(np.diff(t) <= 0.0):
         raise TaskError(
             "the times do not increase",
@@ -343,8 +339,8 @@ def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
         )
 
 
-def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path) -> int:
-    """Return the row at which motion begins.
+def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray) -> int:
+    """Return the row at which motion begins; the number of rows if nothing moves.
 
     If the file has few digits, a gentle motion has been going on for a while when the last digit shows it. It grows as
     the cube of time, so that it is eight times as large after twice the time.
@@ -354,18 +350,8 @@ def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path)
     changed = away > np.maximum(_STILL, 2.2 * rounding)
     clear = away > np.maximum(_STILL, 24.0 * rounding)
     if not changed.any():
-        raise _no_motion("the robot does not move", t, source)
+        return len(t)
     row = int(np.argmax(changed.any(axis=1)))
     lead = t[np.argmax(clear.any(axis=1))] - t[row] if clear.any() else 0.0
     before = np.searchsorted(t, t[row] - lead, side="right") - 1
     return int(np.clip(before, 0, row - 1))
-
-
-def _no_motion(problem: str, t: np.ndarray, source: Path) -> TaskError:
-    """Make the error for a file without a motion."""
-    return TaskError(
-        problem,
-        found=write_count(len(t), "row"),
-        allowed=f"{FEWEST_ROWS} or more rows in which a joint moves",
-        where=str(source),
-    )

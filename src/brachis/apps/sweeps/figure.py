@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _HEIGHT = 62.0
-"""Height of a line plot, and lowest height of a heat map, mm."""
+"""Height of the figure for each key, mm."""
 _MOST_TICKS = 12
 """Names along one axis, and cells of a heat map along one axis that have their times written in them."""
 _COLOURS = "viridis"
@@ -70,11 +70,8 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     places, names = zip(
         *(_locate(column, side_by_side=is_heat_map) for column in columns), strict=True
     )
-    height = _HEIGHT if is_line else 1.4 * _HEIGHT
-    if is_heat_map:
-        height = min(180.0, max(_HEIGHT, 24.0 + 8.0 * len(names[1])))
     width = style.COLUMN_WIDTH if is_line else style.PAGE_WIDTH
-    figure = style.new_figure(width, height)
+    figure = style.new_figure(width, _HEIGHT * len(keys))
     ax = figure.add_subplot()
     x = places[0]
     if is_line:
@@ -149,18 +146,13 @@ def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) ->
     image = ax.imshow(grid, cmap=_COLOURS, aspect="auto", origin="lower")
     if max(grid.shape) > _MOST_TICKS:
         return image
-    differences = np.diff(np.unique(times[np.isfinite(times)]))
-    differences = differences[differences > 1e-5 * np.nanmax(times)]
-    # As many as show them, two to five.
-    smallest = differences.min(initial=1.0)
-    decimals = int(np.clip(np.ceil(-np.log10(smallest) - 1e-6), 2, 5))
     middle = 0.5 * (np.nanmin(times) + np.nanmax(times))
     for column, row, time in zip(x, y, times, strict=True):
         if math.isfinite(time):
             ax.text(
                 column,
                 row,
-                f"{time:.{decimals}f}",
+                f"{time:.4f}",
                 color="white" if time < middle else "black",
                 ha="center",
                 va="center",

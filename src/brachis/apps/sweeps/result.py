@@ -20,7 +20,6 @@ from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.files import (
     atomic_write,
     is_file,
-    is_folder,
     read_file,
     writing_errors,
 )
@@ -55,6 +54,16 @@ _ABOUT = "sweep.json"
 _MARK = "brachis_sweep"
 
 
+def read_description(folder: Path) -> dict[str, Any] | None:
+    """Return what a sweep wrote down in its folder; None if the folder contains no sweep."""
+    try:
+        about: dict[str, Any] = json.loads(read_file(folder / _ABOUT))
+        is_ours = _MARK in about
+    except (OSError, ValueError, TypeError):
+        return None
+    return about if is_ours else None
+
+
 class Store:
     """The folder of a sweep.
 
@@ -75,7 +84,7 @@ class Store:
         self._parquet = require_library("pyarrow.parquet", "a sweep", extra="sweep")
         with writing_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-            is_foreign = any(folder.iterdir()) and self.read_description() is None
+            is_foreign = any(folder.iterdir()) and read_description(folder) is None
         if is_foreign:
             raise InputError(
                 "the folder contains other files",
@@ -87,15 +96,6 @@ class Store:
         """Write down what the folder is for."""
         with atomic_write(self.folder / _ABOUT) as stream:
             stream.write(json.dumps({_MARK: 1, **about}, indent=2).encode() + b"\n")
-
-    def read_description(self) -> dict[str, Any] | None:
-        """Return what was written down; None if the folder contains no sweep."""
-        try:
-            about: dict[str, Any] = json.loads(read_file(self.folder / _ABOUT))
-            is_ours = _MARK in about
-        except (OSError, ValueError, TypeError):
-            return None
-        return about if is_ours else None
 
     def _place(self, digest: str, suffix: str) -> Path:
         """Name a file of a plan, in one of 256 folders: a folder with thousands of files is slow to write to."""
@@ -247,10 +247,7 @@ class SweepResult(Summary):
             It holds no sweep, or one that was not finished.
         """
         path = Path(folder)
-        if not is_folder(path):
-            raise InputError("the folder does not exist", where=str(path))
-        store = Store(path)
-        about = store.read_description()
+        about = read_description(path)
         if about is None:
             raise InputError(
                 "the folder contains no sweep",
@@ -258,7 +255,7 @@ class SweepResult(Summary):
                 allowed=f"one with its {_ABOUT}",
             )
         settings = SweepSettings.model_validate(about["settings"])
-        return cls(path, settings.keys, store.read_table())
+        return cls(path, settings.keys, Store(path).read_table())
 
     @property
     def varied(self) -> tuple[str, ...]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -185,27 +185,12 @@ def _run(
                 found[plan.digest] = store.write(plan.digest, outcome)
                 done = len(found)
                 failed = sum(facts["status"] == FAILED for facts in found.values())
-                each = (time.monotonic() - began) / (done - stored)
-                left = write_duration(each * (len(plans) - done))
+                period = (time.monotonic() - began) / (done - stored)
+                remaining = timedelta(seconds=round(period * (len(plans) - done)))
                 failures = f", {failed} failed" if failed else ""
-                tell(f"{done} of {every}{failures}; {left} left")
+                tell(f"{done} of {every}{failures}; {remaining} left")
     except KeyboardInterrupt as interrupt:
         interrupts.clear()
         message = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
         raise KeyboardInterrupt(message) from interrupt
     return found
-
-
-def write_duration(seconds: float) -> str:
-    """Write a duration as people say it.
-
-    Examples
-    --------
-    >>> write_duration(4.2), write_duration(130.0), write_duration(7500.0)
-    ('5 s', '2 min 10 s', '2 h 05 min')
-    """
-    minutes, whole = divmod(math.ceil(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes:02d} min"
-    return f"{minutes} min {whole:02d} s" if minutes else f"{whole} s"

@@ -103,12 +103,11 @@ class Distribution(_OneKey):
         if key == "choice":
             return [values[i] for i in generator.integers(len(values), size=count)]
         first, second = values
-        if key == "normal":
-            return generator.normal(first, second, count).tolist()
-        if key == "uniform":
-            return generator.uniform(first, second, count).tolist()
-        logarithms = generator.uniform(math.log(first), math.log(second), count)
-        return np.exp(logarithms).tolist()
+        if key == "log_uniform":
+            logarithms = generator.uniform(math.log(first), math.log(second), count)
+            return np.exp(logarithms).tolist()
+        draw = generator.normal if key == "normal" else generator.uniform
+        return draw(first, second, count).tolist()
 
 
 class RandomSettings(Model):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections import defaultdict
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,18 +77,18 @@ def link_shapes(
     materials = tree.robot.findall("material")
     for visual in tree.robot.iterfind("link/visual"):
         name = visual.getparent().get("name")
-        meshes = list(visual.iter("mesh"))
-        files = [str(mesh.get("filename")) for mesh in meshes]
-        paths = [path for file in files if (path := mesh_file(file, folder))]
-        if len(paths) < len(files):
-            absent += [file for file in files if not mesh_file(file, folder)]
-            continue
+        mesh = visual.find("geometry/mesh")
         try:
-            for mesh, path in zip(meshes, paths, strict=True):
+            if mesh is not None:
+                file = str(mesh.get("filename"))
+                path = mesh_file(file, folder)
+                if path is None:
+                    absent.append(file)
+                    continue
                 room -= _check_size(path, room)
                 mesh.set("filename", str(path))
-            found = _meshes(name, visual, materials)
-            shapes.setdefault(name, []).extend(found)
+            meshes = _meshes(name, visual, materials)
+            shapes.setdefault(name, []).extend(meshes)
         except InputError as error:
             unread.append(f"{name}: {error}")
         except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
@@ -155,9 +156,9 @@ def _meshes(
             bare = trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual)
             found.append(_paint(bare))
     if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
-        file = next((mesh.get("filename") for mesh in visual.iter("mesh")), None)
         raise InputError(
-            "the mesh has no faces, or corners that are not finite", where=file
+            "the mesh has no faces, or corners that are not finite",
+            where=visual.xpath("string(geometry/mesh/@filename)"),
         )
     return found
 
@@ -242,15 +243,14 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
 
     robot = trajectory.robot
     shapes, unread = link_shapes(robot.urdf, Path(robot.source).absolute().parent)
-    links: Meshes = {}
+    links: Meshes = defaultdict(list)
     for name, meshes in shapes.items():
         frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.BODY)]
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
-        links.setdefault(int(frame.parentJoint), []).extend(meshes)
+        links[int(frame.parentJoint)] += meshes
     for joint, meshes in scene_meshes(trajectory).items():
-        coloured = [with_colour(mesh, _COLOURS["scene"]) for mesh in meshes]
-        links.setdefault(joint, []).extend(coloured)
+        links[joint] += [with_colour(mesh, _COLOURS["scene"]) for mesh in meshes]
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
     size = np.ptp(positions, axis=(0, 1)).max()
@@ -270,7 +270,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
 
 
 def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
-    """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
+    """Draw every joint along its axis, the link from it to the next one, and what a prismatic joint slides on."""
     import trimesh
 
     robot = trajectory.robot
@@ -280,36 +280,28 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
     ranges = robot.limits.both_ways("position")
     used = trajectory.q.min(axis=0), trajectory.q.max(axis=0)
     ranges = np.where(np.isfinite(ranges), ranges, used)
-    drawn: Meshes = {}
-
-    def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
-        """Add a mesh in the colour of its kind to what a joint moves."""
-        drawn.setdefault(joint, []).append(with_colour(mesh, _COLOURS[kind]))
-
-    def draw_rod(
-        joint: int, first: np.ndarray, last: np.ndarray, thick: float, kind: str
-    ) -> None:
-        """Draw a cylinder between two points if they are apart; `thick` as a multiple of the radius."""
-        if np.linalg.norm(last - first) >= 1e-9:
-            ends = [first, last]
-            rod = trimesh.creation.cylinder(thick * radius, segment=ends, sections=24)
-            draw(joint, rod, kind)
-
     chain = Chain.of(model)
+    rods = []  # moving joint, two ends, thickness as a multiple of the radius, colour
     for joint, axis in enumerate(chain.axes):
         origin = chain.placements[joint, :3, 3]
-        draw_rod(joint, begin, origin, 1.0, "bone")
-        if chain.revolute[joint]:
-            half = 2.0 * radius * axis
-            draw_rod(joint + 1, -half, half, 1.7, "joint")
-        else:
+        half = 2.0 * radius * axis
+        rods.append((joint, begin, origin, 1.0, "bone"))
+        rods.append((joint + 1, -half, half, 1.7, "joint"))
+        if not chain.revolute[joint]:
             direction = chain.placements[joint, :3, :3] @ axis
             low, high = origin + np.outer(ranges[:, joint], direction)
-            draw_rod(joint, low, high, 0.5, "axis")
-            draw(joint + 1, trimesh.creation.box((3.0 * radius,) * 3), "joint")
+            rods.append((joint, low, high, 0.5, "axis"))
         begin = np.zeros(3)
     tool = model.frames[robot.frame_id]
-    draw_rod(tool.parentJoint, begin, tool.placement.translation, 1.0, "bone")
+    rods.append((tool.parentJoint, begin, tool.placement.translation, 1.0, "bone"))
+    drawn: Meshes = defaultdict(list)
+    for joint, first, last, thickness, kind in rods:
+        if np.linalg.norm(last - first) >= 1e-9:
+            ends = [first, last]
+            rod = trimesh.creation.cylinder(
+                thickness * radius, segment=ends, sections=24
+            )
+            drawn[joint].append(with_colour(rod, _COLOURS[kind]))
     return drawn
 
 
@@ -329,13 +321,13 @@ def scene_meshes(trajectory: Trajectory) -> Meshes:
     """Make the meshes of the bodies of a task's scene, without the robot's own, in the frames of their joints, m."""
     task = trajectory.task
     found = scene_of(trajectory.robot, task)
-    meshes: Meshes = {}
+    meshes: Meshes = defaultdict(list)
     if found is None:
         return meshes
     for number, solid in enumerate(found.solids[found.own :], found.own):
         mesh = _mesh_of(solid)
         mesh.apply_transform(found.placements[number])
-        meshes.setdefault(int(found.joints[number]), []).append(mesh)
+        meshes[int(found.joints[number])].append(mesh)
     return meshes
 
 

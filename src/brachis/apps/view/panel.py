@@ -120,10 +120,10 @@ def line_at(part: float) -> str:
 
 
 def look(number: int) -> tuple[str, tuple[float, ...]]:
-    """Colour and dashes of the curve with this number: solid until all colours are used."""
-    turn, colour = divmod(number, len(style.COLOURS))
-    lengths = style.DASHES[turn % len(style.DASHES)]
-    return style.COLOURS[colour], tuple(2.0 * length for length in lengths)
+    """Colour and dashes of the curve with this number, as figures draw it."""
+    line = style.joint_style(number)
+    _, lengths = line["linestyle"]
+    return line["color"], tuple(2.0 * length for length in lengths)
 
 
 def _heading(panel: Panel) -> str:

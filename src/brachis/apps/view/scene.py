@@ -11,6 +11,7 @@ from brachis.apps.plots.postures import plane_of
 from brachis.apps.view.bodies import bodies_of, placements, prescribed_path
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
+from brachis.scene.scene import Scene as BodyScene
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -87,21 +88,19 @@ class Scene:
         for k, handle in enumerate(self._frames):
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
-        if "closest pair" in self.layers:
-            self._show_closest(q)
+        if self._cell is not None and "closest pair" in self.layers:
+            self._show_closest(self._cell, q)
 
-    def _show_closest(self, q: np.ndarray) -> None:
+    def _show_closest(self, cell: BodyScene, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
-        cell = self._cell
-        pair = self.layers["closest pair"]
-        if cell is None or not pair or not pair[0].visible:
+        line, label = self.layers["closest pair"]
+        if not line.visible:
             return
-        line, label = pair
-        found = cell.find_closest(Chain.of(self._robot.model).place(q[None]))
-        line.points = found.points
-        label.position = found.points[0].mean(axis=0)
-        distance = 1e3 * found.distance[0]
-        label.text = f"{cell.names(found.pair[0])}: {distance:.1f} mm"
+        closest = cell.find_closest(Chain.of(self._robot.model).place(q[None]))
+        line.points = closest.points
+        label.position = closest.points[0].mean(axis=0)
+        distance = 1e3 * closest.distance[0]
+        label.text = f"{cell.names(closest.pair[0])}: {distance:.1f} mm"
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import importlib.util
 import io
 import ipaddress
 import logging
-import os
 import socket
 from typing import TYPE_CHECKING
 
@@ -54,14 +52,11 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
                 super().stop()
 
     _check(host, port or 0)
-    logging.getLogger("websockets.server").addFilter(_is_of_a_page)
+    # Probes, such as HEAD, are refused without a word.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     first = FIRST_PORT if port is None else port  # viser takes the next free one
     with contextlib.redirect_stdout(io.StringIO()):
-        server = Server(host=host, port=first, label="brachis", verbose=False)
-    if port and port != server.get_port():  # another process took it in between
-        server.stop()
-        raise _cannot_listen(host, port, os.strerror(errno.EADDRINUSE))
-    return server
+        return Server(host=host, port=first, label="brachis", verbose=False)
 
 
 def require_viser() -> None:
@@ -81,23 +76,6 @@ def is_local(host: str) -> bool:
     return all(ipaddress.ip_address(each[4][0]).is_loopback for each in found)
 
 
-def _is_of_a_page(record: logging.LogRecord) -> bool:
-    """Whether a record of the server is about a page's request; probes, such as HEAD, are refused without a word."""
-    from websockets.exceptions import InvalidMessage
-
-    return record.exc_info is None or not isinstance(record.exc_info[1], InvalidMessage)
-
-
-def _cannot_listen(host: str, port: int, reason: str) -> InputError:
-    return InputError(
-        "the viewer cannot listen on this address",
-        where="--host, --port",
-        found=f"{host}, port {port}: {reason}",
-        allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them; a free port",
-        hint="Leave out --port to use the next free port",
-    )
-
-
 def _check(host: str, port: int) -> None:
     """Refuse an address that cannot be listened on."""
     if not 0 <= port <= 65535:
@@ -109,4 +87,10 @@ def _check(host: str, port: int) -> None:
         socket.create_server(found[4], family=found[0]).close()
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise _cannot_listen(host, port, reason) from error
+        raise InputError(
+            "the viewer cannot listen on this address",
+            where="--host, --port",
+            found=f"{host}, port {port}: {reason}",
+            allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them; a free port",
+            hint="Leave out --port to use the next free port",
+        ) from error

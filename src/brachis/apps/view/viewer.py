@@ -8,8 +8,9 @@ import sys
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     import viser
 
 
-class Viewer:
+class Viewer(AbstractContextManager["Viewer"]):
     """A motion in the browser, until it is stopped.
 
     Parameters
@@ -122,10 +123,6 @@ class Viewer:
         self._thread.join()
         self._server.stop()
 
-    def __enter__(self) -> Self:
-        """Return the viewer, which is stopped at the end of the block."""
-        return self
-
     def __exit__(self, *_: object) -> None:
         """Stop."""
         self.stop()
@@ -189,18 +186,16 @@ class Viewer:
 
     def _follow(self) -> None:
         """Let the slider and the button follow the playback."""
-        self._slider.value = round(self.playback.time, self._digits)
+        self._slider.value = round(self.playback.time, 3)
         self._button.label = "Pause" if self.playback.playing else "Play"
 
     def _add_controls(self) -> None:
         """Add slider, button and speed."""
         t_end = self.playback.t_end
-        step = float(10.0 ** np.floor(np.log10(t_end / 200)))
-        self._digits = max(0, round(-np.log10(step)))
         inner = [(float(t), "") for t in self._trajectory.phase_ends[:-1]]
         ends = ((0.0, "0"), *inner, (t_end, f"{t_end:.4g}"))
         self._slider = self._gui.add_slider(
-            "time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends
+            "time (s)", 0.0, t_end, 1e-3, initial_value=0.0, marks=ends
         )
         self._slider.on_update(self._drag)
         self._button = self._gui.add_button("Pause")
