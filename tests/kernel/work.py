@@ -85,9 +85,6 @@ def work() -> None:
         targets,
         q + 0.01,
         (np.eye(N)[[0]], q[:, :1]),
-        steps=20,
-        tolerance=1e-12,
-        largest_step=0.5,
         beside=False,
     )
     mask = np.ones(N)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, call, declare_fields
+from brachis.kernel.library import address, call, declare_fields
 from brachis.kernel.path_motion import PathMotion
 from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
 
@@ -113,15 +113,13 @@ class VariableSlopes:
 
     def find_entries(self, slopes: np.ndarray) -> np.ndarray:
         """Entries of a Jacobian, (b K + z, values), of values with slopes by the curves, (orders, K, values, c)."""
-        orders, count, columns, width = slopes.shape
+        orders, count, _, width = slopes.shape
         if (count, width) != self.pattern.shape:
             raise ValueError("slopes are of other points or curves")
         kept: list[np.ndarray] = []
-        table = as_doubles(slopes, slopes.shape)
-        found = np.empty((self.entries, columns))
         structure = ctypes.byref(self.structure(orders, kept))
-        call("brachis_entries", count, columns, width, table, structure, found)
-        return found
+        entries: np.ndarray = call("brachis_entries", slopes, structure, e=self.entries)
+        return entries
 
 
 def differentiate(
@@ -172,7 +170,6 @@ def differentiate(
         slopes.append(keep_address(np.empty((3, *shape)), (3, *shape), kept))
         arm = groups.chain.address
     columns = groups.size
-    numbers = np.empty(groups.room)
     orders = 3 if motion.qdddot_y is None else 4
     found = np.empty((orders, count, columns, width))
     entries = np.empty((0, columns))
@@ -193,7 +190,6 @@ def differentiate(
         (ctypes.c_void_p * 6)(*slopes),
         len(table),
         table,
-        numbers,
         orders,
         columns,
         found,

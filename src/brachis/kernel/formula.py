@@ -14,7 +14,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ import numpy as np
 from brachis.kernel.library import (
     Structured,
     address,
-    as_doubles,
+    as_contiguous,
     call,
     declare_fields,
 )
@@ -360,20 +359,19 @@ class Formula(Structured):
         """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
-        given = [as_doubles(own, (count, size)) for own, size in pairs]
+        given = [as_contiguous(own, (count, size)) for own, size in pairs]
         found = np.empty((count, *self.shape))
-        numbers = np.empty(self.room)
         first = given[0]
         second = given[-1]
+        widths = first.shape[1], second.shape[1]
         call(
             "brachis_formula",
             self.address,
             count,
             first,
-            first.shape[1],
+            widths[0],
             second,
-            second.shape[1],
-            numbers,
+            widths[1],
             found,
         )
         return found
@@ -384,9 +382,3 @@ class Formula(Structured):
         sized = [part for own in parts for part in (len(own), address(own))]
         together = self.shape[-1] if self.discards_incomplete else 0
         return _Formula(*counts, *sized, together)
-
-    @cached_property
-    def room(self) -> int:
-        """Numbers of all inputs, constants and steps, as many as are computed side by side."""
-        numbers = sum(self.counts) + len(self.constants) + len(self.steps)
-        return numbers * int(call("brachis_side_by_side"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,37 +27,54 @@ _KINDS = {
     "-": None,
 }
 FUNCTIONS = {
-    "brachis_torques": "- plpppp",
-    "brachis_torque_derivatives": "- plpppppp",
-    "brachis_mass_matrices": "- plpp",
-    "brachis_tool": "- plpippp",
-    "brachis_tool_derivatives": "- llpppippp",
-    "brachis_tool_sizes": "- plippppppp",
-    "brachis_logarithms": "- lpp",
-    "brachis_bounds_of_pairs": "- llpppdpp",
-    "brachis_go_backwards": "i llpppppdddpp",
-    "brachis_go_forwards": "- llppppp",
-    "brachis_rotations": "- llpp",
-    "brachis_body_twists": "- llpp",
-    "brachis_newton": "- ppllpplpllplddip",
-    "brachis_halve": "l plddlpp",
+    "brachis_torques": "- p K [Kn] [Kn] [Kn] >[Kn]",
+    "brachis_torque_derivatives": "- p K [Kn] [Kn] [Kn] >[Knn] >[Knn] >[Knn]",
+    "brachis_mass_matrices": "- p K [Kn] >[Knn]",
+    "brachis_tool": "- p K [Kn] i >[K3] >[K33] >[6Kn]",
+    "brachis_tool_derivatives": "- K n [6Kn] [Kn] [Kn] i >[6Kn] >[6Kn] >[6Kn]",
+    "brachis_tool_sizes": "- p K i [Kn] [Kn] [Kn] p >[K]",
+    "brachis_logarithms": "- K [K33] >[K3]",
+    "brachis_bounds_of_pairs": "- P c [Pc] [Pc] [Pc] d >[P] >[P]",
+    "brachis_go_backwards": "i P c [Sc] [Sc] [Sc] [S] [S] d d d >[P] >[P]",
+    "brachis_go_forwards": "- P c [Sc] [Sc] [P] [P] d >[P]",
+    "brachis_rotations": "- m K [mK4] >[mK33]",
+    "brachis_body_twists": "- m K [mKw] >[rK6]",
+    "brachis_newton": "- p p K z [Kz] [Kn] r p l n [Kr] i >[Kn]",
+    "brachis_halve": "l M n [M] [Mn] [M] [S] [S] l l d d l B >[B]",
     "brachis_postures": "- p",
-    "brachis_evaluate": "i plpp",
+    "brachis_evaluate": "i p l p p",
     "brachis_path_derivatives": "- p",
-    "brachis_least_singular": "- llppp",
-    "brachis_singular_slopes": "- ppppp",
-    "brachis_entries": "- lllppp",
-    "brachis_differentiate": "- lllpppplppllppp",
-    "brachis_values": "- llplppp",
-    "brachis_largest_parts": "- lllpppp",
-    "brachis_solve_band": "- lllpp",
-    "brachis_blossoms": "- lllpppppp",
-    "brachis_curves": "- lllllpppp",
-    "brachis_formula": "- plplplpp",
-    "brachis_side_by_side": "l ",
+    "brachis_least_singular": "- K n [Knn] >[K] >[Kn]",
+    "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",
+    "brachis_entries": "- K v c [oKvc] p >[ev]",
+    "brachis_differentiate": "- l l l p p p p l p l l p p p",
+    "brachis_values": "- l l p l p p",
+    "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
+    "brachis_solve_band": "- l l l p p",
+    "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
+    "brachis_curves": "- o K w c L [oKw] l[K] [cL] >[oKc]",
+    "brachis_formula": "- p l p l p l p",
 }
-"""What functions return and take: pointer, long, double, int, or nothing."""
+"""What functions return and take: pointer, long, double, int, or nothing.
+
+An array has its shape in brackets: a letter is a size, a digit a number. Arrays behind ``>`` are written to; arrays
+behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size.
+"""
 _DOUBLE = np.dtype(np.float64)
+_WHOLE = np.dtype("l")
+_DIGITS = {str(digit): digit for digit in range(10)}
+
+
+def _split(word: str) -> tuple[str, str]:
+    """Split the declaration of an argument into its kind and the letters of its shape."""
+    kind, _, letters = word.rstrip("]").partition("[")
+    return kind, letters
+
+
+_ARGUMENTS = {
+    name: [_split(word) for word in words.split()[1:]]
+    for name, words in FUNCTIONS.items()
+}
 
 
 def declare_fields(declaration: str) -> list[tuple[str, Any]]:
@@ -103,11 +120,13 @@ def _open(path: Path) -> ctypes.CDLL:
     found = library.brachis_source().decode()
     if found != source_digest():
         raise NotBuiltError(f"{path.name} was made of other source", SCRIPT)
-    for name, kinds in FUNCTIONS.items():
+    for name, declaration in FUNCTIONS.items():
         function = getattr(library, name)
-        returned, _, taken = kinds.partition(" ")
-        function.restype = _KINDS[returned]
-        function.argtypes = [_KINDS[kind] for kind in taken]
+        function.restype = _KINDS[declaration[0]]
+        function.argtypes = [
+            _KINDS["p"] if letters else _KINDS.get(kind, ctypes.c_long)
+            for kind, letters in _ARGUMENTS[name]
+        ]
     return library
 
 
@@ -120,13 +139,60 @@ def address(values: np.ndarray) -> int:
         return int(place)
 
 
-def call(name: str, *arguments: Any) -> Any:
-    """Call a function of the library; of contiguous arrays it gets the addresses."""
-    plain = [
-        address(value) if isinstance(value, np.ndarray) else value
-        for value in arguments
-    ]
-    return getattr(load(), name)(*plain)
+def call(name: str, *arguments: Any, **sizes: int) -> Any:
+    """Call a function of the library.
+
+    Parameters
+    ----------
+    name : str
+        One of `FUNCTIONS`.
+    *arguments
+        What it takes, but for sizes and for the arrays that it writes. Of a contiguous array without a declared shape
+        it gets the address.
+    **sizes : int
+        By the letters that stand for them; those that follow from the shapes of arrays may be left out.
+
+    Returns
+    -------
+    What the function returns, then the arrays that it writes: a list, if these are not one alone.
+
+    Raises
+    ------
+    ValueError, TypeError
+        See `as_contiguous`.
+    """
+    sizes |= _DIGITS
+    given = iter(arguments)
+    values: list[Any] = []
+    written: list[np.ndarray] = []
+    for kind, letters in _ARGUMENTS[name]:
+        if kind == ">":
+            written.append(np.empty([sizes[letter] for letter in letters]))
+        elif letters or kind in _KINDS:
+            values.append(_check(next(given), kind, letters, sizes))
+        else:
+            values.append(kind)
+    plain = [_make_plain(value, sizes) for value in (*values, *written)]
+    returned = getattr(load(), name)(*plain)
+    results = written if FUNCTIONS[name][0] == "-" else [returned, *written]
+    return results[0] if len(results) == 1 else results
+
+
+def _make_plain(value: Any, sizes: Mapping[str, int]) -> Any:
+    """Return the address of an array, the size that a letter stands for, and all else as it is."""
+    if isinstance(value, np.ndarray):
+        return address(value)
+    return sizes[value] if isinstance(value, str) else value
+
+
+def _check(value: Any, kind: str, letters: str, sizes: dict[str, int]) -> Any:
+    """Return an argument as the library takes it; sizes that are not known yet are those of an array."""
+    if not letters:
+        return value
+    for letter, size in zip(letters, np.shape(value), strict=False):
+        sizes.setdefault(letter, size)
+    shape = tuple([sizes.get(letter, -1) for letter in letters])
+    return as_contiguous(value, shape, _WHOLE if kind == "l" else _DOUBLE)
 
 
 class Structured:
@@ -157,8 +223,10 @@ class Structured:
         return {name: vars(self)[name] for name in self.__dataclass_fields__}
 
 
-def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an array of this shape as contiguous doubles.
+def as_contiguous(
+    values: Any, shape: tuple[int, ...], dtype: np.dtype[Any] = _DOUBLE
+) -> np.ndarray:
+    """Return an array of this shape as contiguous doubles, or other numbers.
 
     Raises
     ------
@@ -167,12 +235,12 @@ def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
     TypeError
         It is complex.
     """
-    if type(values) is np.ndarray and values.dtype is _DOUBLE:
+    if type(values) is np.ndarray and values.dtype is dtype:
         if values.shape == shape and values.flags.c_contiguous:
             return values
     elif np.iscomplexobj(values):
         raise TypeError("an array is complex; needed: real numbers")
-    found = np.ascontiguousarray(values, dtype=np.float64)
+    found = np.ascontiguousarray(values, dtype=dtype)
     if found.shape != shape:
         raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")
     return found
@@ -184,10 +252,10 @@ def as_doubles_at_points(
     """Return numbers at K points, (K, ...), as contiguous doubles, and how far it is from a point to the next one.
 
     Where they are the same at all points, they are those of one, and the distance is 0. `values` may then be those of
-    one point too. Raises as `as_doubles` does.
+    one point too. Raises as `as_contiguous` does.
     """
     if values.ndim == len(shape) - 1:
-        return as_doubles(values, shape[1:]), 0
+        return as_contiguous(values, shape[1:]), 0
     if values.strides[0] == 0 and values.shape == shape and shape[0]:
-        return as_doubles(values[0], shape[1:]), 0
-    return as_doubles(values, shape), math.prod(shape[1:])
+        return as_contiguous(values[0], shape[1:]), 0
+    return as_contiguous(values, shape), math.prod(shape[1:])

@@ -43,8 +43,6 @@ typedef struct {
     long count;                        /* K */
     long rows_step;                    /* from the rows of one point to those of the next, in doubles; 0 if all points share them */
     double side;                       /* sign that det J_aug must have; 0: either */
-    long steps;                        /* of Newton's method in a chart */
-    double tolerance, largest_step;    /* of it, rad or m */
     const double *y, *ydot, *yddot;    /* (K, c) */
     const double *targets;             /* (K, coordinates) */
     const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
@@ -56,7 +54,6 @@ typedef struct {
 
     /* Found by brachis_postures. */
     double *answers; /* (K, A, m); given where no formula finds them */
-    double *numbers; /* room for a formula */
     double *levels;  /* (K, r) */
     double *q;       /* (K, n) */
 
@@ -114,17 +111,17 @@ void brachis_torque_slopes(
 );
 void brachis_formula(
     const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
-    double *room, double *found
+    double *found
 );
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
     const double *starts, long conditions, const double *rows, long rows_step, long row_width, const double *levels,
-    long steps, double tolerance, double largest_step, int beside, double *found
+    int beside, double *found
 );
 void brachis_path_motion(path_motion *own);
 void brachis_path_derivatives(path_motion *own);
 void brachis_values(
-    long count, long n, const double **quantities, long groups, const group *of, double *numbers, double *found
+    long count, long n, const double **quantities, long groups, const group *of, double *found
 );
 
 #endif

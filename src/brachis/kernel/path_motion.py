@@ -16,12 +16,12 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.library import (
     Structured,
     address,
-    as_doubles,
+    as_contiguous,
     as_doubles_at_points,
     call,
     declare_fields,
 )
-from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE, Prescribed
+from brachis.kernel.newton import Prescribed
 from brachis.kernel.postures import Branch
 from brachis.kernel.value_groups import ValueGroups
 
@@ -43,7 +43,6 @@ _GIVEN = {
 w = n + 1 numbers, and g = n + r + n r numbers of a chart's reference."""
 _FOUND = {
     "answers": "Kam",
-    "numbers": "f",
     "levels": "Kr",
     "q": "Kn",
     "drift": "3Kr",
@@ -59,7 +58,7 @@ _FOUND = {
     "torque": "Kn",
     "values": "Kv",
 }
-"""What it writes: also a answers of a closed form, f numbers of formulas, and v values of limits."""
+"""What it writes: also a answers of a closed form, and v values of limits."""
 _DOUBLE = np.dtype(float).itemsize
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
 """What is needed for more than postures."""
@@ -77,7 +76,7 @@ class _PathMotion(ctypes.Structure):
     """`path_motion` of motion.h."""
 
     _fields_ = declare_fields(
-        "p arm asked by; l count rows_step; d side; l steps; d tolerance largest_step;"
+        "p arm asked by; l count rows_step; d side;"
         f"p {' '.join((*_GIVEN, *_FOUND))}; l is_differentiated"
     )
 
@@ -189,7 +188,6 @@ class PathMotion(Structured):
         """
         n = chain.n
         m = prescribed.count
-        room = 0
         alternatives = 0
         values = 0
         needed = ["y", "rows"]
@@ -199,13 +197,11 @@ class PathMotion(Structured):
         if branch is not None:
             branch.check_fits(n, n - m, prescribed.coordinates)
             alternatives = branch.alternatives
-            room = branch.room
         if groups is not None:
             groups.check_joints(n)
             if groups.has_jerk:
                 raise ValueError("a group needs qdddot, which follows from derivatives")
             values = groups.size
-            room = max(room, groups.room)
         shapes, blocks, length = _divide(
             K=len(given["y"]),
             n=n,
@@ -216,11 +212,10 @@ class PathMotion(Structured):
             z=prescribed.coordinates,
             g=n + (n - m) * (n + 1),
             a=alternatives,
-            f=room,
             v=values,
         )
         kept = {
-            name: as_doubles(own, shapes[name])
+            name: as_contiguous(own, shapes[name])
             for name, own in given.items()
             if name != "rows"
         }
@@ -253,9 +248,6 @@ class PathMotion(Structured):
             len(given["y"]),
             self.rows_step,
             self.side,
-            STEPS,
-            TOLERANCE,
-            LARGEST_STEP,
             *[address(given[name]) if name in given else None for name in _GIVEN],
             *[first + blocks[name].begin * _DOUBLE for name in _FOUND],
         )
@@ -295,10 +287,9 @@ class PathMotion(Structured):
         self, values: np.ndarray, vectors: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Differentiate what `find_least_singular` gives for J_aug, (K,), by q, (K, n), and by s, (K,)."""
-        by_q = np.empty_like(self.qdot)
-        by_s = np.empty(len(by_q))
-        singular = as_doubles(values, by_s.shape), as_doubles(vectors, by_q.shape)
-        call("brachis_singular_slopes", self.address, *singular, by_q, by_s)
+        count, n = self.qdot.shape
+        name = "brachis_singular_slopes"
+        by_q, by_s = call(name, self.address, values, vectors, K=count, n=n)
         return by_q, by_s
 
 
@@ -311,9 +302,5 @@ def _need(given: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
-    count, n, _ = inverses.shape
-    values = np.empty(count)
-    vectors = np.empty((count, n))
-    kept = as_doubles(inverses, (count, n, n))
-    call("brachis_least_singular", count, n, kept, values, vectors)
+    values, vectors = call("brachis_least_singular", inverses)
     return values, vectors

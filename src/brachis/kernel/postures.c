@@ -120,7 +120,7 @@ static void solve_chart(path_motion *own, long n, long r, long coordinates)
     }
     brachis_newton(
         own->arm, own->asked, own->count, coordinates, own->targets, own->q, r, own->rows, own->rows_step, n + 1,
-        own->levels, own->steps, own->tolerance, own->largest_step, 0, own->q
+        own->levels, 0, own->q
     );
 }
 
@@ -140,7 +140,7 @@ void brachis_postures(path_motion *own)
     if (own->by->answers_of) {
         const formula *answers_of = own->by->answers_of;
         brachis_formula(
-            answers_of, own->count, own->targets, coordinates, own->y + 1, 1 + r, own->numbers, own->answers
+            answers_of, own->count, own->targets, coordinates, own->y + 1, 1 + r, own->answers
         );
     }
     take_answers(own, n, m);
@@ -173,6 +173,6 @@ int brachis_evaluate(path_motion *own, long groups, const group *of, const chain
         brachis_torques(arm, own->count, own->q, own->qdot, own->qddot, own->torque);
     }
     const double *quantities[5] = {own->q, own->qdot, own->qddot, NULL, own->torque};
-    brachis_values(own->count, n, quantities, groups, of, own->numbers, own->values);
+    brachis_values(own->count, n, quantities, groups, of, own->values);
     return NO_FAULT;
 }

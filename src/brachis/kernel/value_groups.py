@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.kernel.chain import Chain
 from brachis.kernel.formula import Formula
-from brachis.kernel.library import address, as_doubles, as_doubles_at_points, call
+from brachis.kernel.library import address, as_contiguous, as_doubles_at_points, call
 
 QUANTITIES = ("q", "qdot", "qddot", "qdddot", "torque")
 """In the order of motion.h."""
@@ -96,8 +96,6 @@ class ValueGroups:
         Numbers of the groups that have partials.
     size : int
         Number of all values.
-    room : int
-        Numbers of the longest formula; see `Formula.room`.
     """
 
     def __init__(
@@ -111,7 +109,6 @@ class ValueGroups:
         self._table["values"] = self._sizes
         self._table["quantity"] = -1
         self.size = self._first[-1]
-        self.room = 0
         self.chain: Chain | None = None
         self.has_jerk = False
         self._joints: int | None = None
@@ -137,11 +134,10 @@ class ValueGroups:
         found = (own.values_of.shape, own.slopes_of.shape, own.slopes_of.counts)
         if found != ((size,), (size, n), (n,)):
             raise ValueError(f"the formulas of {size} values have the shapes {found}")
-        factors = as_doubles(own.factors, (size,))
+        factors = as_contiguous(own.factors, (size,))
         self._set_joints(n)
         self._kept.append(factors)
         self._formulas.append(number)
-        self.room = max(self.room, own.values_of.room, own.slopes_of.room)
         row["quantity"] = _FORMULA
         row["factors"] = address(factors)
         row["values_of"] = own.values_of.address
@@ -154,8 +150,8 @@ class ValueGroups:
         count = row["values"]
         if len(joints) and not 0 <= joints.min() <= joints.max() < own.chain.n:
             raise ValueError(f"a joint does not exist; there are {own.chain.n}")
-        offsets = as_doubles(own.offsets, (count,))
-        factors = as_doubles(own.factors, (count,))
+        offsets = as_contiguous(own.offsets, (count,))
+        factors = as_contiguous(own.factors, (count,))
         if joints.shape != (count,):
             raise ValueError("joints are not as many as values")
         self._set_joints(own.chain.n)
@@ -222,10 +218,9 @@ class ValueGroups:
         given = (*states, *nothing, torque)
         addresses = [keep_address(own, (count, n), kept) for own in given]
         found = np.empty(count * self.size)
-        numbers = np.empty(self.room)
         of_states = (ctypes.c_void_p * len(QUANTITIES))(*addresses)
         table = self._table
-        call("brachis_values", count, n, of_states, len(table), table, numbers, found)
+        call("brachis_values", count, n, of_states, len(table), table, found)
         return self.split(found, count)
 
     def table_with(
@@ -259,7 +254,7 @@ def keep_address(
     """Return where numbers are, None without any; what is added to `kept` has to stay alive."""
     if values is None:
         return None
-    kept.append(as_doubles(values, shape))
+    kept.append(as_contiguous(values, shape))
     return address(kept[-1])
 
 
