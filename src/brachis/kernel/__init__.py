@@ -4,7 +4,7 @@ Pinocchio builds the model and is the reference: the tests compare the kernel wi
 formulas.
 """
 
-from brachis.kernel.chain import Chain
+from brachis.kernel.chain import Chain, TorqueDerivatives
 from brachis.kernel.chain_rule import (
     CurvePattern,
     MotionSlopes,
@@ -42,6 +42,7 @@ __all__ = [
     "Quantity",
     "ScaledQuantity",
     "Spline",
+    "TorqueDerivatives",
     "ValueGroups",
     "VariableSlopes",
     "blossom",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,19 +14,46 @@ from brachis.kernel.library import (
     as_contiguous,
     call,
     declare_fields,
+    shape_of,
 )
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
 """In the order of tool.c."""
 
 
+_SHAPES = {
+    "revolute": "n",
+    "axes": "n3",
+    "points": "n3",
+    "tool_position": "3",
+    "tool_rotation": "33",
+    "masses": "n",
+    "centers": "n3",
+    "inertias": "n6",
+    "gravity": "3",
+    "friction": "n4",
+}
+"""Of the numbers of a chain, in the order of chain.h, with n joints."""
+
+
 class _Chain(ctypes.Structure):
     """`chain` of chain.h."""
 
-    _fields_ = declare_fields(
-        "l joints;"
-        "p turns axes points tool_position tool_rotation masses centers inertias gravity friction"
-    )
+    _fields_ = declare_fields(f"l joints; p {' '.join(_SHAPES)}")
+
+
+class TorqueDerivatives(NamedTuple):
+    """Derivatives of the torque of K states, each (K, n, n): row joint torque, column joint.
+
+    Attributes
+    ----------
+    q, qdot, qddot : (K, n, n) ndarray
+        With respect to position, velocity, acceleration (the last is the mass matrix plus armature).
+    """
+
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,23 +101,12 @@ class Chain(Structured):
         return len(self.revolute)
 
     def _make_structure(self) -> _Chain:
-        n = self.n
-        shapes = {
-            "revolute": (n,),
-            "axes": (n, 3),
-            "points": (n, 3),
-            "tool_position": (3,),
-            "tool_rotation": (3, 3),
-            "masses": (n,),
-            "centers": (n, 3),
-            "inertias": (n, 6),
-            "gravity": (3,),
-            "friction": (n, 4),
-        }
+        sizes = {"n": self.n}
         numbers = [
-            as_contiguous(getattr(self, name), shape) for name, shape in shapes.items()
+            as_contiguous(getattr(self, name), shape_of(letters, sizes))
+            for name, letters in _SHAPES.items()
         ]
-        structure = _Chain(n, *map(address, numbers))
+        structure = _Chain(self.n, *map(address, numbers))
         structure.kept = numbers
         return structure
 
@@ -101,12 +117,10 @@ class Chain(Structured):
 
     def torque_derivatives(
         self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate `torques` by q, qdot and qddot, (K, n, n) each: row joint torque, column joint."""
-        by_q, by_qdot, by_qddot = self._call(
-            "brachis_torque_derivatives", q, qdot, qddot
-        )
-        return by_q, by_qdot, by_qddot
+    ) -> TorqueDerivatives:
+        """Differentiate `torques` by q, qdot and qddot."""
+        states = (q, qdot, qddot)
+        return TorqueDerivatives(*self._call("brachis_torque_derivatives", *states))
 
     def mass_matrices(self, q: np.ndarray) -> np.ndarray:
         """Mass matrices with rotors, (K, n, n), of K postures, (K, n)."""

@@ -62,7 +62,6 @@ behind ``l`` are of whole numbers, all others of doubles. A letter by itself is 
 """
 _DOUBLE = np.dtype(np.float64)
 _WHOLE = np.dtype("l")
-_DIGITS = {str(digit): digit for digit in range(10)}
 
 
 def _split(word: str) -> tuple[str, str]:
@@ -161,13 +160,12 @@ def call(name: str, *arguments: Any, **sizes: int) -> Any:
     ValueError, TypeError
         See `as_contiguous`.
     """
-    sizes |= _DIGITS
     given = iter(arguments)
     values: list[Any] = []
     written: list[np.ndarray] = []
     for kind, letters in _ARGUMENTS[name]:
         if kind == ">":
-            written.append(np.empty([sizes[letter] for letter in letters]))
+            written.append(np.empty(shape_of(letters, sizes)))
         elif letters or kind in _KINDS:
             values.append(_check(next(given), kind, letters, sizes))
         else:
@@ -176,6 +174,11 @@ def call(name: str, *arguments: Any, **sizes: int) -> Any:
     returned = getattr(load(), name)(*plain)
     results = written if FUNCTIONS[name][0] == "-" else [returned, *written]
     return results[0] if len(results) == 1 else results
+
+
+def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
+    """Return the shape that letters and digits stand for; unknown sizes are -1."""
+    return tuple([int(own) if own.isdigit() else sizes.get(own, -1) for own in letters])
 
 
 def _make_plain(value: Any, sizes: Mapping[str, int]) -> Any:
@@ -191,8 +194,8 @@ def _check(value: Any, kind: str, letters: str, sizes: dict[str, int]) -> Any:
         return value
     for letter, size in zip(letters, np.shape(value), strict=False):
         sizes.setdefault(letter, size)
-    shape = tuple([sizes.get(letter, -1) for letter in letters])
-    return as_contiguous(value, shape, _WHOLE if kind == "l" else _DOUBLE)
+    dtype = _WHOLE if kind == "l" else _DOUBLE
+    return as_contiguous(value, shape_of(letters, sizes), dtype)
 
 
 class Structured:

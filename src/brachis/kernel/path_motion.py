@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +18,7 @@ from brachis.kernel.library import (
     as_doubles_at_points,
     call,
     declare_fields,
+    shape_of,
 )
 from brachis.kernel.newton import Prescribed
 from brachis.kernel.postures import Branch
@@ -59,7 +58,6 @@ _FOUND = {
     "values": "Kv",
 }
 """What it writes: also a answers of a closed form, and v values of limits."""
-_DOUBLE = np.dtype(float).itemsize
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
 """What is needed for more than postures."""
 
@@ -81,36 +79,9 @@ class _PathMotion(ctypes.Structure):
     )
 
 
-class _Block(NamedTuple):
-    """Where in a block of numbers what is found begins and ends, and of which shape it is."""
-
-    begin: int
-    end: int
-    shape: tuple[int, ...]
-
-
-@lru_cache
-def _divide(
-    **sizes: int,
-) -> tuple[dict[str, tuple[int, ...]], dict[str, _Block], int]:
-    """Return the shapes of what is given, the parts of one block for all that is found, and the block's length.
-
-    Motions share them: they are not to be written to.
-    """
-
-    def shape_of(letters: str) -> tuple[int, ...]:
-        """Return the numbers that letters stand for."""
-        return tuple(sizes[own] if own in sizes else int(own) for own in letters)
-
-    given = {name: shape_of(letters) for name, letters in _GIVEN.items()}
-    blocks = {}
-    end = 0
-    for name, letters in _FOUND.items():
-        begin = end
-        shape = shape_of(letters)
-        end += math.prod(shape)
-        blocks[name] = _Block(begin, end, shape)
-    return given, blocks, end
+def _written(name: str) -> Any:
+    """Return a property: one of the arrays that the library writes."""
+    return property(lambda motion: motion.written[name])
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +109,8 @@ class PathMotion(Structured):
         1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known to be so.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
-    blocks : dict of str to _Block
-        Where in `room` what is found stands.
-    room : (...) ndarray
-        All that is found.
+    written : dict of str to ndarray
+        What the library writes; the arrays below are among them.
     answers : (K, A, m) ndarray
         Of a closed form.
     q, qdot, qddot : (K, n) ndarray
@@ -164,8 +133,7 @@ class PathMotion(Structured):
     groups: ValueGroups | None
     given: dict[str, np.ndarray]
     rows_step: int
-    blocks: dict[str, _Block]
-    room: np.ndarray
+    written: dict[str, np.ndarray]
 
     @classmethod
     def prepare(
@@ -202,45 +170,43 @@ class PathMotion(Structured):
             if groups.has_jerk:
                 raise ValueError("a group needs qdddot, which follows from derivatives")
             values = groups.size
-        shapes, blocks, length = _divide(
-            K=len(given["y"]),
-            n=n,
-            m=m,
-            r=n - m,
-            c=1 + n - m,
-            w=n + 1,
-            z=prescribed.coordinates,
-            g=n + (n - m) * (n + 1),
-            a=alternatives,
-            v=values,
-        )
+        sizes = {
+            "K": len(given["y"]),
+            "n": n,
+            "m": m,
+            "r": n - m,
+            "c": 1 + n - m,
+            "w": n + 1,
+            "z": prescribed.coordinates,
+            "g": n + (n - m) * (n + 1),
+            "a": alternatives,
+            "v": values,
+        }
         kept = {
-            name: as_contiguous(own, shapes[name])
+            name: as_contiguous(own, shape_of(_GIVEN[name], sizes))
             for name, own in given.items()
             if name != "rows"
         }
-        kept["rows"], step = as_doubles_at_points(given["rows"], shapes["rows"])
-        found = np.empty(length)
-        return cls(chain, prescribed, branch, side, groups, kept, step, blocks, found)
+        kept["rows"], step = as_doubles_at_points(
+            given["rows"], shape_of(_GIVEN["rows"], sizes)
+        )
+        written = {
+            name: np.empty(shape_of(letters, sizes)) for name, letters in _FOUND.items()
+        }
+        return cls(chain, prescribed, branch, side, groups, kept, step, written)
 
-    def _find(self, name: str) -> np.ndarray:
-        begin, end, shape = self.blocks[name]
-        return self.room[begin:end].reshape(shape)
-
-    answers = cached_property(lambda self: self._find("answers"))
-    q = cached_property(lambda self: self._find("q"))
-    qdot = cached_property(lambda self: self._find("qdot"))
-    qddot = cached_property(lambda self: self._find("qddot"))
-    twists = cached_property(lambda self: self._find("twists"))
-    inverse = cached_property(lambda self: self._find("inverse"))
-    determinants = cached_property(lambda self: self._find("determinants"))
-    gradient = cached_property(lambda self: self._find("gradient"))
-    torque = cached_property(lambda self: self._find("torque"))
+    answers = _written("answers")
+    q = _written("q")
+    qdot = _written("qdot")
+    qddot = _written("qddot")
+    twists = _written("twists")
+    inverse = _written("inverse")
+    determinants = _written("determinants")
+    gradient = _written("gradient")
+    torque = _written("torque")
 
     def _make_structure(self) -> _PathMotion:
         given = self.given
-        blocks = self.blocks
-        first = address(self.room)
         return _PathMotion(
             self.chain.address,
             self.prescribed.address,
@@ -249,13 +215,14 @@ class PathMotion(Structured):
             self.rows_step,
             self.side,
             *[address(given[name]) if name in given else None for name in _GIVEN],
-            *[first + blocks[name].begin * _DOUBLE for name in _FOUND],
+            *map(address, self.written.values()),
         )
 
     def find_postures(self) -> np.ndarray:
         """Find the postures alone, (K, n); NaN where they do not exist."""
         call("brachis_postures", self.address)
-        return self.q
+        postures: np.ndarray = self.q
+        return postures
 
     def evaluate(self) -> Fault | None:
         """Find postures, motion, and values of the groups; return what is at fault."""
@@ -270,13 +237,14 @@ class PathMotion(Structured):
         """Values of each group, (K, size); nothing is set where it has partials."""
         if self.groups is None:
             return []
-        found = self._find("values")
-        return self.groups.split(found.ravel(), len(found))
+        values = self.written["values"]
+        return self.groups.split(values.ravel(), len(values))
 
     @property
     def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Room for dqdot/dy, dqddot/dy and dqddot/dydot, (K, n, 1 + r) each; see `derivatives`."""
-        return self._find("qdot_y"), self._find("qddot_y"), self._find("qddot_ydot")
+        written = self.written
+        return written["qdot_y"], written["qddot_y"], written["qddot_ydot"]
 
     def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each; once."""

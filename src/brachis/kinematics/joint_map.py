@@ -22,7 +22,7 @@ import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -78,8 +78,7 @@ class JointState(SharedTorques):
     @property
     def slopes(self) -> MotionSlopes:
         """The exact derivatives as the kernel takes them, but for those of the jerk."""
-        own = self.derivatives
-        return MotionSlopes(self.gradient, own.qdot_y, own.qddot_y, own.qddot_ydot)
+        return MotionSlopes(self.gradient, *self.derivatives)
 
     def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
         """Compute values of limits, (K, size) of each group; nothing is set where a group has partials."""
@@ -111,8 +110,7 @@ class JointState(SharedTorques):
         return rates(slopes, self.curves)[0]
 
 
-@dataclass(frozen=True)
-class JointDerivatives:
+class JointDerivatives(NamedTuple):
     """Derivatives of a `JointState`, each (K, n, c); dqdot/dydot = dqddot/dyddot = G are not repeated.
 
     Attributes

@@ -22,10 +22,10 @@ from typing import Any, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 
-from brachis.kernel import Chain, Quantity
+from brachis.kernel import Chain, Quantity, TorqueDerivatives
 from brachis.robot import Robot
 from brachis.robot.custom_limits import name_failures
-from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
+from brachis.robot.dynamics import SharedTorques
 
 _Found = TypeVar("_Found")
 
