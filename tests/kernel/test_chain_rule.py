@@ -12,7 +12,6 @@ from brachis.kernel import (
     Formula,
     FormulaQuantity,
     MotionSlopes,
-    PathMotion,
     Prescribed,
     ScaledQuantity,
     ValueGroups,
@@ -156,26 +155,6 @@ def test_formulas_of_the_posture():
     np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
     with pytest.raises(ValueError, match="have the shapes"):
         ValueGroups([margins], [3])
-
-
-def test_values_come_with_a_motion_along_a_path(chain):
-    rng = np.random.default_rng(8)
-    joints = np.arange(N)
-    torque = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
-    groups = ValueGroups([torque, None], [N, 2])
-    one = np.ones((POINTS, 3))
-    given = {"y": one, "rows": np.eye(N, N + 1)[:2]}
-    for name in ("ydot", "yddot", "xi", "xi_ds", "xi_dds"):
-        given[name] = rng.normal(size=(POINTS, 3))
-    motion = PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, groups=groups)
-    motion.q[:] = rng.normal(size=(POINTS, N))
-    assert not motion.evaluate()
-    known = chain.torques(motion.q, motion.qdot, motion.qddot)
-    np.testing.assert_array_equal(motion.torque, known)
-    np.testing.assert_array_equal(motion.values[0], known)
-    other = chain_of(*random_model(3, 1))
-    with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
-        PathMotion.prepare(other, Prescribed((0,)), given, groups=groups)
 
 
 def test_a_motion_along_a_path_is_differentiated_when_it_is_needed(chain):

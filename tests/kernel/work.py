@@ -62,7 +62,7 @@ def work() -> None:
     every = np.arange(N)
     torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
     groups = ValueGroups([torque, None], [N, N])
-    motion = PathMotion.prepare(chain, asked, given, groups=groups)
+    motion = PathMotion.prepare(chain, asked, given)
     motion.q[:] = q
     motion.evaluate()
     motion.derivatives()

@@ -42,7 +42,7 @@ FUNCTIONS = {
     "brachis_newton": "- p p K z [Kz] [Kn] r p l n [Kr] i >[Kn]",
     "brachis_halve": "l M n [M] [Mn] [M] [S] [S] l l d d l B >[B]",
     "brachis_postures": "- p",
-    "brachis_evaluate": "i p l p p",
+    "brachis_evaluate": "i p",
     "brachis_path_derivatives": "- p",
     "brachis_least_singular": "- K n [Knn] >[K] >[Kn]",
     "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",

@@ -68,7 +68,6 @@ typedef struct {
 
     /* Found by brachis_path_derivatives, (K, n, c), once. */
     double *qdot_y, *qddot_y, *qddot_ydot;
-    double *torque, *values; /* found by brachis_evaluate, where they are asked for */
     long is_differentiated;
 } path_motion;
 
@@ -120,8 +119,5 @@ void brachis_newton(
 );
 void brachis_path_motion(path_motion *own);
 void brachis_path_derivatives(path_motion *own);
-void brachis_values(
-    long count, long n, const double **quantities, long groups, const group *of, double *found
-);
 
 #endif

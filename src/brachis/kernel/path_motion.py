@@ -22,7 +22,6 @@ from brachis.kernel.library import (
 )
 from brachis.kernel.newton import Prescribed
 from brachis.kernel.postures import Branch
-from brachis.kernel.value_groups import ValueGroups
 
 _GIVEN = {
     "y": "Kc",
@@ -54,10 +53,8 @@ _FOUND = {
     "qdot_y": "Knc",
     "qddot_y": "Knc",
     "qddot_ydot": "Knc",
-    "torque": "Kn",
-    "values": "Kv",
 }
-"""What it writes: also a answers of a closed form, and v values of limits."""
+"""What it writes: also a answers of a closed form."""
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
 """What is needed for more than postures."""
 
@@ -99,8 +96,6 @@ class PathMotion(Structured):
         By which postures are found; in a chart, None.
     side : float
         Sign that det J_aug must have; 0: either.
-    groups : ValueGroups or None
-        Values that are computed with the motion.
     given : dict of str to ndarray
         The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) where all points share them.
         For a closed form or a chart ``targets``, (K, coordinates), and in a chart its ``reference``, (K, n + r + n
@@ -122,15 +117,12 @@ class PathMotion(Structured):
         Of J_aug.
     gradient : (K, n, 1 + r) ndarray
         dq/dy.
-    torque : (K, n) ndarray
-        Where values depend on it.
     """
 
     chain: Chain
     prescribed: Prescribed
     branch: Branch | None
     side: float
-    groups: ValueGroups | None
     given: dict[str, np.ndarray]
     rows_step: int
     written: dict[str, np.ndarray]
@@ -144,20 +136,18 @@ class PathMotion(Structured):
         *,
         branch: Branch | None = None,
         side: float = 0.0,
-        groups: ValueGroups | None = None,
     ) -> PathMotion:
         """Check what is given, and make room; see the class.
 
         Raises
         ------
         ValueError
-            An array is missing or has another shape, or branch or groups are those of another chain: the library would
+            An array is missing or has another shape, or the branch is that of another chain: the library would
             read beyond the ends of arrays.
         """
         n = chain.n
         m = prescribed.count
         alternatives = 0
-        values = 0
         needed = ["y", "rows"]
         if "reference" in given or (branch is not None and branch.answers_of):
             needed.append("targets")
@@ -165,11 +155,6 @@ class PathMotion(Structured):
         if branch is not None:
             branch.check_fits(n, n - m, prescribed.coordinates)
             alternatives = branch.alternatives
-        if groups is not None:
-            groups.check_joints(n)
-            if groups.has_jerk:
-                raise ValueError("a group needs qdddot, which follows from derivatives")
-            values = groups.size
         sizes = {
             "K": len(given["y"]),
             "n": n,
@@ -180,7 +165,6 @@ class PathMotion(Structured):
             "z": prescribed.coordinates,
             "g": n + (n - m) * (n + 1),
             "a": alternatives,
-            "v": values,
         }
         kept = {
             name: as_contiguous(own, shape_of(_GIVEN[name], sizes))
@@ -193,7 +177,7 @@ class PathMotion(Structured):
         written = {
             name: np.empty(shape_of(letters, sizes)) for name, letters in _FOUND.items()
         }
-        return cls(chain, prescribed, branch, side, groups, kept, step, written)
+        return cls(chain, prescribed, branch, side, kept, step, written)
 
     answers = _written("answers")
     q = _written("q")
@@ -203,7 +187,6 @@ class PathMotion(Structured):
     inverse = _written("inverse")
     determinants = _written("determinants")
     gradient = _written("gradient")
-    torque = _written("torque")
 
     def _make_structure(self) -> _PathMotion:
         given = self.given
@@ -225,20 +208,10 @@ class PathMotion(Structured):
         return postures
 
     def evaluate(self) -> Fault | None:
-        """Find postures, motion, and values of the groups; return what is at fault."""
+        """Find postures and motion; return what is at fault."""
         _need(self.given, _OF_MOTION)
-        groups = self.groups
-        own = (0, None, None) if groups is None else groups.pointers
-        fault = call("brachis_evaluate", self.address, *own)
+        fault = call("brachis_evaluate", self.address)
         return Fault(fault) if fault else None
-
-    @property
-    def values(self) -> list[np.ndarray]:
-        """Values of each group, (K, size); nothing is set where it has partials."""
-        if self.groups is None:
-            return []
-        values = self.written["values"]
-        return self.groups.split(values.ravel(), len(values))
 
     @property
     def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -149,9 +149,8 @@ void brachis_postures(path_motion *own)
 
 enum { NO_FAULT, NO_POSTURE, SINGULAR, TURNS_TOO_FAR };
 
-/* Find postures and motion, and the values of groups; torques are those of `arm`, if groups ask for them. Returns what is at
-fault. */
-int brachis_evaluate(path_motion *own, long groups, const group *of, const chain *arm)
+/* Find postures and motion. Returns what is at fault. */
+int brachis_evaluate(path_motion *own)
 {
     long n = own->arm->joints;
     brachis_postures(own);
@@ -169,10 +168,5 @@ int brachis_evaluate(path_motion *own, long groups, const group *of, const chain
     if (own->by && own->t && !follow_rates(own, n)) {
         return TURNS_TOO_FAR;
     }
-    if (arm) {
-        brachis_torques(arm, own->count, own->q, own->qdot, own->qddot, own->torque);
-    }
-    const double *quantities[5] = {own->q, own->qdot, own->qddot, NULL, own->torque};
-    brachis_values(own->count, n, quantities, groups, of, own->values);
     return NO_FAULT;
 }

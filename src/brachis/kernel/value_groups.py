@@ -176,12 +176,6 @@ class ValueGroups:
         if self._joints not in (None, n):
             raise ValueError(f"the motion has {n} joints; needed: {self._joints}")
 
-    @property
-    def pointers(self) -> tuple[int, int, int | None]:
-        """How many groups there are, and where the library finds them and the chain of the torques."""
-        arm = None if self.chain is None else self.chain.address
-        return len(self._table), address(self._table), arm
-
     def split(self, found: np.ndarray, count: int) -> list[np.ndarray]:
         """Divide values of K points, of one group behind the other, into (K, size) of each group."""
         parts = zip(self._first, self._sizes, strict=False)

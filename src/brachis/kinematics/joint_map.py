@@ -170,7 +170,6 @@ class JointMap(ABC):
         *curves: np.ndarray,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
-        groups: ValueGroups | None = None,
     ) -> JointState:
         """Joint motion at K times.
 
@@ -182,8 +181,6 @@ class JointMap(ABC):
             The times, ascending from the start on, s; by them turns are counted.
         near : (K, n) ndarray, optional
             Postures known to be near, which decide about turns; the times may then be any.
-        groups : ValueGroups, optional
-            Values that will be asked for; a map may compute them with the motion.
 
         Raises
         ------

@@ -69,8 +69,7 @@ class Evaluator:
         UnreachableError
             The joint map has no posture at one of the times.
         """
-        groups = None if self._groups.has_jerk else self._groups
-        motion = self.joint_map.state(*curves, t=t, near=near, groups=groups)
+        motion = self.joint_map.state(*curves, t=t, near=near)
         return Evaluation(self.limits, motion, self._groups)
 
 
