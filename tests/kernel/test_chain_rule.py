@@ -12,7 +12,6 @@ from brachis.kernel import (
     Formula,
     FormulaQuantity,
     MotionSlopes,
-    Prescribed,
     ScaledQuantity,
     ValueGroups,
     VariableSlopes,
@@ -20,7 +19,6 @@ from brachis.kernel import (
     formula,
 )
 from kernel.test_chain import chain_of, random_model
-from kernel.test_path_motion import motion_in
 
 POINTS = 9
 N = 5
@@ -155,32 +153,6 @@ def test_formulas_of_the_posture():
     np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
     with pytest.raises(ValueError, match="have the shapes"):
         ValueGroups([margins], [3])
-
-
-def test_a_motion_along_a_path_is_differentiated_when_it_is_needed(chain):
-    rng = np.random.default_rng(6)
-    rows = np.eye(N, N + 1)[:2]
-    q = rng.normal(size=(POINTS, N))
-    path = tuple(rng.normal(size=(3, POINTS, 3)))
-    curves = tuple(rng.normal(size=(2, POINTS, 3)))
-    asked = Prescribed((0, 1, 2))
-
-    def make():
-        return motion_in(chain, asked, q, path, [rows], curves)
-
-    joints = np.arange(N)
-    scaled = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
-    groups = ValueGroups([scaled], [N])
-    motion = make()
-    states = (q, motion.qdot, motion.qddot)
-    assert not motion._structure.is_differentiated
-    slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
-    found, _ = differentiate(groups, slopes, states, [])
-    assert motion._structure.is_differentiated
-    known = MotionSlopes(motion.gradient, *make().derivatives())
-    for own, other in zip(motion.derivatives(), make().derivatives(), strict=True):
-        np.testing.assert_array_equal(own, other)
-    np.testing.assert_array_equal(found, differentiate(groups, known, states, [])[0])
 
 
 def test_groups_can_be_sent_to_another_process(chain):

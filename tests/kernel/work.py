@@ -70,7 +70,7 @@ def work() -> None:
     for quantity in ("speed", "angular speed", "acceleration"):
         chain.tool_size_slopes(quantity, q, qdot, qddot)
     groups.values((q, qdot, qddot), q)
-    slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
+    slopes = MotionSlopes(motion.gradient, *motion.derivatives())
     places = np.arange(POINTS)
     of_curves = CurvePattern(places, places % 2, POINTS, 2)
     shared = np.ones((2, 3, POINTS, 2))

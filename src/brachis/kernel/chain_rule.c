@@ -140,11 +140,9 @@ void brachis_entries(
 }
 
 /* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width); and entries
-by variables, if they are asked for. Along a path the motion is first differentiated, if that
-has not been done; its slopes take the place of those in `motion`. With an arm the slopes of its torques are found in `motion`;
-`states` are q, qdot and qddot. */
+by variables, if they are asked for. With an arm the slopes of its torques are found in `motion`; `states` are q, qdot and qddot. */
 void brachis_differentiate(
-    long count, long n, long width, path_motion *along, const chain *arm, const double **states,
+    long count, long n, long width, const chain *arm, const double **states,
     const motion_slopes *motion, long groups, const group *of, long orders, long columns, double *table,
     const variables *by, double *found
 )
@@ -158,18 +156,10 @@ void brachis_differentiate(
             slopes[i] *= each->factors[i / n % each->values];
         }
     }
-    motion_slopes own = *motion;
-    if (along) {
-        brachis_path_derivatives(along);
-        own.gradient = along->gradients;
-        own.qdot_y = along->qdot_y;
-        own.qddot_y = along->qddot_y;
-        own.qddot_ydot = along->qddot_ydot;
-    }
     if (arm) {
-        brachis_torque_slopes(arm, count, width, states, &own);
+        brachis_torque_slopes(arm, count, width, states, motion);
     }
-    WITH_WIDTH(chain_rule, count, n, groups, of, &own, orders, columns, table)
+    WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
     if (by) {
         brachis_entries(count, columns, width, table, by, found);
     }

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.kernel.library import address, call, declare_fields
-from brachis.kernel.path_motion import PathMotion
 from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
 
 
@@ -25,9 +24,6 @@ class MotionSlopes:
     gradient, qdot_y, qddot_y, qddot_ydot : (K, n, c) ndarray
     qdddot_y : (K, n, c) ndarray or None
         Where a value depends on the jerk.
-    path_motion : PathMotion or None
-        Along a path the motion whose slopes they are. All but `gradient` are without numbers until that is
-        differentiated: by `PathMotion.derivatives`, or by `differentiate`.
     """
 
     gradient: np.ndarray
@@ -35,7 +31,6 @@ class MotionSlopes:
     qddot_y: np.ndarray
     qddot_ydot: np.ndarray
     qdddot_y: np.ndarray | None = None
-    path_motion: PathMotion | None = None
 
 
 class _Variables(ctypes.Structure):
@@ -157,13 +152,14 @@ def differentiate(
     if has_jerk and motion.qdddot_y is None:
         raise ValueError("values that depend on qdddot need qdddot_y")
     shape = count, n, width
-    along = motion.path_motion
-    if along is not None and along.gradient.shape != shape:
-        raise ValueError("the motion along the path has other joints, curves or points")
-    parts: list[Partial] = [None] * 4  # along a path the library knows them
-    if along is None:
-        parts = [motion.gradient, motion.qdot_y, motion.qddot_y, motion.qddot_ydot]
-    slopes = [keep_address(own, shape, kept) for own in (*parts, motion.qdddot_y)]
+    parts = (
+        motion.gradient,
+        motion.qdot_y,
+        motion.qddot_y,
+        motion.qddot_ydot,
+        motion.qdddot_y,
+    )
+    slopes = [keep_address(own, shape, kept) for own in parts]
     of_states = [keep_address(own, (count, n), kept) for own in states[:3]]
     arm = None
     if groups.chain is not None:
@@ -184,7 +180,6 @@ def differentiate(
         count,
         n,
         width,
-        None if along is None else along.address,
         arm,
         (ctypes.c_void_p * 3)(*of_states),
         (ctypes.c_void_p * 6)(*slopes),

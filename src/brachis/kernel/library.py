@@ -47,7 +47,7 @@ FUNCTIONS = {
     "brachis_least_singular": "- K n [Knn] >[K] >[Kn]",
     "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",
     "brachis_entries": "- K v c [oKvc] p >[ev]",
-    "brachis_differentiate": "- l l l p p p p l p l l p p p",
+    "brachis_differentiate": "- l l l p p p l p l l p p p",
     "brachis_values": "- l l p l p p",
     "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
     "brachis_solve_band": "- l l l p p",

@@ -66,9 +66,8 @@ typedef struct {
     double *gradients;    /* (K, n, c) */
     double *qdot, *qddot; /* (K, n) */
 
-    /* Found by brachis_path_derivatives, (K, n, c), once. */
+    /* Found by brachis_path_derivatives, (K, n, c). */
     double *qdot_y, *qddot_y, *qddot_ydot;
-    long is_differentiated;
 } path_motion;
 
 /* Derivatives of the joint motion by the curves, (K, n, width) each; see kinematics/joint_map.py. That of the jerk counts only
@@ -118,6 +117,5 @@ void brachis_newton(
     int beside, double *found
 );
 void brachis_path_motion(path_motion *own);
-void brachis_path_derivatives(path_motion *own);
 
 #endif

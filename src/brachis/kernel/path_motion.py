@@ -71,8 +71,7 @@ class _PathMotion(ctypes.Structure):
     """`path_motion` of motion.h."""
 
     _fields_ = declare_fields(
-        "p arm asked by; l count rows_step; d side;"
-        f"p {' '.join((*_GIVEN, *_FOUND))}; l is_differentiated"
+        f"p arm asked by; l count rows_step; d side;p {' '.join((*_GIVEN, *_FOUND))}"
     )
 
 
@@ -213,16 +212,11 @@ class PathMotion(Structured):
         fault = call("brachis_evaluate", self.address)
         return Fault(fault) if fault else None
 
-    @property
-    def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Room for dqdot/dy, dqddot/dy and dqddot/dydot, (K, n, 1 + r) each; see `derivatives`."""
+    def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each."""
+        call("brachis_path_derivatives", self.address)
         written = self.written
         return written["qdot_y"], written["qddot_y"], written["qddot_ydot"]
-
-    def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each; once."""
-        call("brachis_path_derivatives", self.address)
-        return self.slopes
 
     def singular_slopes(
         self, values: np.ndarray, vectors: np.ndarray

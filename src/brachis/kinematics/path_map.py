@@ -40,7 +40,6 @@ from brachis.errors import UnreachableError
 from brachis.kernel import (
     Branch,
     Fault,
-    MotionSlopes,
     PathMotion,
     find_least_singular,
 )
@@ -59,11 +58,6 @@ class PathState(JointState):
     """
 
     motion: PathMotion
-
-    @property
-    def slopes(self) -> MotionSlopes:
-        """The exact derivatives, which the kernel computes when it needs them."""
-        return MotionSlopes(self.gradient, *self.motion.slopes, path_motion=self.motion)
 
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
