@@ -21,12 +21,7 @@ from brachis.kernel.postures import Branch
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.splines import Basis, Spline, blossom, collocation
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
-from brachis.kernel.value_groups import (
-    FormulaQuantity,
-    Quantity,
-    ScaledQuantity,
-    ValueGroups,
-)
+from brachis.kernel.value_groups import ScaledQuantity, ValueGroups
 
 __all__ = [
     "Basis",
@@ -35,11 +30,9 @@ __all__ = [
     "CurvePattern",
     "Fault",
     "Formula",
-    "FormulaQuantity",
     "MotionSlopes",
     "PathMotion",
     "Prescribed",
-    "Quantity",
     "ScaledQuantity",
     "Spline",
     "TorqueDerivatives",

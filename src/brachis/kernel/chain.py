@@ -12,7 +12,7 @@ from brachis.kernel.library import (
     Structured,
     address,
     as_contiguous,
-    call,
+    compute,
     declare_fields,
     shape_of,
 )
@@ -183,4 +183,4 @@ class Chain(Structured):
 
     def _call(self, name: str, *arguments: np.ndarray | int | None) -> Any:
         """Call a function of the library for this chain."""
-        return call(name, self.address, *arguments, n=self.n)
+        return compute(name, self.address, *arguments, n=self.n)

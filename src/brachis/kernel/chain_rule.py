@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import address, call, declare_fields
+from brachis.kernel.library import address, call, compute, declare_fields
 from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
 
 
@@ -113,7 +113,9 @@ class VariableSlopes:
             raise ValueError("slopes are of other points or curves")
         kept: list[np.ndarray] = []
         structure = ctypes.byref(self.structure(orders, kept))
-        entries: np.ndarray = call("brachis_entries", slopes, structure, e=self.entries)
+        entries: np.ndarray = compute(
+            "brachis_entries", slopes, structure, e=self.entries
+        )
         return entries
 
 
@@ -162,7 +164,7 @@ def differentiate(
     slopes = [keep_address(own, shape, kept) for own in parts]
     of_states = [keep_address(own, (count, n), kept) for own in states[:3]]
     arm = None
-    if groups.chain is not None:
+    if groups.chain is not None and groups.has_torque:
         slopes.append(keep_address(np.empty((3, *shape)), (3, *shape), kept))
         arm = groups.chain.address
     columns = groups.size

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import call
+from brachis.kernel.library import compute
 
 
 def halve_intervals(
@@ -52,5 +52,5 @@ def halve_intervals(
     timing = (t, accelerations, rate, jumps, ramps, few)
     sizes = {"S": len(t) - 1, "B": max(most, pieces) + 2}
     ends = (pieces, tolerance, shortest, most)
-    count, begins = call("brachis_halve", *timing, *ends, **sizes)
+    count, begins = compute("brachis_halve", *timing, *ends, **sizes)
     return np.sort(begins[:count])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,7 +48,6 @@ FUNCTIONS = {
     "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",
     "brachis_entries": "- K v c [oKvc] p >[ev]",
     "brachis_differentiate": "- l l l p p p l p l l p p p",
-    "brachis_values": "- l l p l p p",
     "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
     "brachis_solve_band": "- l l l p p",
     "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
@@ -61,7 +60,8 @@ An array has its shape in brackets: a letter is a size, a digit a number. Arrays
 behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size.
 """
 _DOUBLE = np.dtype(np.float64)
-_WHOLE = np.dtype("l")
+WHOLE = np.dtype("l")
+"""Whole numbers of the library."""
 
 
 def _split(word: str) -> tuple[str, str]:
@@ -74,6 +74,9 @@ _ARGUMENTS = {
     name: [_split(word) for word in words.split()[1:]]
     for name, words in FUNCTIONS.items()
 }
+
+
+_DIGITS = {str(digit): digit for digit in range(10)}
 
 
 def declare_fields(declaration: str) -> list[tuple[str, Any]]:
@@ -138,16 +141,24 @@ def address(values: np.ndarray) -> int:
         return int(place)
 
 
-def call(name: str, *arguments: Any, **sizes: int) -> Any:
-    """Call a function of the library.
+def call(name: str, *arguments: Any) -> Any:
+    """Call a function of the library; of contiguous arrays it gets the addresses."""
+    plain = [
+        address(value) if isinstance(value, np.ndarray) else value
+        for value in arguments
+    ]
+    return getattr(load(), name)(*plain)
+
+
+def compute(name: str, *arguments: Any, **sizes: int) -> Any:
+    """Call a function of the library with arrays of the shapes that are declared, and make room for what it writes.
 
     Parameters
     ----------
     name : str
         One of `FUNCTIONS`.
     *arguments
-        What it takes, but for sizes and for the arrays that it writes. Of a contiguous array without a declared shape
-        it gets the address.
+        What it takes, but for sizes and for the arrays that it writes.
     **sizes : int
         By the letters that stand for them; those that follow from the shapes of arrays may be left out.
 
@@ -160,42 +171,65 @@ def call(name: str, *arguments: Any, **sizes: int) -> Any:
     ValueError, TypeError
         See `as_contiguous`.
     """
-    given = iter(arguments)
-    values: list[Any] = []
-    written: list[np.ndarray] = []
-    for kind, letters in _ARGUMENTS[name]:
-        if kind == ">":
-            written.append(np.empty(shape_of(letters, sizes)))
-        elif letters or kind in _KINDS:
-            values.append(_check(next(given), kind, letters, sizes))
-        else:
-            values.append(kind)
-    plain = [_make_plain(value, sizes) for value in (*values, *written)]
-    returned = getattr(load(), name)(*plain)
+    shapes = tuple([getattr(value, "shape", None) for value in arguments])
+    found = _find_shapes(name, shapes, tuple(sizes.items()))
+    pairs = zip(arguments, found.taken, strict=True)
+    taken = iter([as_contiguous(value, *own) if own else value for value, own in pairs])
+    written = [np.empty(shape) for shape in found.written]
+    values = [next(taken) if size is None else size for size in found.sizes]
+    returned = call(name, *values, *written)
     results = written if FUNCTIONS[name][0] == "-" else [returned, *written]
     return results[0] if len(results) == 1 else results
 
 
+class _CallShapes(NamedTuple):
+    """Shapes in one call.
+
+    Attributes
+    ----------
+    taken : list
+        For what is handed over shape and kind of numbers; empty where no shape is declared.
+    sizes : list of int or None
+        For each argument that is not written to the size that it is; None where it is handed over.
+    written : list of tuple of int
+        Shapes of arrays that are written to.
+    """
+
+    taken: list[tuple[Any, ...]]
+    sizes: list[int | None]
+    written: list[tuple[int, ...]]
+
+
+@lru_cache(maxsize=4096)
+def _find_shapes(
+    name: str,
+    shapes: tuple[tuple[int, ...] | None, ...],
+    sizes: tuple[tuple[str, int], ...],
+) -> _CallShapes:
+    """Find what the shapes of arguments say of a function's sizes and of what it writes."""
+    known = _DIGITS | dict(sizes)
+    words = _ARGUMENTS[name]
+    inputs = [word for word in words if word[0] in ("", *_KINDS)]
+    taken: list[tuple[Any, ...]] = []
+    for (kind, letters), shape in zip(inputs, shapes, strict=True):
+        for letter, size in zip(letters, shape or (), strict=False):
+            known.setdefault(letter, size)
+        needed = tuple([known.get(letter, -1) for letter in letters])
+        taken.append((needed, WHOLE if kind == "l" else _DOUBLE) if letters else ())
+    return _CallShapes(
+        taken,
+        [
+            None if word in inputs else known[word[0]]
+            for word in words
+            if word[0] != ">"
+        ],
+        [shape_of(letters, known) for kind, letters in words if kind == ">"],
+    )
+
+
 def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
-    """Return the shape that letters and digits stand for; unknown sizes are -1."""
-    return tuple([int(own) if own.isdigit() else sizes.get(own, -1) for own in letters])
-
-
-def _make_plain(value: Any, sizes: Mapping[str, int]) -> Any:
-    """Return the address of an array, the size that a letter stands for, and all else as it is."""
-    if isinstance(value, np.ndarray):
-        return address(value)
-    return sizes[value] if isinstance(value, str) else value
-
-
-def _check(value: Any, kind: str, letters: str, sizes: dict[str, int]) -> Any:
-    """Return an argument as the library takes it; sizes that are not known yet are those of an array."""
-    if not letters:
-        return value
-    for letter, size in zip(letters, np.shape(value), strict=False):
-        sizes.setdefault(letter, size)
-    dtype = _WHOLE if kind == "l" else _DOUBLE
-    return as_contiguous(value, shape_of(letters, sizes), dtype)
+    """Return the shape that letters and digits stand for."""
+    return tuple(sizes[own] if own in sizes else int(own) for own in letters)
 
 
 class Structured:

@@ -11,7 +11,7 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.library import (
     Structured,
     as_doubles_at_points,
-    call,
+    compute,
     declare_fields,
 )
 
@@ -91,5 +91,5 @@ def find_postures(
     own = (chain.address, prescribed.address)
     sizes = {"z": prescribed.coordinates, "r": free, "n": chain.n}
     arrays = (targets, starts, table, step, levels)
-    postures: np.ndarray = call("brachis_newton", *own, *arrays, beside, **sizes)
+    postures: np.ndarray = compute("brachis_newton", *own, *arrays, beside, **sizes)
     return postures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import call
+from brachis.kernel.library import compute
 
 
 def bounds_of_pairs(
@@ -24,7 +24,7 @@ def bounds_of_pairs(
     least, most : (P,) ndarray
         The largest x is -1 where parallel lines leave nothing between them.
     """
-    least, most = call("brachis_bounds_of_pairs", slope, lower, upper, parallel)
+    least, most = compute("brachis_bounds_of_pairs", slope, lower, upper, parallel)
     return least, most
 
 
@@ -58,7 +58,9 @@ def go_backwards(
     """
     count = len(steps[0]) + 1
     ends = (last, flat, rounding)
-    reached, low, high = call("brachis_go_backwards", *steps, *levels, *ends, P=count)
+    reached, low, high = compute(
+        "brachis_go_backwards", *steps, *levels, *ends, P=count
+    )
     return (low, high) if reached else None
 
 
@@ -69,7 +71,7 @@ def go_forwards(
     first: float,
 ) -> np.ndarray:
     """Find the largest x, (P,), from the first station on, within intervals, (P,) each; see `go_backwards`."""
-    x: np.ndarray = call(
+    x: np.ndarray = compute(
         "brachis_go_forwards", factor, most, *within, first, P=len(factor) + 1
     )
     return x

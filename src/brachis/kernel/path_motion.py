@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from brachis.kernel.library import (
     as_contiguous,
     as_doubles_at_points,
     call,
+    compute,
     declare_fields,
     shape_of,
 )
@@ -75,6 +77,16 @@ class _PathMotion(ctypes.Structure):
     )
 
 
+@lru_cache
+def _lay_out(**sizes: int) -> tuple[dict[str, tuple[int, ...]], np.dtype[Any]]:
+    """Return the shapes of what is given, and one record for all that is written."""
+    given = {name: shape_of(letters, sizes) for name, letters in _GIVEN.items()}
+    written = [
+        (name, float, shape_of(letters, sizes)) for name, letters in _FOUND.items()
+    ]
+    return given, np.dtype(written)
+
+
 def _written(name: str) -> Any:
     """Return a property: one of the arrays that the library writes."""
     return property(lambda motion: motion.written[name])
@@ -103,7 +115,7 @@ class PathMotion(Structured):
         1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known to be so.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
-    written : dict of str to ndarray
+    written : ndarray
         What the library writes; the arrays below are among them.
     answers : (K, A, m) ndarray
         Of a closed form.
@@ -124,7 +136,7 @@ class PathMotion(Structured):
     side: float
     given: dict[str, np.ndarray]
     rows_step: int
-    written: dict[str, np.ndarray]
+    written: np.ndarray
 
     @classmethod
     def prepare(
@@ -154,28 +166,24 @@ class PathMotion(Structured):
         if branch is not None:
             branch.check_fits(n, n - m, prescribed.coordinates)
             alternatives = branch.alternatives
-        sizes = {
-            "K": len(given["y"]),
-            "n": n,
-            "m": m,
-            "r": n - m,
-            "c": 1 + n - m,
-            "w": n + 1,
-            "z": prescribed.coordinates,
-            "g": n + (n - m) * (n + 1),
-            "a": alternatives,
-        }
+        shapes, record = _lay_out(
+            K=len(given["y"]),
+            n=n,
+            m=m,
+            r=n - m,
+            c=1 + n - m,
+            w=n + 1,
+            z=prescribed.coordinates,
+            g=n + (n - m) * (n + 1),
+            a=alternatives,
+        )
         kept = {
-            name: as_contiguous(own, shape_of(_GIVEN[name], sizes))
+            name: as_contiguous(own, shapes[name])
             for name, own in given.items()
             if name != "rows"
         }
-        kept["rows"], step = as_doubles_at_points(
-            given["rows"], shape_of(_GIVEN["rows"], sizes)
-        )
-        written = {
-            name: np.empty(shape_of(letters, sizes)) for name, letters in _FOUND.items()
-        }
+        kept["rows"], step = as_doubles_at_points(given["rows"], shapes["rows"])
+        written = np.empty((), record)
         return cls(chain, prescribed, branch, side, kept, step, written)
 
     answers = _written("answers")
@@ -189,6 +197,8 @@ class PathMotion(Structured):
 
     def _make_structure(self) -> _PathMotion:
         given = self.given
+        first = address(self.written)
+        record: Any = self.written.dtype.fields
         return _PathMotion(
             self.chain.address,
             self.prescribed.address,
@@ -197,7 +207,7 @@ class PathMotion(Structured):
             self.rows_step,
             self.side,
             *[address(given[name]) if name in given else None for name in _GIVEN],
-            *map(address, self.written.values()),
+            *[first + offset for _, offset in record.values()],
         )
 
     def find_postures(self) -> np.ndarray:
@@ -224,7 +234,7 @@ class PathMotion(Structured):
         """Differentiate what `find_least_singular` gives for J_aug, (K,), by q, (K, n), and by s, (K,)."""
         count, n = self.qdot.shape
         name = "brachis_singular_slopes"
-        by_q, by_s = call(name, self.address, values, vectors, K=count, n=n)
+        by_q, by_s = compute(name, self.address, values, vectors, K=count, n=n)
         return by_q, by_s
 
 
@@ -237,5 +247,5 @@ def _need(given: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
-    values, vectors = call("brachis_least_singular", inverses)
+    values, vectors = compute("brachis_least_singular", inverses)
     return values, vectors

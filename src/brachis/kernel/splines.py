@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brachis.kernel.library import as_contiguous, call
+from brachis.kernel.library import as_contiguous, call, compute
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def blossom(
         raise ValueError(f"a piece does not exist; they are {degree} to {points - 1}")
     places = np.reshape(arguments, (degree, count))
     arrays = (knots, control_points, piece, places)
-    values: np.ndarray = call("brachis_blossoms", *arrays, g=degree, L=points)
+    values: np.ndarray = compute("brachis_blossoms", *arrays, g=degree, L=points)
     return values
 
 
@@ -163,5 +163,5 @@ class Basis:
         if len(self._first) and many < self._needed:
             raise ValueError(f"a control point does not exist; there are {many}")
         arrays = (self._values, self._first, control_points)
-        values: np.ndarray = call("brachis_curves", *arrays)
+        values: np.ndarray = compute("brachis_curves", *arrays)
         return values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import call
+from brachis.kernel.library import compute
 
 
 def tool_derivatives(
@@ -25,7 +25,7 @@ def tool_derivatives(
     tuple of (6, K, n) ndarray
         dV/dq, da/dq and da/dqdot.
     """
-    velocity_q, acceleration_q, acceleration_qdot = call(
+    velocity_q, acceleration_q, acceleration_qdot = compute(
         "brachis_tool_derivatives", twists, qdot, qddot, in_tool_axes
     )
     return velocity_q, acceleration_q, acceleration_qdot
@@ -33,5 +33,5 @@ def tool_derivatives(
 
 def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
     """Rotation vectors, (K, 3), rad, of rotation matrices, (K, 3, 3)."""
-    vectors: np.ndarray = call("brachis_logarithms", rotations)
+    vectors: np.ndarray = compute("brachis_logarithms", rotations)
     return vectors
