@@ -197,7 +197,7 @@ class PathMotion(Structured):
 
     def _make_structure(self) -> _PathMotion:
         given = self.given
-        first = address(self.written)
+        first = self.written.ctypes.data
         record: Any = self.written.dtype.fields
         return _PathMotion(
             self.chain.address,
