@@ -9,19 +9,13 @@ import pytest
 
 from brachis.kernel import (
     CurvePattern,
-    Formula,
-    FormulaQuantity,
     MotionSlopes,
-    PathMotion,
-    Prescribed,
     ScaledQuantity,
     ValueGroups,
     VariableSlopes,
     differentiate,
-    formula,
 )
 from kernel.test_chain import chain_of, random_model
-from kernel.test_path_motion import motion_in
 
 POINTS = 9
 N = 5
@@ -106,23 +100,16 @@ def test_scaled_quantities(chain, quantity):
     """Each is its partials, which are rows of the unit matrix or derivatives of the torque, times the factors."""
     rng = np.random.default_rng(5)
     joints = np.array([3, 0, 3])
-    offsets, factors = rng.normal(size=(2, 3))
-    scaled = ScaledQuantity(quantity, joints, offsets, factors, chain)
+    factors = rng.normal(size=3)
+    scaled = ScaledQuantity(quantity, joints, factors, chain)
     states = rng.normal(size=(4, POINTS, N))
     parts = list(rng.normal(size=(5, POINTS, N, 3)))
-    torque = chain.torques(*states[:3])
-    quantities = dict(zip(("q", "qdot", "qddot", "qdddot"), states, strict=True))
-    quantities["torque"] = torque
     groups = ValueGroups([scaled], [3])
-    (values,) = groups.values(states, torque)
-    known = (quantities[quantity][:, joints] - offsets) * factors
-    np.testing.assert_array_equal(values, known)
-
     partials = np.zeros((4, POINTS, N, N))
     if quantity == "torque":
         partials[:3] = chain.torque_derivatives(*states[:3])
     else:
-        partials[list(quantities).index(quantity)] = np.eye(N)
+        partials[("q", "qdot", "qddot", "qdddot").index(quantity)] = np.eye(N)
     partials = partials[:, :, joints] * factors[:, None]
     has_jerk = quantity == "qdddot"
     motion = MotionSlopes(*parts[:4], parts[4] if has_jerk else None)
@@ -131,90 +118,16 @@ def test_scaled_quantities(chain, quantity):
     np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
 
 
-def test_formulas_of_the_posture():
-    """Margins are such: numbers of a formula, times signs."""
-    rng = np.random.default_rng(7)
-    states = rng.normal(size=(3, POINTS, N))
-
-    def function(q):
-        return np.stack([q[:, 0] * q[:, 2], formula.sin(q[:, 4])], axis=1)
-
-    factors = np.array([2.0, -1.0])
-    margins = FormulaQuantity(
-        Formula.of(function, N), Formula.gradient(function, N), factors
-    )
-    groups = ValueGroups([None, margins], [1, 2])
-    values = groups.values(states)[1]
-    np.testing.assert_allclose(values, function(states[0]) * factors, atol=1e-14)
-    parts = rng.normal(size=(5, POINTS, N, 3))
-    by_q = margins.slopes_of(states[0]) * factors[:, None]
-    zero = np.zeros_like(by_q)
-    given = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
-    motion = MotionSlopes(*parts[:4])
-    found, _ = differentiate(groups, motion, states, given)
-    known = slopes_of((by_q, zero, zero, zero), parts, with_jerk=False)
-    np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
-    with pytest.raises(ValueError, match="have the shapes"):
-        ValueGroups([margins], [3])
-
-
-def test_values_come_with_a_motion_along_a_path(chain):
-    rng = np.random.default_rng(8)
-    joints = np.arange(N)
-    torque = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
-    groups = ValueGroups([torque, None], [N, 2])
-    one = np.ones((POINTS, 3))
-    given = {"y": one, "rows": np.eye(N, N + 1)[:2]}
-    for name in ("ydot", "yddot", "xi", "xi_ds", "xi_dds"):
-        given[name] = rng.normal(size=(POINTS, 3))
-    motion = PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, groups=groups)
-    motion.q[:] = rng.normal(size=(POINTS, N))
-    assert not motion.evaluate()
-    known = chain.torques(motion.q, motion.qdot, motion.qddot)
-    np.testing.assert_array_equal(motion.torque, known)
-    np.testing.assert_array_equal(motion.values[0], known)
-    other = chain_of(*random_model(3, 1))
-    with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
-        PathMotion.prepare(other, Prescribed((0,)), given, groups=groups)
-
-
-def test_a_motion_along_a_path_is_differentiated_when_it_is_needed(chain):
-    rng = np.random.default_rng(6)
-    rows = np.eye(N, N + 1)[:2]
-    q = rng.normal(size=(POINTS, N))
-    path = tuple(rng.normal(size=(3, POINTS, 3)))
-    curves = tuple(rng.normal(size=(2, POINTS, 3)))
-    asked = Prescribed((0, 1, 2))
-
-    def make():
-        return motion_in(chain, asked, q, path, [rows], curves)
-
-    joints = np.arange(N)
-    scaled = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
-    groups = ValueGroups([scaled], [N])
-    motion = make()
-    states = (q, motion.qdot, motion.qddot)
-    assert not motion._structure.is_differentiated
-    slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
-    found, _ = differentiate(groups, slopes, states, [])
-    assert motion._structure.is_differentiated
-    known = MotionSlopes(motion.gradient, *make().derivatives())
-    for own, other in zip(motion.derivatives(), make().derivatives(), strict=True):
-        np.testing.assert_array_equal(own, other)
-    np.testing.assert_array_equal(found, differentiate(groups, known, states, [])[0])
-
-
 def test_groups_can_be_sent_to_another_process(chain):
     one = np.ones(1)
-    groups = ValueGroups(
-        [ScaledQuantity("torque", np.array([2]), one, one, chain)], [1]
-    )
-    states = np.random.default_rng(7).normal(size=(3, POINTS, N))
+    groups = ValueGroups([ScaledQuantity("torque", np.array([2]), one, chain)], [1])
+    rng = np.random.default_rng(7)
+    states = rng.normal(size=(3, POINTS, N))
+    motion = MotionSlopes(*rng.normal(size=(4, POINTS, N, 3)))
     again = copy.deepcopy(groups)  # as another process gets it
-    torque = np.random.default_rng(8).normal(size=(POINTS, N))
-    (known,) = groups.values(states, torque)
+    known, _ = differentiate(groups, motion, states, [])
     del groups
-    (found,) = again.values(states, torque)
+    found, _ = differentiate(again, motion, states, [])
     np.testing.assert_array_equal(found, known)
 
 
@@ -242,25 +155,18 @@ def test_what_does_not_fit_is_refused(chain):
     with pytest.raises(ValueError, match="other points"):
         differentiate(groups, motion, states, partials, variables)
     one = np.ones(1)
-    beyond = ScaledQuantity("q", np.array([N]), one, one, chain)
+    beyond = ScaledQuantity("q", np.array([N]), one, chain)
     with pytest.raises(ValueError, match="joint"):
         ValueGroups([beyond], [1])
     first = np.zeros(1, dtype=int)
-    torque = ScaledQuantity("torque", first, one, one, chain)
+    torque = ScaledQuantity("torque", first, one, chain)
     groups = ValueGroups([torque], [1])
-    with pytest.raises(ValueError, match="needs the torque"):
-        groups.values(states)
-    with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
-        groups.values(states[:, :, :3], states[0, :, :3])
     fewer = MotionSlopes(*np.zeros((4, POINTS, 3, 3)))
     with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
         differentiate(groups, fewer, states[:, :, :3], [])
-    other = chain_of(*random_model(3, 1))
-    with pytest.raises(ValueError, match="different numbers"):
-        ValueGroups([torque, ScaledQuantity("q", first, one, one, other)], [1, 1])
-    again = chain_of(*random_model(N, 2))
+    other = chain_of(*random_model(N, 2))
     with pytest.raises(ValueError, match="more than one chain"):
-        ValueGroups([torque, ScaledQuantity("torque", first, one, one, again)], [1, 1])
+        ValueGroups([torque, ScaledQuantity("q", first, one, other)], [1, 1])
 
 
 def test_partials_by_the_jerk_need_its_slopes(chain):
@@ -275,8 +181,6 @@ def test_partials_by_the_jerk_need_its_slopes(chain):
             [((None, None, None, partials), None)],
         )
     one = np.ones(1)
-    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
+    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, chain)
     with pytest.raises(ValueError, match="qdddot_y"):
         differentiate(ValueGroups([jerk], [1]), motion, states, [])
-    with pytest.raises(ValueError, match="qdddot"):
-        ValueGroups([jerk], [1]).values(states)

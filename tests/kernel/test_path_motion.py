@@ -11,8 +11,6 @@ from brachis.kernel import (
     Fault,
     PathMotion,
     Prescribed,
-    ScaledQuantity,
-    ValueGroups,
     find_least_singular,
     largest_parts,
     tool_derivatives,
@@ -246,10 +244,6 @@ def test_what_the_library_would_read_beyond_its_end_is_refused():
         PathMotion.prepare(chain, asked, given | {"reference": np.zeros((1, 7))})
     with pytest.raises(ValueError, match="ydot, yddot, xi, xi_ds, xi_dds of the"):
         PathMotion.prepare(chain, asked, given).evaluate()
-    one = np.ones(1)
-    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
-    with pytest.raises(ValueError, match="needs qdddot"):
-        PathMotion.prepare(chain, asked, given, groups=ValueGroups([jerk], [1]))
 
 
 def test_derivatives_are_those_of_the_last_evaluation(case):

@@ -9,10 +9,8 @@ from brachis.kernel import (
     Branch,
     Fault,
     Formula,
-    FormulaQuantity,
     PathMotion,
     Prescribed,
-    ValueGroups,
 )
 from brachis.robot.chain import chain_of
 from support.random_chains import random_model
@@ -166,8 +164,7 @@ def test_a_branch_of_another_chain_is_refused():
         PathMotion.prepare(chain, ASKED, given, branch=branch)
 
 
-def test_formulas_of_answers_and_of_margins_share_their_room():
-    """The first is long, the second short, and the other way round."""
+def test_a_formula_of_answers():
     rng = np.random.default_rng(5)
     chain = chain_of(*random_model(N, 1))
     mask = np.zeros(N, dtype=bool)
@@ -177,20 +174,12 @@ def test_formulas_of_answers_and_of_margins_share_their_room():
             targets = targets * targets + q_r
         return (targets * 0.0 + q_r)[:, None]
 
-    def margins(q):
-        return q[:, :1] * q[:, 1:2]
-
     branch = Branch(
         REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, Formula.of(answers, 2, 1)
     )
-    quantity = FormulaQuantity(
-        Formula.of(margins, N), Formula.gradient(margins, N), np.ones(1)
-    )
-    groups = ValueGroups([quantity], [1])
     names = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds", "targets")
     given = {name: rng.uniform(0.1, 0.5, (7, 2)) for name in names}
     given["rows"] = np.eye(N, N + 1)[[1]]
-    motion = PathMotion.prepare(chain, ASKED, given, branch=branch, groups=groups)
+    motion = PathMotion.prepare(chain, ASKED, given, branch=branch)
     assert motion.evaluate() is None
     np.testing.assert_allclose(motion.q, given["y"][:, [1, 1, 1]], atol=1e-15)
-    np.testing.assert_allclose(motion.values[0], margins(motion.q), atol=1e-15)

@@ -60,17 +60,16 @@ def work() -> None:
     given["rows"] = np.eye(N, N + 1)[[0]]
     given["y"] = rng.normal(size=(POINTS, 2))
     every = np.arange(N)
-    torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
+    torque = ScaledQuantity("torque", every, np.ones(N), chain)
     groups = ValueGroups([torque, None], [N, N])
-    motion = PathMotion.prepare(chain, asked, given, groups=groups)
+    motion = PathMotion.prepare(chain, asked, given)
     motion.q[:] = q
     motion.evaluate()
     motion.derivatives()
     motion.singular_slopes(*find_least_singular(motion.inverse))
     for quantity in ("speed", "angular speed", "acceleration"):
         chain.tool_size_slopes(quantity, q, qdot, qddot)
-    groups.values((q, qdot, qddot), q)
-    slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
+    slopes = MotionSlopes(motion.gradient, *motion.derivatives())
     places = np.arange(POINTS)
     of_curves = CurvePattern(places, places % 2, POINTS, 2)
     shared = np.ones((2, 3, POINTS, 2))
@@ -85,9 +84,6 @@ def work() -> None:
         targets,
         q + 0.01,
         (np.eye(N)[[0]], q[:, :1]),
-        steps=20,
-        tolerance=1e-12,
-        largest_step=0.5,
         beside=False,
     )
     mask = np.ones(N)

@@ -17,7 +17,6 @@ import numpy as np
 from brachis.common.arrays import apply_each
 from brachis.ik.screws import ChainGeometry
 from brachis.kernel import find_postures
-from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE
 from brachis.robot import TaskMap
 
 
@@ -86,9 +85,6 @@ class Newton:
             targets,
             q,
             (rows, levels),
-            steps=8 if beside else STEPS,
-            tolerance=TOLERANCE,
-            largest_step=0.2 if beside else LARGEST_STEP,
             beside=beside,
         )
 

@@ -4,7 +4,7 @@ Pinocchio builds the model and is the reference: the tests compare the kernel wi
 formulas.
 """
 
-from brachis.kernel.chain import Chain
+from brachis.kernel.chain import Chain, TorqueDerivatives
 from brachis.kernel.chain_rule import (
     CurvePattern,
     MotionSlopes,
@@ -21,12 +21,7 @@ from brachis.kernel.postures import Branch
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.splines import Basis, Spline, blossom, collocation
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
-from brachis.kernel.value_groups import (
-    FormulaQuantity,
-    Quantity,
-    ScaledQuantity,
-    ValueGroups,
-)
+from brachis.kernel.value_groups import ScaledQuantity, ValueGroups
 
 __all__ = [
     "Basis",
@@ -35,13 +30,12 @@ __all__ = [
     "CurvePattern",
     "Fault",
     "Formula",
-    "FormulaQuantity",
     "MotionSlopes",
     "PathMotion",
     "Prescribed",
-    "Quantity",
     "ScaledQuantity",
     "Spline",
+    "TorqueDerivatives",
     "ValueGroups",
     "VariableSlopes",
     "blossom",

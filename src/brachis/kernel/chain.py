@@ -4,28 +4,56 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from brachis.kernel.library import (
     Structured,
     address,
-    as_doubles,
-    call,
+    as_contiguous,
+    compute,
     declare_fields,
+    shape_of,
 )
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
 """In the order of tool.c."""
 
 
+_SHAPES = {
+    "revolute": "n",
+    "axes": "n3",
+    "points": "n3",
+    "tool_position": "3",
+    "tool_rotation": "33",
+    "masses": "n",
+    "centers": "n3",
+    "inertias": "n6",
+    "gravity": "3",
+    "friction": "n4",
+}
+"""Of the numbers of a chain, in the order of chain.h, with n joints."""
+
+
 class _Chain(ctypes.Structure):
     """`chain` of chain.h."""
 
-    _fields_ = declare_fields(
-        "l joints;"
-        "p turns axes points tool_position tool_rotation masses centers inertias gravity friction"
-    )
+    _fields_ = declare_fields(f"l joints; p {' '.join(_SHAPES)}")
+
+
+class TorqueDerivatives(NamedTuple):
+    """Derivatives of the torque of K states, each (K, n, n): row joint torque, column joint.
+
+    Attributes
+    ----------
+    q, qdot, qddot : (K, n, n) ndarray
+        With respect to position, velocity, acceleration (the last is the mass matrix plus armature).
+    """
+
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,46 +101,31 @@ class Chain(Structured):
         return len(self.revolute)
 
     def _make_structure(self) -> _Chain:
-        n = self.n
-        shapes = {
-            "revolute": (n,),
-            "axes": (n, 3),
-            "points": (n, 3),
-            "tool_position": (3,),
-            "tool_rotation": (3, 3),
-            "masses": (n,),
-            "centers": (n, 3),
-            "inertias": (n, 6),
-            "gravity": (3,),
-            "friction": (n, 4),
-        }
+        sizes = {"n": self.n}
         numbers = [
-            as_doubles(getattr(self, name), shape) for name, shape in shapes.items()
+            as_contiguous(getattr(self, name), shape_of(letters, sizes))
+            for name, letters in _SHAPES.items()
         ]
-        structure = _Chain(n, *map(address, numbers))
+        structure = _Chain(self.n, *map(address, numbers))
         structure.kept = numbers
         return structure
 
     def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
         """Torques, (K, n), Nm or N, of rigid bodies, rotors and friction in K states, (K, n) each."""
-        found = np.empty((len(q), self.n))
-        self._call("brachis_torques", (q, qdot, qddot), found)
-        return found
+        torques: np.ndarray = self._call("brachis_torques", q, qdot, qddot)
+        return torques
 
     def torque_derivatives(
         self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate `torques` by q, qdot and qddot, (K, n, n) each: row joint torque, column joint."""
-        by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n, self.n))
+    ) -> TorqueDerivatives:
+        """Differentiate `torques` by q, qdot and qddot."""
         states = (q, qdot, qddot)
-        self._call("brachis_torque_derivatives", states, by_q, by_qdot, by_qddot)
-        return by_q, by_qdot, by_qddot
+        return TorqueDerivatives(*self._call("brachis_torque_derivatives", *states))
 
     def mass_matrices(self, q: np.ndarray) -> np.ndarray:
         """Mass matrices with rotors, (K, n, n), of K postures, (K, n)."""
-        found = np.empty((len(q), self.n, self.n))
-        self._call("brachis_mass_matrices", (q,), found)
-        return found
+        matrices: np.ndarray = self._call("brachis_mass_matrices", q)
+        return matrices
 
     def tool(
         self, q: np.ndarray, *, in_tool_axes: bool
@@ -128,13 +141,8 @@ class Chain(Structured):
             Columns of the Jacobian: linear, then angular velocity at the tool's origin, along the tool's axes or the
             world's.
         """
-        count = len(q)
-        positions = np.empty((count, 3))
-        rotations = np.empty((count, 3, 3))
-        twists = np.empty((6, count, self.n))
-        found = (positions, rotations, twists)
-        self._call("brachis_tool", (q,), int(in_tool_axes), *found)
-        return found
+        positions, rotations, twists = self._call("brachis_tool", q, in_tool_axes)
+        return positions, rotations, twists
 
     def tool_sizes(
         self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
@@ -152,39 +160,27 @@ class Chain(Structured):
         (K,) ndarray
             m/s, rad/s or m/s^2.
         """
-        return self._find_sizes(quantity, (q, qdot, qddot), (0, 0, 0))
+        return self._find_sizes(quantity, (q, qdot, qddot), None)
 
     def tool_size_slopes(
         self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Compute `tool_sizes`, (K,), and their slopes by q, qdot and qddot, (K, n) each: 0 where the size is 0."""
-        by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n))
-        slopes = (by_q, by_qdot, by_qddot)
-        return self._find_sizes(quantity, (q, qdot, qddot), slopes), slopes
+        by_q, by_qdot, by_qddot = slopes = np.empty((3, len(q), self.n))
+        sizes = self._find_sizes(quantity, (q, qdot, qddot), slopes)
+        return sizes, (by_q, by_qdot, by_qddot)
 
     def _find_sizes(
         self,
         quantity: str,
-        states: tuple[np.ndarray, ...],
-        slopes: tuple[np.ndarray | int, ...],
+        states: tuple[np.ndarray, np.ndarray, np.ndarray],
+        slopes: np.ndarray | None,
     ) -> np.ndarray:
-        """Return `tool_sizes`, and write `slopes` unless these are zeros."""
-        sizes = np.empty(len(states[0]))
-        before = (_QUANTITIES.index(quantity),)
-        self._call("brachis_tool_sizes", states, sizes, *slopes, before=before)
+        """Return `tool_sizes`, and write `slopes`, (3, K, n), if these are asked for."""
+        number = _QUANTITIES.index(quantity)
+        sizes: np.ndarray = self._call("brachis_tool_sizes", number, *states, slopes)
         return sizes
 
-    def _call(
-        self,
-        name: str,
-        states: tuple[np.ndarray, ...],
-        *others: np.ndarray | int,
-        before: tuple[int, ...] = (),
-    ) -> None:
-        """Call a function of the library with postures, rates or accelerations, (K, n) each, and where it writes.
-
-        Numbers `before` stand in front of the postures.
-        """
-        count = len(states[0])
-        kept = [as_doubles(own, (count, self.n)) for own in states]
-        call(name, self.address, count, *before, *kept, *others)
+    def _call(self, name: str, *arguments: np.ndarray | int | None) -> Any:
+        """Call a function of the library for this chain."""
+        return compute(name, self.address, *arguments, n=self.n)

@@ -140,60 +140,18 @@ void brachis_entries(
 }
 
 /* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width); and entries
-by variables, if they are asked for. `numbers` is room for a formula. Along a path the motion is first differentiated, if that
-has not been done; its slopes take the place of those in `motion`. With an arm the slopes of its torques are found in `motion`;
-`states` are q, qdot and qddot. */
+by variables, if they are asked for. With an arm the slopes of its torques are found in `motion`; `states` are q, qdot and qddot. */
 void brachis_differentiate(
-    long count, long n, long width, path_motion *along, const chain *arm, const double **states,
-    const motion_slopes *motion, long groups, const group *of, double *numbers, long orders, long columns, double *table,
+    long count, long n, long width, const chain *arm, const double **states,
+    const motion_slopes *motion, long groups, const group *of, long orders, long columns, double *table,
     const variables *by, double *found
 )
 {
-    for (const group *each = of; each < of + groups; each++) {
-        double *slopes = each->by[0].numbers;
-        if (each->quantity == FORMULA) {
-            brachis_formula(each->slopes_of, count, states[0], n, NULL, 0, numbers, slopes);
-        }
-        for (long i = 0; i < count * each->values * n && each->quantity == FORMULA; i++) {
-            slopes[i] *= each->factors[i / n % each->values];
-        }
-    }
-    motion_slopes own = *motion;
-    if (along) {
-        brachis_path_derivatives(along);
-        own.gradient = along->gradients;
-        own.qdot_y = along->qdot_y;
-        own.qddot_y = along->qddot_y;
-        own.qddot_ydot = along->qddot_ydot;
-    }
     if (arm) {
-        brachis_torque_slopes(arm, count, width, states, &own);
+        brachis_torque_slopes(arm, count, width, states, motion);
     }
-    WITH_WIDTH(chain_rule, count, n, groups, of, &own, orders, columns, table)
+    WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
     if (by) {
         brachis_entries(count, columns, width, table, by, found);
-    }
-}
-
-/* Values of the groups that are quantities of joints or formulas, each (K, values), one behind the other; `quantities` are q and
-its three derivatives and the torque, (K, n). `numbers` is room for a formula. */
-void brachis_values(
-    long count, long n, const double **quantities, long groups, const group *of, double *numbers, double *found
-)
-{
-    for (const group *own = of; own < of + groups; own++) {
-        if (own->quantity == FORMULA) {
-            brachis_formula(own->values_of, count, quantities[0], n, NULL, 0, numbers, found);
-        }
-        for (long i = 0; i < count * own->values && own->quantity == FORMULA; i++) {
-            found[i] *= own->factors[i % own->values];
-        }
-        for (long k = 0; k < count && own->quantity >= 0 && own->quantity <= TORQUE; k++) {
-            const double *quantity = quantities[own->quantity] + k * n;
-            for (long i = 0; i < own->values; i++) {
-                found[k * own->values + i] = (quantity[own->joints[i]] - own->offsets[i]) * own->factors[i];
-            }
-        }
-        found += count * own->values;
     }
 }

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, call, declare_fields
-from brachis.kernel.path_motion import PathMotion
+from brachis.kernel.library import address, call, compute, declare_fields
 from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
 
 
@@ -25,9 +24,6 @@ class MotionSlopes:
     gradient, qdot_y, qddot_y, qddot_ydot : (K, n, c) ndarray
     qdddot_y : (K, n, c) ndarray or None
         Where a value depends on the jerk.
-    path_motion : PathMotion or None
-        Along a path the motion whose slopes they are. All but `gradient` are without numbers until that is
-        differentiated: by `PathMotion.derivatives`, or by `differentiate`.
     """
 
     gradient: np.ndarray
@@ -35,7 +31,6 @@ class MotionSlopes:
     qddot_y: np.ndarray
     qddot_ydot: np.ndarray
     qdddot_y: np.ndarray | None = None
-    path_motion: PathMotion | None = None
 
 
 class _Variables(ctypes.Structure):
@@ -113,15 +108,15 @@ class VariableSlopes:
 
     def find_entries(self, slopes: np.ndarray) -> np.ndarray:
         """Entries of a Jacobian, (b K + z, values), of values with slopes by the curves, (orders, K, values, c)."""
-        orders, count, columns, width = slopes.shape
+        orders, count, _, width = slopes.shape
         if (count, width) != self.pattern.shape:
             raise ValueError("slopes are of other points or curves")
         kept: list[np.ndarray] = []
-        table = as_doubles(slopes, slopes.shape)
-        found = np.empty((self.entries, columns))
         structure = ctypes.byref(self.structure(orders, kept))
-        call("brachis_entries", count, columns, width, table, structure, found)
-        return found
+        entries: np.ndarray = compute(
+            "brachis_entries", slopes, structure, e=self.entries
+        )
+        return entries
 
 
 def differentiate(
@@ -159,20 +154,20 @@ def differentiate(
     if has_jerk and motion.qdddot_y is None:
         raise ValueError("values that depend on qdddot need qdddot_y")
     shape = count, n, width
-    along = motion.path_motion
-    if along is not None and along.gradient.shape != shape:
-        raise ValueError("the motion along the path has other joints, curves or points")
-    parts: list[Partial] = [None] * 4  # along a path the library knows them
-    if along is None:
-        parts = [motion.gradient, motion.qdot_y, motion.qddot_y, motion.qddot_ydot]
-    slopes = [keep_address(own, shape, kept) for own in (*parts, motion.qdddot_y)]
+    parts = (
+        motion.gradient,
+        motion.qdot_y,
+        motion.qddot_y,
+        motion.qddot_ydot,
+        motion.qdddot_y,
+    )
+    slopes = [keep_address(own, shape, kept) for own in parts]
     of_states = [keep_address(own, (count, n), kept) for own in states[:3]]
     arm = None
-    if groups.chain is not None:
+    if groups.chain is not None and groups.has_torque:
         slopes.append(keep_address(np.empty((3, *shape)), (3, *shape), kept))
         arm = groups.chain.address
     columns = groups.size
-    numbers = np.empty(groups.room)
     orders = 3 if motion.qdddot_y is None else 4
     found = np.empty((orders, count, columns, width))
     entries = np.empty((0, columns))
@@ -187,13 +182,11 @@ def differentiate(
         count,
         n,
         width,
-        None if along is None else along.address,
         arm,
         (ctypes.c_void_p * 3)(*of_states),
         (ctypes.c_void_p * 6)(*slopes),
         len(table),
         table,
-        numbers,
         orders,
         columns,
         found,

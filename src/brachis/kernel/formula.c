@@ -1,5 +1,6 @@
 /* Formulas: straight sequences of steps, each of one or two numbers, at many points. See formula.py. */
 #include <math.h>
+#include <stdlib.h>
 
 #include "motion.h"
 
@@ -12,17 +13,23 @@ enum { PLUS, MINUS, TIMES, OVER, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2, CEIL }
     }                                                   \
     break
 
-/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. `room` is that for all
-numbers of the formula, of SIDE_BY_SIDE points. Found are (K, outputs). */
+/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. Found
+are (K, outputs), NaN without memory. */
 void brachis_formula(
     const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
-    double *room, double *found
+    double *found
 )
 {
-    double (*numbers)[SIDE_BY_SIDE] = (double (*)[SIDE_BY_SIDE])room;
     long inputs = own->counts[0] + own->counts[1];
     long outputs = own->outputs;
     const step *step_of = own->step_of;
+    double (*numbers)[SIDE_BY_SIDE] = malloc((inputs + own->constants + own->steps) * sizeof *numbers);
+    for (long i = 0; !numbers && i < count * outputs; i++) {
+        found[i] = NAN;
+    }
+    if (!numbers) {
+        return;
+    }
     for (long i = 0; i < own->constants; i++) {
         for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
             numbers[inputs + i][lane] = own->constant[i];
@@ -60,6 +67,7 @@ void brachis_formula(
             }
         }
     }
+    free(numbers);
     long together = own->together;
     for (long i = 0; together && i < count * outputs; i += together) {
         int complete = all_finite(found + i, together);
@@ -67,10 +75,4 @@ void brachis_formula(
             found[j] = NAN;
         }
     }
-}
-
-/* Points that are computed side by side. */
-long brachis_side_by_side(void)
-{
-    return SIDE_BY_SIDE;
 }

@@ -14,7 +14,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ import numpy as np
 from brachis.kernel.library import (
     Structured,
     address,
-    as_doubles,
+    as_contiguous,
     call,
     declare_fields,
 )
@@ -30,6 +29,17 @@ from brachis.kernel.library import (
 _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
 """In the order of formula.c."""
+
+
+def _make_operator(
+    apply: Callable[[Record, Number, Number], Number],
+) -> Callable[[Number, Any], Number]:
+    """Return a method that applies an operation to a number and another one, which may be plain."""
+
+    def operate(self: Number, other: Any) -> Number:
+        return apply(self.record, self, self.record.number(other))
+
+    return operate
 
 
 class Number:
@@ -60,33 +70,12 @@ class Number:
         self.place = len(record.numbers)
         self.value: float | None = operands[0] if operation == "constant" else None
 
-    def __add__(self, other: Any) -> Number:
-        """Add."""
-        return self.record.add(self, self.record.number(other))
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Number:
-        """Subtract."""
-        return self.record.add(self, -self.record.number(other))
-
-    def __rsub__(self, other: Any) -> Number:
-        """Subtract from a plain number."""
-        return self.record.add(self.record.number(other), -self)
-
-    def __mul__(self, other: Any) -> Number:
-        """Multiply."""
-        return self.record.multiply(self, self.record.number(other))
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> Number:
-        """Divide."""
-        return self.record.divide(self, self.record.number(other))
-
-    def __rtruediv__(self, other: Any) -> Number:
-        """Divide a plain number."""
-        return self.record.divide(self.record.number(other), self)
+    __add__ = __radd__ = _make_operator(lambda record, a, b: record.add(a, b))
+    __mul__ = __rmul__ = _make_operator(lambda record, a, b: record.multiply(a, b))
+    __sub__ = _make_operator(lambda record, a, b: record.add(a, -b))
+    __rsub__ = _make_operator(lambda record, a, b: record.add(b, -a))
+    __truediv__ = _make_operator(lambda record, a, b: record.divide(a, b))
+    __rtruediv__ = _make_operator(lambda record, a, b: record.divide(b, a))
 
     def __neg__(self) -> Number:
         """Change the sign."""
@@ -159,15 +148,10 @@ class Record:
             return a
         if a.value in (1.0, -1.0):
             return b if a.value == 1.0 else -b
-        if a.operation == "negate" or b.operation == "negate":
-            sign = (a.operation == "negate") != (b.operation == "negate")
-            product = self.multiply(
-                *(
-                    own.operands[0] if own.operation == "negate" else own
-                    for own in (a, b)
-                )
-            )
-            return -product if sign else product
+        if a.operation == "negate":
+            return -self.multiply(a.operands[0], b)
+        if b.operation == "negate":
+            return -self.multiply(a, b.operands[0])
         return self._keep("multiply", *sorted((a, b), key=_place))
 
     def divide(self, a: Number, b: Number) -> Number:
@@ -283,29 +267,8 @@ class Formula(Structured):
         """Record a function of arrays, (K, count) each, that returns an array, (K, ...)."""
         record = Record()
         with np.errstate(all="ignore"):
-            found = function(*(record.inputs(count) for count in counts))
-        whole = cls._of_numbers(record, counts, found[0])
-        return replace(whole, discards_incomplete=discards_incomplete)
-
-    @classmethod
-    def gradient(
-        cls, function: Callable[[np.ndarray], np.ndarray], count: int
-    ) -> Formula:
-        """Record the slopes, (K, c, count), of a function that returns an array, (K, c)."""
-        record = Record()
-        inputs = record.inputs(count)
-        with np.errstate(all="ignore"):
-            values = [record.number(own) for own in function(inputs)[0]]
-        slopes = [record.gradient(own, inputs) for own in values]
-        found = np.array(slopes, dtype=object).reshape(len(values), count)
-        return cls._of_numbers(record, (count,), found)
-
-    @classmethod
-    def _of_numbers(
-        cls, record: Record, counts: tuple[int, ...], found: np.ndarray
-    ) -> Formula:
-        """Keep what is needed for the numbers that are wanted."""
-        wanted = [record.number(own) for own in found.flat]
+            results = function(*(record.inputs(count) for count in counts))[0]
+        wanted = [record.number(own) for own in results.flat]
         own = record.numbers
         constants = [number for number in own if number.operation == "constant"]
         done = [number for number in own if number.operation in _CODES]
@@ -325,12 +288,28 @@ class Formula(Structured):
         ]
         whole = cls(
             counts,
-            found.shape,
+            results.shape,
             np.array([number.value for number in constants], dtype=float),
             np.array(steps, dtype=np.int32).reshape(-1, 3),
             np.array([place[number] for number in wanted], dtype=np.int32),
+            discards_incomplete,
         )
         return whole.part(...)
+
+    @classmethod
+    def gradient(
+        cls, function: Callable[[np.ndarray], np.ndarray], count: int
+    ) -> Formula:
+        """Record the slopes, (K, c, count), of a function that returns an array, (K, c)."""
+
+        def differentiate(inputs: np.ndarray) -> np.ndarray:
+            """Return the slopes at one point, (1, c, count)."""
+            record = inputs[0, 0].record
+            values = [record.number(own) for own in function(inputs)[0]]
+            slopes = [record.gradient(own, inputs) for own in values]
+            return np.array(slopes, dtype=object).reshape(1, len(values), count)
+
+        return cls.of(differentiate, count)
 
     def part(self, index: Any) -> Formula:
         """Return the formula of a part of what is found at a point; `index` as NumPy takes it."""
@@ -360,22 +339,13 @@ class Formula(Structured):
         """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
-        given = [as_doubles(own, (count, size)) for own, size in pairs]
+        given = [as_contiguous(own, (count, size)) for own, size in pairs]
         found = np.empty((count, *self.shape))
-        numbers = np.empty(self.room)
         first = given[0]
         second = given[-1]
-        call(
-            "brachis_formula",
-            self.address,
-            count,
-            first,
-            first.shape[1],
-            second,
-            second.shape[1],
-            numbers,
-            found,
-        )
+        sizes = self.counts
+        name = "brachis_formula"
+        call(name, self.address, count, first, sizes[0], second, sizes[-1], found)
         return found
 
     def _make_structure(self) -> _Formula:
@@ -384,9 +354,3 @@ class Formula(Structured):
         sized = [part for own in parts for part in (len(own), address(own))]
         together = self.shape[-1] if self.discards_incomplete else 0
         return _Formula(*counts, *sized, together)
-
-    @cached_property
-    def room(self) -> int:
-        """Numbers of all inputs, constants and steps, as many as are computed side by side."""
-        numbers = sum(self.counts) + len(self.constants) + len(self.steps)
-        return numbers * int(call("brachis_side_by_side"))

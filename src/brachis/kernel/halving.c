@@ -1,6 +1,7 @@
 /* Knot intervals that are halved, those first that lose most, until they lose little enough together. */
 
 #include <math.h>
+#include <stdlib.h>
 
 /* A timing at M times: t, ascending; accelerations, (M, n); the rate dp/dt, (M); and between two times how much of an
 acceleration jumps, and what a ramp in place of a jump costs, (M - 1). */
@@ -105,19 +106,25 @@ static void sink(interval *heap, long count)
 }
 
 /* Halve `pieces` equal intervals of 0 to 1 until they lose less than `tolerance` together, or are `most`. Those shorter than
-`shortest` stay as they are. `heap` and `begins` have room for the larger of both numbers. Returns how many there are; `begins`
-is where they begin, in any order. */
+`shortest` stay as they are. For the others see `timing`. `begins` has `room` for two more than the larger of both numbers.
+Returns how many there are, 0 without memory; `begins` is where they begin, in any order. */
 long brachis_halve(
-    const timing *own, long pieces, double tolerance, double shortest, long most, interval *heap, double *begins
+    long times, long joints, const double *t, const double *accelerations, const double *rate, const double *jumps,
+    const double *ramps, long few, long pieces, double tolerance, double shortest, long most, long room, double *begins
 )
 {
+    const timing own = {times, joints, t, accelerations, rate, jumps, ramps, few};
+    interval *heap = malloc(room * sizeof(interval));
+    if (!heap) {
+        return 0;
+    }
     long open = 0;
     long done = 0;
     double lost = 0.0;
     for (long i = 0; i < pieces; i++) {
         double low = (double)i / (double)pieces;
         double high = (double)(i + 1) / (double)pieces;
-        heap[open++] = (interval){loss(own, low, high), low, high};
+        heap[open++] = (interval){loss(&own, low, high), low, high};
         lost += heap[open - 1].loss;
         rise(heap, open);
     }
@@ -133,7 +140,7 @@ long brachis_halve(
         double middle = 0.5 * (worst.low + worst.high);
         double ends[3] = {worst.low, middle, worst.high};
         for (int part = 0; part < 2; part++) {
-            heap[open++] = (interval){loss(own, ends[part], ends[part + 1]), ends[part], ends[part + 1]};
+            heap[open++] = (interval){loss(&own, ends[part], ends[part + 1]), ends[part], ends[part + 1]};
             lost += heap[open - 1].loss;
             rise(heap, open);
         }
@@ -141,5 +148,6 @@ long brachis_halve(
     for (long i = 0; i < open; i++) {
         begins[done++] = heap[i].low;
     }
+    free(heap);
     return done;
 }

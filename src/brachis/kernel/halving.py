@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
-
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, call, declare_fields
-
-
-class _Timing(ctypes.Structure):
-    """`timing` of halving.c."""
-
-    _fields_ = declare_fields(
-        "l times joints; p t accelerations rate jumps ramps; l few"
-    )
+from brachis.kernel.library import compute
 
 
 def halve_intervals(
@@ -59,20 +49,8 @@ def halve_intervals(
     (N,) ndarray
         Where they begin, ascending.
     """
-    count, joints = accelerations.shape
-    kept = [
-        as_doubles(t, (count,)),
-        as_doubles(accelerations, (count, joints)),
-        as_doubles(rate, (count,)),
-        as_doubles(jumps, (count - 1,)),
-        as_doubles(ramps, (count - 1,)),
-    ]
-    own = _Timing(count, joints, *map(address, kept), few)
-    room = max(most, pieces) + 2
-    heap = np.empty((room, 3))
-    begins = np.empty(room)
-    place = ctypes.addressof(own)
-    found = call(
-        "brachis_halve", place, pieces, tolerance, shortest, most, heap, begins
-    )
-    return np.sort(begins[:found])
+    timing = (t, accelerations, rate, jumps, ramps, few)
+    sizes = {"S": len(t) - 1, "B": max(most, pieces) + 2}
+    ends = (pieces, tolerance, shortest, most)
+    count, begins = compute("brachis_halve", *timing, *ends, **sizes)
+    return np.sort(begins[:count])

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,37 +27,56 @@ _KINDS = {
     "-": None,
 }
 FUNCTIONS = {
-    "brachis_torques": "- plpppp",
-    "brachis_torque_derivatives": "- plpppppp",
-    "brachis_mass_matrices": "- plpp",
-    "brachis_tool": "- plpippp",
-    "brachis_tool_derivatives": "- llpppippp",
-    "brachis_tool_sizes": "- plippppppp",
-    "brachis_logarithms": "- lpp",
-    "brachis_bounds_of_pairs": "- llpppdpp",
-    "brachis_go_backwards": "i llpppppdddpp",
-    "brachis_go_forwards": "- llppppp",
-    "brachis_rotations": "- llpp",
-    "brachis_body_twists": "- llpp",
-    "brachis_newton": "- ppllpplpllplddip",
-    "brachis_halve": "l plddlpp",
+    "brachis_torques": "- p K [Kn] [Kn] [Kn] >[Kn]",
+    "brachis_torque_derivatives": "- p K [Kn] [Kn] [Kn] >[Knn] >[Knn] >[Knn]",
+    "brachis_mass_matrices": "- p K [Kn] >[Knn]",
+    "brachis_tool": "- p K [Kn] i >[K3] >[K33] >[6Kn]",
+    "brachis_tool_derivatives": "- K n [6Kn] [Kn] [Kn] i >[6Kn] >[6Kn] >[6Kn]",
+    "brachis_tool_sizes": "- p K i [Kn] [Kn] [Kn] p >[K]",
+    "brachis_logarithms": "- K [K33] >[K3]",
+    "brachis_bounds_of_pairs": "- P c [Pc] [Pc] [Pc] d >[P] >[P]",
+    "brachis_go_backwards": "i P c [Sc] [Sc] [Sc] [S] [S] d d d >[P] >[P]",
+    "brachis_go_forwards": "- P c [Sc] [Sc] [P] [P] d >[P]",
+    "brachis_rotations": "- m K [mK4] >[mK33]",
+    "brachis_body_twists": "- m K [mKw] >[rK6]",
+    "brachis_newton": "- p p K z [Kz] [Kn] r p l n [Kr] i >[Kn]",
+    "brachis_halve": "l M n [M] [Mn] [M] [S] [S] l l d d l B >[B]",
     "brachis_postures": "- p",
-    "brachis_evaluate": "i plpp",
+    "brachis_evaluate": "i p",
     "brachis_path_derivatives": "- p",
-    "brachis_least_singular": "- llppp",
-    "brachis_singular_slopes": "- ppppp",
-    "brachis_entries": "- lllppp",
-    "brachis_differentiate": "- lllpppplppllppp",
-    "brachis_values": "- llplppp",
-    "brachis_largest_parts": "- lllpppp",
-    "brachis_solve_band": "- lllpp",
-    "brachis_blossoms": "- lllpppppp",
-    "brachis_curves": "- lllllpppp",
-    "brachis_formula": "- plplplpp",
-    "brachis_side_by_side": "l ",
+    "brachis_least_singular": "- K n [Knn] >[K] >[Kn]",
+    "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",
+    "brachis_entries": "- K v c [oKvc] p >[ev]",
+    "brachis_differentiate": "- l l l p p p l p l l p p p",
+    "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
+    "brachis_solve_band": "- l l l p p",
+    "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
+    "brachis_curves": "- o K w c L [oKw] l[K] [cL] >[oKc]",
+    "brachis_formula": "- p l p l p l p",
 }
-"""What functions return and take: pointer, long, double, int, or nothing."""
+"""What functions return and take: pointer, long, double, int, or nothing.
+
+An array has its shape in brackets: a letter is a size, a digit a number. Arrays behind ``>`` are written to; arrays
+behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size.
+"""
 _DOUBLE = np.dtype(np.float64)
+WHOLE = np.dtype("l")
+"""Whole numbers of the library."""
+
+
+def _split(word: str) -> tuple[str, str]:
+    """Split the declaration of an argument into its kind and the letters of its shape."""
+    kind, _, letters = word.rstrip("]").partition("[")
+    return kind, letters
+
+
+_ARGUMENTS = {
+    name: [_split(word) for word in words.split()[1:]]
+    for name, words in FUNCTIONS.items()
+}
+
+
+_DIGITS = {str(digit): digit for digit in range(10)}
 
 
 def declare_fields(declaration: str) -> list[tuple[str, Any]]:
@@ -103,11 +122,13 @@ def _open(path: Path) -> ctypes.CDLL:
     found = library.brachis_source().decode()
     if found != source_digest():
         raise NotBuiltError(f"{path.name} was made of other source", SCRIPT)
-    for name, kinds in FUNCTIONS.items():
+    for name, declaration in FUNCTIONS.items():
         function = getattr(library, name)
-        returned, _, taken = kinds.partition(" ")
-        function.restype = _KINDS[returned]
-        function.argtypes = [_KINDS[kind] for kind in taken]
+        function.restype = _KINDS[declaration[0]]
+        function.argtypes = [
+            _KINDS["p"] if letters else _KINDS.get(kind, ctypes.c_long)
+            for kind, letters in _ARGUMENTS[name]
+        ]
     return library
 
 
@@ -127,6 +148,88 @@ def call(name: str, *arguments: Any) -> Any:
         for value in arguments
     ]
     return getattr(load(), name)(*plain)
+
+
+def compute(name: str, *arguments: Any, **sizes: int) -> Any:
+    """Call a function of the library with arrays of the shapes that are declared, and make room for what it writes.
+
+    Parameters
+    ----------
+    name : str
+        One of `FUNCTIONS`.
+    *arguments
+        What it takes, but for sizes and for the arrays that it writes.
+    **sizes : int
+        By the letters that stand for them; those that follow from the shapes of arrays may be left out.
+
+    Returns
+    -------
+    What the function returns, then the arrays that it writes: a list, if these are not one alone.
+
+    Raises
+    ------
+    ValueError, TypeError
+        See `as_contiguous`.
+    """
+    shapes = tuple([getattr(value, "shape", None) for value in arguments])
+    found = _find_shapes(name, shapes, tuple(sizes.items()))
+    pairs = zip(arguments, found.taken, strict=True)
+    taken = iter([as_contiguous(value, *own) if own else value for value, own in pairs])
+    written = [np.empty(shape) for shape in found.written]
+    values = [next(taken) if size is None else size for size in found.sizes]
+    returned = call(name, *values, *written)
+    results = written if FUNCTIONS[name][0] == "-" else [returned, *written]
+    return results[0] if len(results) == 1 else results
+
+
+class _CallShapes(NamedTuple):
+    """Shapes in one call.
+
+    Attributes
+    ----------
+    taken : list
+        For what is handed over shape and kind of numbers; empty where no shape is declared.
+    sizes : list of int or None
+        For each argument that is not written to the size that it is; None where it is handed over.
+    written : list of tuple of int
+        Shapes of arrays that are written to.
+    """
+
+    taken: list[tuple[Any, ...]]
+    sizes: list[int | None]
+    written: list[tuple[int, ...]]
+
+
+@lru_cache(maxsize=4096)
+def _find_shapes(
+    name: str,
+    shapes: tuple[tuple[int, ...] | None, ...],
+    sizes: tuple[tuple[str, int], ...],
+) -> _CallShapes:
+    """Find what the shapes of arguments say of a function's sizes and of what it writes."""
+    known = _DIGITS | dict(sizes)
+    words = _ARGUMENTS[name]
+    inputs = [word for word in words if word[0] in ("", *_KINDS)]
+    taken: list[tuple[Any, ...]] = []
+    for (kind, letters), shape in zip(inputs, shapes, strict=True):
+        for letter, size in zip(letters, shape or (), strict=False):
+            known.setdefault(letter, size)
+        needed = tuple([known.get(letter, -1) for letter in letters])
+        taken.append((needed, WHOLE if kind == "l" else _DOUBLE) if letters else ())
+    return _CallShapes(
+        taken,
+        [
+            None if word in inputs else known[word[0]]
+            for word in words
+            if word[0] != ">"
+        ],
+        [shape_of(letters, known) for kind, letters in words if kind == ">"],
+    )
+
+
+def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
+    """Return the shape that letters and digits stand for."""
+    return tuple(sizes[own] if own in sizes else int(own) for own in letters)
 
 
 class Structured:
@@ -157,8 +260,10 @@ class Structured:
         return {name: vars(self)[name] for name in self.__dataclass_fields__}
 
 
-def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an array of this shape as contiguous doubles.
+def as_contiguous(
+    values: Any, shape: tuple[int, ...], dtype: np.dtype[Any] = _DOUBLE
+) -> np.ndarray:
+    """Return an array of this shape as contiguous doubles, or other numbers.
 
     Raises
     ------
@@ -167,12 +272,12 @@ def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
     TypeError
         It is complex.
     """
-    if type(values) is np.ndarray and values.dtype is _DOUBLE:
+    if type(values) is np.ndarray and values.dtype is dtype:
         if values.shape == shape and values.flags.c_contiguous:
             return values
     elif np.iscomplexobj(values):
         raise TypeError("an array is complex; needed: real numbers")
-    found = np.ascontiguousarray(values, dtype=np.float64)
+    found = np.ascontiguousarray(values, dtype=dtype)
     if found.shape != shape:
         raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")
     return found
@@ -184,10 +289,10 @@ def as_doubles_at_points(
     """Return numbers at K points, (K, ...), as contiguous doubles, and how far it is from a point to the next one.
 
     Where they are the same at all points, they are those of one, and the distance is 0. `values` may then be those of
-    one point too. Raises as `as_doubles` does.
+    one point too. Raises as `as_contiguous` does.
     """
     if values.ndim == len(shape) - 1:
-        return as_doubles(values, shape[1:]), 0
+        return as_contiguous(values, shape[1:]), 0
     if values.strides[0] == 0 and values.shape == shape and shape[0]:
-        return as_doubles(values[0], shape[1:]), 0
-    return as_doubles(values, shape), math.prod(shape[1:])
+        return as_contiguous(values[0], shape[1:]), 0
+    return as_contiguous(values, shape), math.prod(shape[1:])

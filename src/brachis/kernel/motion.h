@@ -43,8 +43,6 @@ typedef struct {
     long count;                        /* K */
     long rows_step;                    /* from the rows of one point to those of the next, in doubles; 0 if all points share them */
     double side;                       /* sign that det J_aug must have; 0: either */
-    long steps;                        /* of Newton's method in a chart */
-    double tolerance, largest_step;    /* of it, rad or m */
     const double *y, *ydot, *yddot;    /* (K, c) */
     const double *targets;             /* (K, coordinates) */
     const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
@@ -56,7 +54,6 @@ typedef struct {
 
     /* Found by brachis_postures. */
     double *answers; /* (K, A, m); given where no formula finds them */
-    double *numbers; /* room for a formula */
     double *levels;  /* (K, r) */
     double *q;       /* (K, n) */
 
@@ -69,10 +66,8 @@ typedef struct {
     double *gradients;    /* (K, n, c) */
     double *qdot, *qddot; /* (K, n) */
 
-    /* Found by brachis_path_derivatives, (K, n, c), once. */
+    /* Found by brachis_path_derivatives, (K, n, c). */
     double *qdot_y, *qddot_y, *qddot_ydot;
-    double *torque, *values; /* found by brachis_evaluate, where they are asked for */
-    long is_differentiated;
 } path_motion;
 
 /* Derivatives of the joint motion by the curves, (K, n, width) each; see kinematics/joint_map.py. That of the jerk counts only
@@ -89,18 +84,16 @@ typedef struct {
     long step;
 } partial;
 
-enum { TORQUE = 4, FORMULA };
+enum { TORQUE = 4 };
 
-/* A group of values. Either each value is (quantity of one joint - offset) * factor, with `quantity` 0 to 3 for q and its
-derivatives and TORQUE for the torque. Or it is a number of a FORMULA of the posture times a factor; its slopes by q go to
-`by[0]`. Or `quantity` is -1, and partial derivatives by q, qdot, qddot and qdddot, and by s, (K, values), are given; a null
-pointer stands for zeros. */
+/* A group of values. Either each value is (quantity of one joint - a constant) * factor, with `quantity` 0 to 3 for q and its
+derivatives and TORQUE for the torque. Or `quantity` is -1, and partial derivatives by q, qdot, qddot and qdddot, and by s,
+(K, values), are given; a null pointer stands for zeros. */
 typedef struct {
     long values;
     long quantity;
-    const long *joints;              /* (values) */
-    const double *offsets, *factors; /* (values) */
-    const formula *values_of, *slopes_of;
+    const long *joints;    /* (values) */
+    const double *factors; /* (values) */
     partial by[4];
     const double *by_s;
 } group;
@@ -114,17 +107,13 @@ void brachis_torque_slopes(
 );
 void brachis_formula(
     const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
-    double *room, double *found
+    double *found
 );
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
     const double *starts, long conditions, const double *rows, long rows_step, long row_width, const double *levels,
-    long steps, double tolerance, double largest_step, int beside, double *found
+    int beside, double *found
 );
 void brachis_path_motion(path_motion *own);
-void brachis_path_derivatives(path_motion *own);
-void brachis_values(
-    long count, long n, const double **quantities, long groups, const group *of, double *numbers, double *found
-);
 
 #endif

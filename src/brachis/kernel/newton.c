@@ -5,6 +5,8 @@
 #include "motion.h"
 
 static const double TURN = 6.283185307179586;
+/* A miss, m or rad, after which one more step meets the target to rounding: Newton's method squares it. */
+static const double TOLERANCE = 1e-10;
 
 /* Solve a linear system, (n, n) row by row with `right` behind each row, by elimination with pivots. */
 static void eliminate(long n, double *system, double *answer)
@@ -106,15 +108,18 @@ static double largest_of(const double *values, long count)
 
 /* Find postures, (K, n), that meet targets, (K, c), and C q = levels, from `starts`, (K, n); NaN where the method does not
 converge. They may be found where `starts` are. From one row of C to the next it is `row_width`, from the rows of one point to
-those of the next `rows_step`, 0 if all points share them. A step is no longer than `largest_step`. `beside` gives a posture up
-whose steps do not halve; tolerance and largest step are then in proportion to its size where that is above 1. */
+those of the next `rows_step`, 0 if all points share them. The linear model says little about postures farther away than 0.5 rad
+or m. `beside` takes fewer and shorter steps, and gives a posture up whose steps do not halve; tolerance and largest step are then
+in proportion to its size where that is above 1. */
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
     const double *starts, long conditions, const double *rows, long rows_step, long row_width, const double *levels,
-    long steps, double tolerance, double largest_step, int beside, double *found
+    int beside, double *found
 )
 {
     long n = arm->joints;
+    long steps = beside ? 8 : 15;
+    double largest_step = beside ? 0.2 : 0.5;
     for (long k = 0; k < count; k += LANES) {
         double q[LANES][n];
         double scales[LANES], longest[LANES];
@@ -162,7 +167,7 @@ void brachis_newton(
                 for (long i = 0; i < n; i++) {
                     misses[i] = system[i * width + n];
                 }
-                int met = largest_of(misses, n) < tolerance * scales[lane];
+                int met = largest_of(misses, n) < TOLERANCE * scales[lane];
                 eliminate(n, system, step);
                 double size = largest_of(step, n);
                 double factor = size > longest[lane] ? longest[lane] / size : 1.0;

@@ -10,18 +10,10 @@ import numpy as np
 from brachis.kernel.chain import Chain
 from brachis.kernel.library import (
     Structured,
-    as_doubles,
     as_doubles_at_points,
-    call,
+    compute,
     declare_fields,
 )
-
-STEPS = 15
-"""Newton's method takes no more steps."""
-TOLERANCE = 1e-10
-"""A miss, m or rad, after which one more step meets the target to rounding: Newton's method squares it."""
-LARGEST_STEP = 0.5
-"""rad or m; the linear model says little about postures farther away."""
 
 
 class _Prescribed(ctypes.Structure):
@@ -87,9 +79,6 @@ def find_postures(
     starts: np.ndarray,
     conditions: tuple[np.ndarray, np.ndarray],
     *,
-    steps: int,
-    tolerance: float,
-    largest_step: float,
     beside: bool,
 ) -> np.ndarray:
     """Find postures, (K, n), that meet targets, (K, c), under linear conditions.
@@ -97,27 +86,10 @@ def find_postures(
     These are rows, (K, r, n), and levels, (K, r). The others are as of `brachis.ik.newton.Newton.solve`.
     """
     rows, levels = conditions
-    count = len(starts)
     free = chain.n - prescribed.count
-    own_rows, step = as_doubles_at_points(rows, (count, free, chain.n))
-    found = np.empty((count, chain.n))
-    call(
-        "brachis_newton",
-        chain.address,
-        prescribed.address,
-        count,
-        prescribed.coordinates,
-        as_doubles(targets, (count, prescribed.coordinates)),
-        as_doubles(starts, (count, chain.n)),
-        free,
-        own_rows,
-        step,
-        chain.n,
-        as_doubles(levels, (count, free)),
-        steps,
-        tolerance,
-        largest_step,
-        beside,
-        found,
-    )
-    return found
+    table, step = as_doubles_at_points(rows, (len(starts), free, chain.n))
+    own = (chain.address, prescribed.address)
+    sizes = {"z": prescribed.coordinates, "r": free, "n": chain.n}
+    arrays = (targets, starts, table, step, levels)
+    postures: np.ndarray = compute("brachis_newton", *own, *arrays, beside, **sizes)
+    return postures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import as_doubles, call
+from brachis.kernel.library import compute
 
 
 def bounds_of_pairs(
@@ -24,9 +24,7 @@ def bounds_of_pairs(
     least, most : (P,) ndarray
         The largest x is -1 where parallel lines leave nothing between them.
     """
-    lines = [as_doubles(own, slope.shape) for own in (slope, lower, upper)]
-    least, most = np.empty((2, len(slope)))
-    call("brachis_bounds_of_pairs", *slope.shape, *lines, parallel, least, most)
+    least, most = compute("brachis_bounds_of_pairs", slope, lower, upper, parallel)
     return least, most
 
 
@@ -58,21 +56,10 @@ def go_backwards(
     low, high : (P,) ndarray
         None if an interval is empty.
     """
-    shape = steps[0].shape
-    rows = [as_doubles(own, shape) for own in steps]
-    ends = [as_doubles(own, shape[:1]) for own in levels]
-    low, high = np.empty((2, shape[0] + 1))
-    reached = call(
-        "brachis_go_backwards",
-        shape[0] + 1,
-        shape[1],
-        *rows,
-        *ends,
-        last,
-        flat,
-        rounding,
-        low,
-        high,
+    count = len(steps[0]) + 1
+    ends = (last, flat, rounding)
+    reached, low, high = compute(
+        "brachis_go_backwards", *steps, *levels, *ends, P=count
     )
     return (low, high) if reached else None
 
@@ -84,10 +71,7 @@ def go_forwards(
     first: float,
 ) -> np.ndarray:
     """Find the largest x, (P,), from the first station on, within intervals, (P,) each; see `go_backwards`."""
-    rows = [as_doubles(own, factor.shape) for own in (factor, most)]
-    count = len(factor) + 1
-    ends = [as_doubles(own, (count,)) for own in within]
-    x = np.empty(count)
-    x[0] = first
-    call("brachis_go_forwards", count, factor.shape[1], *rows, *ends, x)
+    x: np.ndarray = compute(
+        "brachis_go_forwards", factor, most, *within, first, P=len(factor) + 1
+    )
     return x

@@ -73,7 +73,6 @@ void brachis_path_motion(path_motion *own)
     const prescribed *asked = own->asked;
     long count = own->count;
     long n = arm->joints;
-    own->is_differentiated = 0;
     const selection chosen = select_parts(asked);
     long m = chosen.count;
     long r = n - m;
@@ -148,15 +147,12 @@ void brachis_path_motion(path_motion *own)
     }
 }
 
-/* Derivatives of qdot by y, and of qddot by y and by ydot, of what `brachis_path_motion` found; nothing where they are known. */
+/* Derivatives of qdot by y, and of qddot by y and by ydot, of what `brachis_path_motion` found. */
 void brachis_path_derivatives(path_motion *own)
 {
     const prescribed *asked = own->asked;
     long count = own->count;
     long n = own->arm->joints;
-    if (__atomic_load_n(&own->is_differentiated, __ATOMIC_ACQUIRE)) {
-        return;
-    }
     const selection chosen = select_parts(asked);
     long m = chosen.count;
     long r = n - m;
@@ -249,8 +245,6 @@ void brachis_path_derivatives(path_motion *own)
         write_block(second, own->qddot_ydot, count, n * c, k);
         write_block(third, own->qddot_y, count, n * c, k);
     }
-    /* Another thread that comes meanwhile writes the same numbers. */
-    __atomic_store_n(&own->is_differentiated, 1, __ATOMIC_RELEASE);
 }
 
 /* M = A A^T, (n, n) */

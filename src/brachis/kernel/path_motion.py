@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property, lru_cache
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +15,15 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.library import (
     Structured,
     address,
-    as_doubles,
+    as_contiguous,
     as_doubles_at_points,
     call,
+    compute,
     declare_fields,
+    shape_of,
 )
-from brachis.kernel.newton import LARGEST_STEP, STEPS, TOLERANCE, Prescribed
+from brachis.kernel.newton import Prescribed
 from brachis.kernel.postures import Branch
-from brachis.kernel.value_groups import ValueGroups
 
 _GIVEN = {
     "y": "Kc",
@@ -43,7 +43,6 @@ _GIVEN = {
 w = n + 1 numbers, and g = n + r + n r numbers of a chart's reference."""
 _FOUND = {
     "answers": "Kam",
-    "numbers": "f",
     "levels": "Kr",
     "q": "Kn",
     "drift": "3Kr",
@@ -56,11 +55,8 @@ _FOUND = {
     "qdot_y": "Knc",
     "qddot_y": "Knc",
     "qddot_ydot": "Knc",
-    "torque": "Kn",
-    "values": "Kv",
 }
-"""What it writes: also a answers of a closed form, f numbers of formulas, and v values of limits."""
-_DOUBLE = np.dtype(float).itemsize
+"""What it writes: also a answers of a closed form."""
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
 """What is needed for more than postures."""
 
@@ -77,41 +73,23 @@ class _PathMotion(ctypes.Structure):
     """`path_motion` of motion.h."""
 
     _fields_ = declare_fields(
-        "p arm asked by; l count rows_step; d side; l steps; d tolerance largest_step;"
-        f"p {' '.join((*_GIVEN, *_FOUND))}; l is_differentiated"
+        f"p arm asked by; l count rows_step; d side;p {' '.join((*_GIVEN, *_FOUND))}"
     )
 
 
-class _Block(NamedTuple):
-    """Where in a block of numbers what is found begins and ends, and of which shape it is."""
-
-    begin: int
-    end: int
-    shape: tuple[int, ...]
-
-
 @lru_cache
-def _divide(
-    **sizes: int,
-) -> tuple[dict[str, tuple[int, ...]], dict[str, _Block], int]:
-    """Return the shapes of what is given, the parts of one block for all that is found, and the block's length.
+def _lay_out(**sizes: int) -> tuple[dict[str, tuple[int, ...]], np.dtype[Any]]:
+    """Return the shapes of what is given, and one record for all that is written."""
+    given = {name: shape_of(letters, sizes) for name, letters in _GIVEN.items()}
+    written = [
+        (name, float, shape_of(letters, sizes)) for name, letters in _FOUND.items()
+    ]
+    return given, np.dtype(written)
 
-    Motions share them: they are not to be written to.
-    """
 
-    def shape_of(letters: str) -> tuple[int, ...]:
-        """Return the numbers that letters stand for."""
-        return tuple(sizes[own] if own in sizes else int(own) for own in letters)
-
-    given = {name: shape_of(letters) for name, letters in _GIVEN.items()}
-    blocks = {}
-    end = 0
-    for name, letters in _FOUND.items():
-        begin = end
-        shape = shape_of(letters)
-        end += math.prod(shape)
-        blocks[name] = _Block(begin, end, shape)
-    return given, blocks, end
+def _written(name: str) -> Any:
+    """Return a property: one of the arrays that the library writes."""
+    return property(lambda motion: motion.written[name])
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +107,6 @@ class PathMotion(Structured):
         By which postures are found; in a chart, None.
     side : float
         Sign that det J_aug must have; 0: either.
-    groups : ValueGroups or None
-        Values that are computed with the motion.
     given : dict of str to ndarray
         The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) where all points share them.
         For a closed form or a chart ``targets``, (K, coordinates), and in a chart its ``reference``, (K, n + r + n
@@ -139,10 +115,8 @@ class PathMotion(Structured):
         1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known to be so.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
-    blocks : dict of str to _Block
-        Where in `room` what is found stands.
-    room : (...) ndarray
-        All that is found.
+    written : ndarray
+        What the library writes; the arrays below are among them.
     answers : (K, A, m) ndarray
         Of a closed form.
     q, qdot, qddot : (K, n) ndarray
@@ -154,19 +128,15 @@ class PathMotion(Structured):
         Of J_aug.
     gradient : (K, n, 1 + r) ndarray
         dq/dy.
-    torque : (K, n) ndarray
-        Where values depend on it.
     """
 
     chain: Chain
     prescribed: Prescribed
     branch: Branch | None
     side: float
-    groups: ValueGroups | None
     given: dict[str, np.ndarray]
     rows_step: int
-    blocks: dict[str, _Block]
-    room: np.ndarray
+    written: np.ndarray
 
     @classmethod
     def prepare(
@@ -177,21 +147,18 @@ class PathMotion(Structured):
         *,
         branch: Branch | None = None,
         side: float = 0.0,
-        groups: ValueGroups | None = None,
     ) -> PathMotion:
         """Check what is given, and make room; see the class.
 
         Raises
         ------
         ValueError
-            An array is missing or has another shape, or branch or groups are those of another chain: the library would
+            An array is missing or has another shape, or the branch is that of another chain: the library would
             read beyond the ends of arrays.
         """
         n = chain.n
         m = prescribed.count
-        room = 0
         alternatives = 0
-        values = 0
         needed = ["y", "rows"]
         if "reference" in given or (branch is not None and branch.answers_of):
             needed.append("targets")
@@ -199,14 +166,7 @@ class PathMotion(Structured):
         if branch is not None:
             branch.check_fits(n, n - m, prescribed.coordinates)
             alternatives = branch.alternatives
-            room = branch.room
-        if groups is not None:
-            groups.check_joints(n)
-            if groups.has_jerk:
-                raise ValueError("a group needs qdddot, which follows from derivatives")
-            values = groups.size
-            room = max(room, groups.room)
-        shapes, blocks, length = _divide(
+        shapes, record = _lay_out(
             K=len(given["y"]),
             n=n,
             m=m,
@@ -216,36 +176,29 @@ class PathMotion(Structured):
             z=prescribed.coordinates,
             g=n + (n - m) * (n + 1),
             a=alternatives,
-            f=room,
-            v=values,
         )
         kept = {
-            name: as_doubles(own, shapes[name])
+            name: as_contiguous(own, shapes[name])
             for name, own in given.items()
             if name != "rows"
         }
         kept["rows"], step = as_doubles_at_points(given["rows"], shapes["rows"])
-        found = np.empty(length)
-        return cls(chain, prescribed, branch, side, groups, kept, step, blocks, found)
+        written = np.empty((), record)
+        return cls(chain, prescribed, branch, side, kept, step, written)
 
-    def _find(self, name: str) -> np.ndarray:
-        begin, end, shape = self.blocks[name]
-        return self.room[begin:end].reshape(shape)
-
-    answers = cached_property(lambda self: self._find("answers"))
-    q = cached_property(lambda self: self._find("q"))
-    qdot = cached_property(lambda self: self._find("qdot"))
-    qddot = cached_property(lambda self: self._find("qddot"))
-    twists = cached_property(lambda self: self._find("twists"))
-    inverse = cached_property(lambda self: self._find("inverse"))
-    determinants = cached_property(lambda self: self._find("determinants"))
-    gradient = cached_property(lambda self: self._find("gradient"))
-    torque = cached_property(lambda self: self._find("torque"))
+    answers = _written("answers")
+    q = _written("q")
+    qdot = _written("qdot")
+    qddot = _written("qddot")
+    twists = _written("twists")
+    inverse = _written("inverse")
+    determinants = _written("determinants")
+    gradient = _written("gradient")
 
     def _make_structure(self) -> _PathMotion:
         given = self.given
-        blocks = self.blocks
-        first = address(self.room)
+        first = self.written.ctypes.data
+        record: Any = self.written.dtype.fields
         return _PathMotion(
             self.chain.address,
             self.prescribed.address,
@@ -253,52 +206,35 @@ class PathMotion(Structured):
             len(given["y"]),
             self.rows_step,
             self.side,
-            STEPS,
-            TOLERANCE,
-            LARGEST_STEP,
             *[address(given[name]) if name in given else None for name in _GIVEN],
-            *[first + blocks[name].begin * _DOUBLE for name in _FOUND],
+            *[first + offset for _, offset in record.values()],
         )
 
     def find_postures(self) -> np.ndarray:
         """Find the postures alone, (K, n); NaN where they do not exist."""
         call("brachis_postures", self.address)
-        return self.q
+        postures: np.ndarray = self.q
+        return postures
 
     def evaluate(self) -> Fault | None:
-        """Find postures, motion, and values of the groups; return what is at fault."""
+        """Find postures and motion; return what is at fault."""
         _need(self.given, _OF_MOTION)
-        groups = self.groups
-        own = (0, None, None) if groups is None else groups.pointers
-        fault = call("brachis_evaluate", self.address, *own)
+        fault = call("brachis_evaluate", self.address)
         return Fault(fault) if fault else None
 
-    @property
-    def values(self) -> list[np.ndarray]:
-        """Values of each group, (K, size); nothing is set where it has partials."""
-        if self.groups is None:
-            return []
-        found = self._find("values")
-        return self.groups.split(found.ravel(), len(found))
-
-    @property
-    def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Room for dqdot/dy, dqddot/dy and dqddot/dydot, (K, n, 1 + r) each; see `derivatives`."""
-        return self._find("qdot_y"), self._find("qddot_y"), self._find("qddot_ydot")
-
     def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each; once."""
+        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each."""
         call("brachis_path_derivatives", self.address)
-        return self.slopes
+        written = self.written
+        return written["qdot_y"], written["qddot_y"], written["qddot_ydot"]
 
     def singular_slopes(
         self, values: np.ndarray, vectors: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Differentiate what `find_least_singular` gives for J_aug, (K,), by q, (K, n), and by s, (K,)."""
-        by_q = np.empty_like(self.qdot)
-        by_s = np.empty(len(by_q))
-        singular = as_doubles(values, by_s.shape), as_doubles(vectors, by_q.shape)
-        call("brachis_singular_slopes", self.address, *singular, by_q, by_s)
+        count, n = self.qdot.shape
+        name = "brachis_singular_slopes"
+        by_q, by_s = compute(name, self.address, values, vectors, K=count, n=n)
         return by_q, by_s
 
 
@@ -311,9 +247,5 @@ def _need(given: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
-    count, n, _ = inverses.shape
-    values = np.empty(count)
-    vectors = np.empty((count, n))
-    kept = as_doubles(inverses, (count, n, n))
-    call("brachis_least_singular", count, n, kept, values, vectors)
+    values, vectors = compute("brachis_least_singular", inverses)
     return values, vectors

@@ -71,11 +71,13 @@ int brachis_go_backwards(
     return 1;
 }
 
-/* The largest x, (P), from `x[0]` on, within the intervals. */
+/* The largest x, (P), from the `first` one on, within the intervals. */
 void brachis_go_forwards(
-    long places, long rows, const double *factor, const double *most, const double *low, const double *high, double *x
+    long places, long rows, const double *factor, const double *most, const double *low, const double *high,
+    double first, double *x
 )
 {
+    x[0] = first;
     for (long k = 0; k + 1 < places; k++) {
         double next = high[k + 1];
         for (long i = 0; i < rows; i++) {

@@ -120,7 +120,7 @@ static void solve_chart(path_motion *own, long n, long r, long coordinates)
     }
     brachis_newton(
         own->arm, own->asked, own->count, coordinates, own->targets, own->q, r, own->rows, own->rows_step, n + 1,
-        own->levels, own->steps, own->tolerance, own->largest_step, 0, own->q
+        own->levels, 0, own->q
     );
 }
 
@@ -140,7 +140,7 @@ void brachis_postures(path_motion *own)
     if (own->by->answers_of) {
         const formula *answers_of = own->by->answers_of;
         brachis_formula(
-            answers_of, own->count, own->targets, coordinates, own->y + 1, 1 + r, own->numbers, own->answers
+            answers_of, own->count, own->targets, coordinates, own->y + 1, 1 + r, own->answers
         );
     }
     take_answers(own, n, m);
@@ -149,9 +149,8 @@ void brachis_postures(path_motion *own)
 
 enum { NO_FAULT, NO_POSTURE, SINGULAR, TURNS_TOO_FAR };
 
-/* Find postures and motion, and the values of groups; torques are those of `arm`, if groups ask for them. Returns what is at
-fault. */
-int brachis_evaluate(path_motion *own, long groups, const group *of, const chain *arm)
+/* Find postures and motion. Returns what is at fault. */
+int brachis_evaluate(path_motion *own)
 {
     long n = own->arm->joints;
     brachis_postures(own);
@@ -169,10 +168,5 @@ int brachis_evaluate(path_motion *own, long groups, const group *of, const chain
     if (own->by && own->t && !follow_rates(own, n)) {
         return TURNS_TOO_FAR;
     }
-    if (arm) {
-        brachis_torques(arm, own->count, own->q, own->qdot, own->qddot, own->torque);
-    }
-    const double *quantities[5] = {own->q, own->qdot, own->qddot, NULL, own->torque};
-    brachis_values(own->count, n, quantities, groups, of, own->numbers, own->values);
     return NO_FAULT;
 }

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.kernel.formula import Formula
-from brachis.kernel.library import Structured, address, as_doubles, declare_fields
+from brachis.kernel.library import Structured, address, as_contiguous, declare_fields
 
 
 class _Branch(ctypes.Structure):
@@ -55,11 +55,6 @@ class Branch(Structured):
         """Whether it matters which turn an angle is in."""
         return bool(self.ranged.any())
 
-    @property
-    def room(self) -> int:
-        """Numbers of the formula; see `Formula.room`."""
-        return 0 if self.answers_of is None else self.answers_of.room
-
     def check_fits(self, n: int, r: int, coordinates: int) -> None:
         """Refuse other numbers of joints, redundant joints or task coordinates.
 
@@ -96,7 +91,7 @@ class Branch(Structured):
                     f"the answers have the shape {self.answers_of.shape}; needed: {needed}"
                 )
         tables = [
-            as_doubles(own, (n,)) for own in (self.turns, self.ranged, self.start)
+            as_contiguous(own, (n,)) for own in (self.turns, self.ranged, self.start)
         ]
         numbers = [self.redundant.astype("l"), self.others.astype("l"), *tables]
         structure = _Branch(formula, self.alternatives, *map(address, numbers))

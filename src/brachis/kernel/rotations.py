@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from brachis.kernel.library import as_doubles, call
+from brachis.kernel.library import compute
 
 _MOST = 8
 """Derivatives that the library has room for, with the value itself."""
@@ -14,11 +16,9 @@ def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
     """Differentiate the rotation matrices, (m, ..., 3, 3), of quaternions w, x, y, z of any length, (m, ..., 4)."""
     orders, *places, _ = quaternions.shape
     _check(orders)
-    kept = as_doubles(quaternions, (orders, *places, 4))
-    found = np.empty((orders, *places, 3, 3))
-    count = kept[0].size // 4
-    call("brachis_rotations", orders, count, kept, found)
-    return found
+    flat = quaternions.reshape(orders, math.prod(places), 4)
+    rotations: np.ndarray = compute("brachis_rotations", flat)
+    return rotations.reshape(orders, *places, 3, 3)
 
 
 def body_twists(poses: np.ndarray) -> np.ndarray:
@@ -34,13 +34,11 @@ def body_twists(poses: np.ndarray) -> np.ndarray:
     (m - 1, ..., 6) ndarray
         The body twist and its derivatives: linear, then angular velocity, along the axes of the turning frame.
     """
-    orders, *places, _ = poses.shape
+    orders, *places, width = poses.shape
     _check(orders)
-    kept = as_doubles(poses, (orders, *places, 12))
-    found = np.empty((orders - 1, *places, 6))
-    count = kept[0].size // 12
-    call("brachis_body_twists", orders, count, kept, found)
-    return found
+    flat = poses.reshape(orders, math.prod(places), width)
+    twists: np.ndarray = compute("brachis_body_twists", flat, w=12, r=orders - 1)
+    return twists.reshape(orders - 1, *places, 6)
 
 
 def _check(orders: int) -> None:

@@ -34,13 +34,13 @@ void brachis_solve_band(long count, long d, long columns, double *matrix, double
 }
 
 /* Blossoms of pieces of a spline of degree d, by de Boor's recursion, (count, columns): of the pieces that begin at the knots
-with the numbers `pieces`, (count), at `arguments`, (d, count). `points`, (knots - d - 1, columns), are the control points,
-`work` has room for (d + 1, columns). */
+with the numbers `pieces`, (count), at `arguments`, (d, count). `points`, (knots - d - 1, columns), are the control points. */
 void brachis_blossoms(
     long count, long d, long columns, const double *knots, const double *points, const long *pieces,
-    const double *arguments, double *work, double *found
+    const double *arguments, double *found
 )
 {
+    double work[(d + 1) * columns + 1];
     for (long k = 0; k < count; k++) {
         const long first = pieces[k] - d;
         for (long i = 0; i < (d + 1) * columns; i++) {

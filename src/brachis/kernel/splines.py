@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brachis.kernel.library import as_doubles, call
+from brachis.kernel.library import as_contiguous, call, compute
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,22 +122,13 @@ def blossom(
     """
     degree = len(arguments)
     count = len(piece)
-    points = as_doubles(
-        control_points, (len(knots) - degree - 1, *control_points.shape[1:])
-    )
-    columns = points.shape[1]
-    numbers = piece.astype("l", order="C", copy=False)
-    if count and not degree <= piece.min() <= piece.max() < len(points):
-        raise ValueError(
-            f"a piece does not exist; they are {degree} to {len(points) - 1}"
-        )
-    at = as_doubles(np.array(arguments), (degree, count)) if degree else np.empty(0)
-    own_knots = as_doubles(knots, knots.shape)
-    work = np.empty((degree + 1, columns))
-    found = np.empty((count, columns))
-    given = (own_knots, points, numbers, at, work, found)
-    call("brachis_blossoms", count, degree, columns, *given)
-    return found
+    points = len(knots) - degree - 1
+    if count and not degree <= piece.min() <= piece.max() < points:
+        raise ValueError(f"a piece does not exist; they are {degree} to {points - 1}")
+    places = np.reshape(arguments, (degree, count))
+    arrays = (knots, control_points, piece, places)
+    values: np.ndarray = compute("brachis_blossoms", *arrays, g=degree, L=points)
+    return values
 
 
 def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
@@ -162,18 +153,15 @@ class Basis:
             raise ValueError("first needs one number for each place")
         if count and first.min() < 0:
             raise ValueError("numbers of control points are negative")
-        self._values = as_doubles(values, (orders, count, width))
+        self._values = as_contiguous(values, (orders, count, width))
         self._first = first.astype("l", order="C", copy=False)
         self._needed = int(first.max(initial=0)) + width
 
     def sum(self, control_points: np.ndarray) -> np.ndarray:
         """Values of splines with control points, (c, L), and their derivatives, (orders, K, c)."""
-        orders, count, width = self._values.shape
-        curves, many = control_points.shape
-        if count and many < self._needed:
+        many = control_points.shape[1]
+        if len(self._first) and many < self._needed:
             raise ValueError(f"a control point does not exist; there are {many}")
-        points = as_doubles(control_points, (curves, many))
-        found = np.empty((orders, count, curves))
-        given = (self._values, self._first, points, found)
-        call("brachis_curves", orders, count, width, curves, many, *given)
-        return found
+        arrays = (self._values, self._first, control_points)
+        values: np.ndarray = compute("brachis_curves", *arrays)
+        return values

@@ -51,10 +51,10 @@ void brachis_tool_derivatives(
 }
 
 /* Sizes, (K), of the tool's velocity (`quantity` 0), angular velocity (1) or acceleration (2) at its origin, and their slopes
-by q, qdot and qddot, (K, n) each, if they are asked for: those of a vector of length zero are zero. */
+by q, qdot and qddot, (3, K, n), if they are asked for: those of a vector of length zero are zero. */
 void brachis_tool_sizes(
     const chain *arm, long count, int quantity, const double *q, const double *qdot, const double *qddot,
-    double *sizes, double *slopes_q, double *slopes_qdot, double *slopes_qddot
+    double *slopes_of_sizes, double *sizes
 )
 {
     long n = arm->joints;
@@ -79,7 +79,7 @@ void brachis_tool_sizes(
             inverse[lane] = size[lane] > 0.0 ? 1.0 / size[lane] : 0.0;
         }
         scatter(size, sizes, count, 1, k, 0);
-        if (!slopes_q) {
+        if (!slopes_of_sizes) {
             continue;
         }
         direction = scale(direction, inverse);
@@ -91,9 +91,9 @@ void brachis_tool_sizes(
                 {by_q[i].v, by_qdot[i].v, columns[i].v},
             };
             const vec *own = found[quantity];
-            scatter(dot(direction, own[0]), slopes_q, count, n, k, i);
-            scatter(dot(direction, own[1]), slopes_qdot, count, n, k, i);
-            scatter(dot(direction, own[2]), slopes_qddot, count, n, k, i);
+            for (int by = 0; by < 3; by++) {
+                scatter(dot(direction, own[by]), slopes_of_sizes + by * count * n, count, n, k, i);
+            }
         }
     }
 }

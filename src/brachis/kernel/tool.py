@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import as_doubles, call
+from brachis.kernel.library import compute
 
 
 def tool_derivatives(
@@ -25,27 +25,13 @@ def tool_derivatives(
     tuple of (6, K, n) ndarray
         dV/dq, da/dq and da/dqdot.
     """
-    _, count, n = twists.shape
-    velocity_q, acceleration_q, acceleration_qdot = np.empty((3, *twists.shape))
-    call(
-        "brachis_tool_derivatives",
-        count,
-        n,
-        as_doubles(twists, twists.shape),
-        as_doubles(qdot, (count, n)),
-        as_doubles(qddot, (count, n)),
-        in_tool_axes,
-        velocity_q,
-        acceleration_q,
-        acceleration_qdot,
+    velocity_q, acceleration_q, acceleration_qdot = compute(
+        "brachis_tool_derivatives", twists, qdot, qddot, in_tool_axes
     )
     return velocity_q, acceleration_q, acceleration_qdot
 
 
 def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
     """Rotation vectors, (K, 3), rad, of rotation matrices, (K, 3, 3)."""
-    count = len(rotations)
-    kept = as_doubles(rotations, (count, 3, 3))
-    found = np.empty((count, 3))
-    call("brachis_logarithms", count, kept, found)
-    return found
+    vectors: np.ndarray = compute("brachis_logarithms", rotations)
+    return vectors

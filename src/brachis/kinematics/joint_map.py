@@ -22,12 +22,12 @@ import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
-from brachis.kernel import FormulaQuantity, MotionSlopes, ValueGroups
+from brachis.kernel import MotionSlopes
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
@@ -78,16 +78,7 @@ class JointState(SharedTorques):
     @property
     def slopes(self) -> MotionSlopes:
         """The exact derivatives as the kernel takes them, but for those of the jerk."""
-        own = self.derivatives
-        return MotionSlopes(self.gradient, own.qdot_y, own.qddot_y, own.qddot_ydot)
-
-    def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
-        """Compute values of limits, (K, size) of each group; nothing is set where a group has partials."""
-        states = [self.q, self.qdot, self.qddot]
-        if groups.has_jerk:
-            states.append(self.qdddot)
-        torque = None if groups.chain is None else self.torque_of(groups.chain)
-        return groups.values(states, torque)
+        return MotionSlopes(self.gradient, *self.derivatives)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
@@ -111,8 +102,7 @@ class JointState(SharedTorques):
         return rates(slopes, self.curves)[0]
 
 
-@dataclass(frozen=True)
-class JointDerivatives:
+class JointDerivatives(NamedTuple):
     """Derivatives of a `JointState`, each (K, n, c); dqdot/dydot = dqddot/dyddot = G are not repeated.
 
     Attributes
@@ -172,7 +162,6 @@ class JointMap(ABC):
         *curves: np.ndarray,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
-        groups: ValueGroups | None = None,
     ) -> JointState:
         """Joint motion at K times.
 
@@ -184,8 +173,6 @@ class JointMap(ABC):
             The times, ascending from the start on, s; by them turns are counted.
         near : (K, n) ndarray, optional
             Postures known to be near, which decide about turns; the times may then be any.
-        groups : ValueGroups, optional
-            Values that will be asked for; a map may compute them with the motion.
 
         Raises
         ------
@@ -211,10 +198,6 @@ class JointMap(ABC):
     def margins(self, state: Any) -> np.ndarray:
         """Margins, (K, b), of a state that this map gave; see `start_margins`."""
         return np.empty((len(state.q), 0))
-
-    def margin_quantity(self) -> FormulaQuantity | None:
-        """Return the margins as the kernel computes them by itself; None where it does not."""
-        return None
 
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""

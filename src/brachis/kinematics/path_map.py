@@ -39,11 +39,8 @@ from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.kernel import (
     Branch,
-    Chain,
     Fault,
-    MotionSlopes,
     PathMotion,
-    ValueGroups,
     find_least_singular,
 )
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
@@ -61,24 +58,6 @@ class PathState(JointState):
     """
 
     motion: PathMotion
-
-    @property
-    def slopes(self) -> MotionSlopes:
-        """The exact derivatives, which the kernel computes when it needs them."""
-        return MotionSlopes(self.gradient, *self.motion.slopes, path_motion=self.motion)
-
-    def torque_of(self, chain: Chain) -> np.ndarray:
-        """Joint torques of a chain, (K, n); not to be written to."""
-        groups = self.motion.groups
-        if groups is not None and groups.chain is chain:
-            return self.motion.torque
-        return super().torque_of(chain)
-
-    def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
-        """Compute values of limits, or return them where the kernel has them with the motion."""
-        if groups is self.motion.groups:
-            return self.motion.values
-        return super().values_of(groups)
 
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
@@ -160,7 +139,6 @@ class PathMap(JointMap):
         self,
         given: dict[str, np.ndarray],
         sample: PathSample,
-        groups: ValueGroups | None = None,
     ) -> PathMotion:
         """Prepare a motion with what is given of curves, times and postures nearby."""
         motion = PathMotion.prepare(
@@ -169,7 +147,6 @@ class PathMap(JointMap):
             given | self.kernel_inputs(given["y"], sample),
             branch=self.branch_of,
             side=self.side,
-            groups=groups,
         )
         self.write_answers(motion)
         return motion
@@ -185,7 +162,6 @@ class PathMap(JointMap):
         *curves: np.ndarray,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
-        groups: ValueGroups | None = None,
     ) -> PathState:
         """Joint motion at K times; see `JointMap.state` and the module's formulas.
 
@@ -206,7 +182,7 @@ class PathMap(JointMap):
             given["near"] = near
         elif t is not None and branch is not None and branch.counts_turns:
             given["t"] = t
-        motion = self._prepare(given, sample, groups)
+        motion = self._prepare(given, sample)
         fault = motion.evaluate()
         if fault is not None:
             raise UnreachableError(self.faults[fault])

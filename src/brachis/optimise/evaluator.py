@@ -69,8 +69,7 @@ class Evaluator:
         UnreachableError
             The joint map has no posture at one of the times.
         """
-        groups = None if self._groups.has_jerk else self._groups
-        motion = self.joint_map.state(*curves, t=t, near=near, groups=groups)
+        motion = self.joint_map.state(*curves, t=t, near=near)
         return Evaluation(self.limits, motion, self._groups)
 
 
@@ -95,11 +94,7 @@ class Evaluation:
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
         """Values of every limit, (K, its own c)."""
-        motion = self.motion
-        values = motion.values_of(self.groups)
-        for number in self.groups.with_partials:
-            values[number] = self.limits[number].values(motion)
-        return tuple(values)
+        return tuple(limit.values(self.motion) for limit in self.limits)
 
     @cached_property
     def values(self) -> np.ndarray:

@@ -4,26 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from brachis.kernel import Chain
+from brachis.kernel import Chain, TorqueDerivatives
 from brachis.robot.robot import Robot
-
-
-class TorqueDerivatives(NamedTuple):
-    """Derivatives of the torque of K states, each (K, n, n): row joint torque, column joint.
-
-    Attributes
-    ----------
-    q, qdot, qddot : (K, n, n) ndarray
-        With respect to position, velocity, acceleration (the last is the mass matrix plus armature).
-    """
-
-    q: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
 
 
 class SharedTorques:
@@ -61,7 +47,8 @@ class SharedTorques:
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
         """Return the derivatives of the joint torques."""
         chain = _chain_with_masses(robot)
-        return TorqueDerivatives(*self._compute_once(chain.torque_derivatives))
+        derivatives: TorqueDerivatives = self._compute_once(chain.torque_derivatives)
+        return derivatives
 
 
 def _chain_with_masses(robot: Robot) -> Chain:
@@ -98,5 +85,4 @@ def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    exact = _chain_with_masses(robot).torque_derivatives(q, qdot, qddot)
-    return TorqueDerivatives(*exact)
+    return _chain_with_masses(robot).torque_derivatives(q, qdot, qddot)
