@@ -16,6 +16,7 @@ True
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 from brachis.limits.checks import build_user_limits
 from brachis.limits.clearance import build_clearance
@@ -39,11 +40,7 @@ from brachis.limits.tolerance import (
     build_tool_range,
     build_tool_tilt,
 )
-from brachis.limits.tool import (
-    build_tool_acceleration,
-    build_tool_angular_speed,
-    build_tool_speed,
-)
+from brachis.limits.tool import build_constant, build_tool_speed
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel, list_models
 from brachis.task import LIMIT_KINDS, Task
@@ -54,8 +51,8 @@ Build = Callable[[Robot, Task], Limit | None]
 _AFTER: dict[str, dict[str, Build]] = {
     "position": {
         "tool_speed": build_tool_speed,
-        "tool_acceleration": build_tool_acceleration,
-        "tool_angular_speed": build_tool_angular_speed,
+        "tool_acceleration": partial(build_constant, "acceleration", "m/s^2"),
+        "tool_angular_speed": partial(build_constant, "angular speed", "rad/s"),
     },
     "power": {
         "total_power": build_total_power,

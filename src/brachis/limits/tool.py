@@ -184,7 +184,8 @@ def _label(quantity: str, unit: str) -> Label:
 
 def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     """Build the limit of a task that has one, or whose path has feed rates or leads to process speeds."""
-    speed = task.tool_limits.speed
+    limits = task.tool_limits
+    speed = limits.speed
     tables = []
     labels = []
     if speed is not None:
@@ -194,7 +195,6 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
             else SpeedTable([0.0], [speed])
         )
         labels.append(_label("speed", "m/s"))
-    limits = task.tool_limits
     leads = [lead for part in limits.process_speed for lead in part.leads]
     for quantity, key, parts in (
         ("feed rate", "feed", limits.feed),
@@ -207,23 +207,12 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 
 
-def _build_constant(
-    robot: Robot, quantity: str, unit: str, figure: float | None
+def build_constant(
+    quantity: str, unit: str, robot: Robot, task: Task
 ) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one."""
+    """Build the limit of a task that has one figure for a quantity of `ToolMotionLimit`."""
+    figure = getattr(task.tool_limits, quantity.replace(" ", "_"))
     if figure is None:
         return None
     table = SpeedTable([0.0], [figure])
     return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
-
-
-def build_tool_acceleration(robot: Robot, task: Task) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one."""
-    figure = task.tool_limits.acceleration
-    return _build_constant(robot, "acceleration", "m/s^2", figure)
-
-
-def build_tool_angular_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one."""
-    figure = task.tool_limits.angular_speed
-    return _build_constant(robot, "angular speed", "rad/s", figure)

@@ -61,16 +61,15 @@ def check_ends(given: Given) -> list[Check]:
     task = given.task
     boundary = task.boundary
     states = given.states
-    ends = (
-        ("start", states.only([0]), 0.0, task.joints_at("start"), boundary.start_speed),
-        ("end", states.only([-1]), 1.0, task.joints_at("end"), boundary.end_speed),
-    )
     checks = []
-    for name, state, s, joints, speed in ends:
+    for name, number, s in (("start", 0, 0.0), ("end", -1, 1.0)):
+        state = states.only([number])
+        joints = task.joints_at(name)
+        speed = getattr(boundary, f"{name}_speed")
         if joints is not None:
-            wanted = given.robot.posture(*joints)
+            posture = given.robot.posture(*joints)
             target = given.path.sample(np.array([s])).target
-            miss = state.q - _move_onto(wanted, given.task_map, target)
+            miss = state.q - _move_onto(posture, given.task_map, target)
             allowed = given.options.posture_tolerance
             title = f"{name} posture"
             checks.append(
