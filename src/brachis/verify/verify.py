@@ -24,14 +24,15 @@ from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
     check_continuity,
     check_ends,
+    check_process_speed,
     check_progress,
     check_splines,
+    check_stops,
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Given
-from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
