@@ -184,7 +184,7 @@ def test_built_in_limits_pass():
     limits = limits_of(robot, task)
     assert len(limits) >= 6
     for limit in limits:
-        check_partials(limit, sample_moments(robot), robot, limit.kind)
+        check_partials(limit, sample_moments(robot), robot)
 
 
 @pytest.mark.parametrize(("left_out", "is_refused"), [(2, False), (4, True)])

@@ -35,12 +35,13 @@ from brachis.limits.protocol import (
     Partials,
     Role,
 )
-from brachis.limits.tolerance import (
+from brachis.limits.tool import (
+    build_constant,
     build_tool_distance,
     build_tool_range,
+    build_tool_speed,
     build_tool_tilt,
 )
-from brachis.limits.tool import build_constant, build_tool_speed
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel, list_models
 from brachis.task import LIMIT_KINDS, Task

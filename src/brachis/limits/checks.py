@@ -155,7 +155,7 @@ def build_user_limits(
     names = {kind.replace("_", " ") for kind in kinds}
     for where, model in models.items():
         limit = bind_model(where, model, robot)
-        _check_members(limit, where)
+        _check_members(limit)
         if limit.name in names:
             raise InputError(
                 "a built-in limit has this kind already",
@@ -167,7 +167,7 @@ def build_user_limits(
             if str(label) in labels:
                 problem = "this label exists already; its subject and kind together must be unique"
                 raise InputError(problem, where=f"{where}.labels", found=str(label))
-        _check_functions(limit, robot, where)
+        _check_functions(limit, robot)
         if has_check(model):
             moments = sample_moments(robot)
             tau = moments.torque_of(robot.chain)
@@ -181,15 +181,15 @@ def build_user_limits(
     return limits
 
 
-def _check_members(limit: Limit, where: str) -> None:
+def _check_members(limit: Limit) -> None:
     """Refuse a limit that lacks a member, or has one that is not allowed."""
     parts = ("kind", "labels", "lower", "upper")
     missing = [name for name in parts if not hasattr(limit, name)]
     if missing:
         problem = "the limit lacks required attributes"
-        raise InputError(problem, where=where, found=f"no {', '.join(missing)}")
+        raise InputError(problem, where=limit.origin, found=f"no {', '.join(missing)}")
     labels = limit.labels
-    here = f"{where}.labels"
+    here = f"{limit.origin}.labels"
     if not (isinstance(labels, tuple | list) and all(map(_is_label, labels))):
         raise InputError(
             "wrong type",
@@ -202,11 +202,11 @@ def _check_members(limit: Limit, where: str) -> None:
             "the limit has no values", where=here, allowed="at least one label"
         )
     for name in ("lower", "upper"):
-        check_array(getattr(limit, name), (len(labels),), f"{where}.{name}")
+        check_array(getattr(limit, name), (len(labels),), f"{limit.origin}.{name}")
     if not np.all(limit.lower < limit.upper):
         raise InputError(
             "the lower bounds are not below the upper bounds",
-            where=where,
+            where=limit.origin,
             found=[limit.lower, limit.upper],
         )
     for name, (allowed, accepts) in _MEMBERS.items():
@@ -218,13 +218,13 @@ def _check_members(limit: Limit, where: str) -> None:
         if not is_allowed:
             raise InputError(
                 f"{name} is not valid",
-                where=f"{where}.{name}",
+                where=f"{limit.origin}.{name}",
                 found=f"{value!r:.200}",
                 allowed=allowed,
             )
 
 
-def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
+def _check_functions(limit: Limit, robot: Robot) -> None:
     """Refuse values and partial derivatives of the wrong type or shape, not finite, or that contradict each other.
 
     A limit may be undefined in some postures: those are left out, if they are not most of them.
@@ -233,20 +233,22 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
     count = len(moments.q)
     c = len(limit.labels)
     values = limit.values(moments)
-    check_array(values, (count, c), f"{where}.values", remark=f" for {count} moments")
+    check_array(
+        values, (count, c), f"{limit.origin}.values", remark=f" for {count} moments"
+    )
     is_known = np.isfinite(values).all(axis=1)
     if 2 * np.count_nonzero(is_known) <= count:
         moment, column = np.argwhere(~np.isfinite(values))[0]
         posture = write_posture(moments, moment)
         raise InputError(
             "the values are not finite",
-            where=f"{where}.values",
+            where=f"{limit.origin}.values",
             found=f"{values[moment, column]} for {limit.labels[column]!s} at {posture}",
             allowed="finite numbers in most postures within the joints' ranges, at moderate speeds",
         )
     known = Moments(*(getattr(moments, own.name)[is_known] for own in fields(moments)))
     partials = limit.partials(known)
-    here = f"{where}.partials"
+    here = f"{limit.origin}.partials"
     if not isinstance(partials, Partials):
         problem = "the return value is not a brachis.limits.Partials"
         raise InputError(problem, where=here, found=partials)
@@ -261,7 +263,7 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
         shape = (count, c) if name == "s" else (count, c, n)
         check_array(part, shape, f"{here}.{name}", remark=f" for {count} moments")
         check_finite(part, f"{here}.{name}")
-    check_partials(limit, known, robot, where)
+    check_partials(limit, known, robot)
 
 
 def _reaches(robot: Robot) -> np.ndarray:
@@ -303,7 +305,7 @@ def write_posture(moments: Moments, number: int | np.intp) -> str:
 
 
 def _differentiate(
-    limit: Limit, moments: Moments, name: str, reach: np.ndarray, where: str
+    limit: Limit, moments: Moments, name: str, reach: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Differentiate values by one of q, qdot, ..., s in units of its reach, (d,), once with each of two steps.
 
@@ -323,7 +325,7 @@ def _differentiate(
     check_array(
         values,
         (total, len(limit.labels)),
-        f"{where}.values",
+        f"{limit.origin}.values",
         remark=f" for {total} moments",
     )
     parts = values.reshape(len(steps), len(reach), count, -1)
@@ -331,7 +333,7 @@ def _differentiate(
     return (ahead - behind) / (2.0 * _STEP), (far_ahead - far_behind) / (4.0 * _STEP)
 
 
-def check_partials(limit: Limit, moments: Moments, robot: Robot, where: str) -> None:
+def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
     """Refuse partial derivatives that contradict the values.
 
     Parameters
@@ -341,8 +343,6 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot, where: str) -> 
     moments : Moments
         At which they are compared.
     robot : Robot
-    where : str
-        Where the limit stands, for messages.
 
     Raises
     ------
@@ -354,7 +354,7 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot, where: str) -> 
     rounding = _ROUNDING * np.abs(limit.values(moments)).max(axis=0)
     names = ("q", "qdot", "qddot", "qdddot", "s")
     for name, reach in zip(names, [*_reaches(robot), np.ones(1)], strict=True):
-        found, coarse = _differentiate(limit, moments, name, reach, where)
+        found, coarse = _differentiate(limit, moments, name, reach)
         partial = getattr(partials, name)
         stated = np.zeros_like(found)
         if partial is not None:
@@ -364,7 +364,7 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot, where: str) -> 
         small = small + _PRECISION * np.abs(stated).max(axis=2, keepdims=True)
         is_steep = np.maximum(np.abs(stated), size) > small
         if name == "qdddot" and limit.order < 3:
-            _check_order(limit, is_steep.any(axis=2), where)
+            _check_order(limit, is_steep.any(axis=2))
         off = np.abs(stated - found)
         allowed = small + _PRECISION * size + _MARGIN * np.abs(found - coarse)
         is_wrong = off > allowed
@@ -379,19 +379,19 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot, where: str) -> 
         posture = write_posture(moments, worst)
         raise InputError(
             f"this partial derivative of {limit.labels[column]!s}{by} contradicts the values",
-            where=f"{where}.partials.{name}",
+            where=f"{limit.origin}.partials.{name}",
             found=f"{numbers[0]:.6g} at {posture}",
             allowed=f"{numbers[1]:.6g}, by differences of the values",
         )
 
 
-def _check_order(limit: Limit, depends: np.ndarray, where: str) -> None:
+def _check_order(limit: Limit, depends: np.ndarray) -> None:
     """Refuse values that depend on qdddot, (K, c) bool, at most of the moments."""
     columns = np.flatnonzero(2 * depends.sum(axis=0) > len(depends))
     if len(columns):
         raise InputError(
             f"the value of {limit.labels[columns[0]]!s} depends on qdddot",
-            where=f"{where}.order",
+            where=f"{limit.origin}.order",
             found=limit.order,
             allowed=3,
         )

@@ -146,7 +146,10 @@ def check_stops(given: Given) -> list[Check]:
     trajectory = given.trajectory
     ends = np.array([phase.s_end for phase in trajectory.phases])
     misses = [np.abs(ends - leg.end).min() for leg in stops]
-    dwells = [_dwells(given, leg) for leg in stops]
+    dwells = [
+        [phase for phase in _phases_up_to(given, leg) if phase.is_dwell]
+        for leg in stops
+    ]
     waits = [sum(phase.duration for phase in phases) for phases in dwells]
     off = [abs(wait - leg.dwell) for wait, leg in zip(waits, stops, strict=True)]
     places = [f"s = {leg.end:g}" for leg in stops]
@@ -192,15 +195,9 @@ def check_rest(given: Given, title: str, states: MotionStates) -> list[Check]:
 
 def times_of_stops(given: Given) -> np.ndarray:
     """Return the times at which phases end or begin at stops of the task, s."""
-    tolerance = given.options.progress_tolerance
-    stops = np.array([leg.end for leg in given.legs if leg.stops])
-    return np.array(
-        [
-            phase.end
-            for phase in given.trajectory.phases
-            if np.any(np.abs(stops - phase.s_end) <= tolerance)
-        ]
-    )
+    stops = [leg for leg in given.legs if leg.stops]
+    ends = [phase.end for leg in stops for phase in _phases_up_to(given, leg)]
+    return np.unique(ends)
 
 
 def check_process_speed(given: Given) -> list[Check]:
@@ -262,14 +259,11 @@ def _distance(phase: MotionPhase, leg: Leg) -> float:
     return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
 
 
-def _dwells(given: Given, leg: Leg) -> list[MotionPhase]:
-    """List the dwells at the end of a leg."""
+def _phases_up_to(given: Given, leg: Leg) -> list[MotionPhase]:
+    """List the phases that end where a leg ends."""
     tolerance = given.options.progress_tolerance
-    return [
-        phase
-        for phase in given.trajectory.phases
-        if phase.is_dwell and abs(phase.s_end - leg.end) <= tolerance
-    ]
+    phases = given.trajectory.phases
+    return [phase for phase in phases if abs(phase.s_end - leg.end) <= tolerance]
 
 
 def _check_worst(
