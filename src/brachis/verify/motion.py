@@ -340,10 +340,9 @@ def _spread(given: Given) -> Places:
     middle = 0.5 * (edges[1:] + edges[:-1])
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]
-    each = np.clip(_USUAL_INSTANTS / len(knots), _FEWEST, None)
-    by_interval = (
-        share * min(given.options.points_per_interval, each) - 1e-6
-    )  # less rounding
+    most_steps = max(_USUAL_INSTANTS / len(knots), _FEWEST)
+    steps_per_interval = min(given.options.points_per_interval, most_steps)
+    by_interval = share * steps_per_interval - 1e-6  # less rounding
     travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)
     by_travel = travel[first] * (high - low) / _TRAVEL
     wanted = np.nan_to_num(np.maximum(by_interval, by_travel))
