@@ -55,8 +55,8 @@ class BranchMargin(Limit):
         return self._joint_map.margins(motion)
 
     def kernel_quantity(self, _chain: Chain) -> FormulaQuantity | None:
-        """Describe the margins; nothing for subclasses, which may have values of their own."""
-        return self._joint_map.margin_quantity() if type(self) is BranchMargin else None
+        """Describe the margins."""
+        return self._joint_map.margin_quantity()
 
     def partials(self, motion: JointStates) -> Partials:
         by_q, by_s = self._joint_map.margin_gradient(motion)

@@ -348,7 +348,7 @@ class Trajectory(Summary):
             "branch": self.branch,
             "degree": self.degree,
             "joint_names": self.joint_names,
-            "recovered": None if self.recovered is None else self.recovered.to_file(),
+            "recovered": self.recovered and self.recovered.to_file(),
             "own_limits": self.own_limits,
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
