@@ -162,13 +162,14 @@ def check_stops(given: Given) -> list[Check]:
     sides = (np.append(before, piece), np.append(np.ones(len(before)), u))
     states = MotionStates.at(given.pieces, *sides)
     checks += check_rest(given, "{} at stops", states)
-    moved = [given.during(phase) for phases in dwells for phase in phases]
-    if moved:
-        speeds = np.concatenate([each.qdot for each in moved])
-        times = np.concatenate([each.t for each in moved])
+    parts = [given.during(phase) for phases in dwells for phase in phases]
+    if parts:
+        still = MotionStates.join(parts)
         allowed = options.rest_velocity_tolerance
         title = "velocity in dwells"
-        checks.append(check_joints(given, title, speeds, times, "velocity", allowed))
+        checks.append(
+            check_joints(given, title, still.qdot, still.t, "velocity", allowed)
+        )
     return checks
 
 

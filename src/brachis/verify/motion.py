@@ -197,10 +197,10 @@ class MotionStates:
         u = u[first]
         blocks = range(_AT_ONCE, max(len(piece), 1), _AT_ONCE)
         parts = zip(np.split(piece, blocks), np.split(u, blocks), strict=True)
-        return cls._join([cls._evaluate(pieces, *part) for part in parts])
+        return cls.join([cls._evaluate(pieces, *part) for part in parts])
 
     @classmethod
-    def _join(cls, parts: list[MotionStates]) -> MotionStates:
+    def join(cls, parts: list[MotionStates]) -> MotionStates:
         """Put states one after the other."""
         rows = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*map(np.concatenate, rows))
@@ -231,7 +231,7 @@ class MotionStates:
 
     def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
-        both = self._join([self, other])
+        both = self.join([self, other])
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order
 
