@@ -17,20 +17,23 @@ from brachis.common.files import shipped_folder
 from brachis.errors import no_attribute
 
 
+def _task_files() -> dict[str, Path]:
+    """Return the task files by the names of the examples, from the easiest on."""
+    paths = sorted(shipped_folder("examples").glob("[0-9]*_*.yaml"))
+    return {path.stem.split("_", 1)[1]: path for path in paths}
+
+
 def names() -> tuple[str, ...]:
     """Return the names of the examples, from the easiest on."""
-    return tuple(
-        path.stem.split("_", 1)[1]
-        for path in sorted(shipped_folder("examples").glob("[0-9]*_*.yaml"))
-    )
+    return tuple(_task_files())
 
 
 def __getattr__(name: str) -> Path:
     """Find an example's task file."""
-    found = list(shipped_folder("examples").glob(f"[0-9][0-9]_{name}.yaml"))
-    if not found:
+    paths = _task_files()
+    if name not in paths:
         raise no_attribute(__name__, "examples", name, names())
-    return found[0]
+    return paths[name]
 
 
 def __dir__() -> list[str]:

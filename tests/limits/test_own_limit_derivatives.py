@@ -8,7 +8,7 @@ import pytest
 import brachis
 from brachis.errors import InputError
 from brachis.limits import Label, Limit, Partials
-from brachis.limits.derivatives import sample_moments
+from brachis.limits.checks import sample_moments
 from brachis.problem.problem import Problem
 from brachis.task import task_with
 
@@ -173,7 +173,7 @@ def test_a_limit_on_torques_passes():
 
 def test_built_in_limits_pass():
     from brachis.limits import limits_of
-    from brachis.limits.derivatives import check_partials, sample_moments
+    from brachis.limits.checks import check_partials, sample_moments
 
     task = task_with(
         brachis.examples.scara_line,
@@ -184,7 +184,7 @@ def test_built_in_limits_pass():
     limits = limits_of(robot, task)
     assert len(limits) >= 6
     for limit in limits:
-        check_partials(limit, sample_moments(robot), robot, limit.kind)
+        check_partials(limit, sample_moments(robot), robot)
 
 
 @pytest.mark.parametrize(("left_out", "is_refused"), [(2, False), (4, True)])

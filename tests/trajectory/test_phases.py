@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from brachis.errors import ResultFileError
-from brachis.task import ProcessSpeed
 from brachis.trajectory import (
     PHASE_COLUMNS,
     PhaseSpline,
@@ -14,7 +15,6 @@ from brachis.trajectory import (
     join_splines,
     phase_rows,
 )
-from brachis.trajectory.phases import list_phases, split_splines
 from support.gantry import DWELL, SPEED, SPLINES, gantry_motion
 from support.result_files import with_parts
 
@@ -37,11 +37,12 @@ def random_splines(degree: int) -> list[PhaseSpline]:
 
 
 @pytest.mark.parametrize("degree", [2, 3, 5])
-def test_splines_are_split_as_they_were_joined(degree):
+def test_splines_are_split_as_they_were_joined(degree, motion):
     splines = random_splines(degree)
     knots, points = join_splines(splines)
     ends = np.cumsum([spline.t_end for spline in splines])
-    again = split_splines(knots, degree, points, ends)
+    parts = {"knots": knots, "control_points": points, "phase_ends": ends}
+    again = replace(motion, degree=degree, **parts).phase_splines
     assert len(again) == len(splines)
     assert len(knots) == points.shape[1] + degree + 1
     for spline, other in zip(splines, again, strict=True):
@@ -78,8 +79,9 @@ def test_a_trajectory_says_what_its_phases_are(motion):
 
 def test_a_phase_longer_than_a_part_has_no_given_speed():
     """As in recorded motions, of which only the stops are known."""
-    part = ProcessSpeed(speed=SPEED, s=[0.1, 0.3])
-    (phase,) = list_phases(SPLINES[:1], np.array([1.0]), [part])
+    part = {"speed": SPEED, "s": [0.1, 0.3]}
+    motion = gantry_motion(SPLINES[:1], tool_limits={"process_speed": part})
+    (phase,) = motion.phases
     assert phase.kind == "move"
     assert phase.speed is None
 

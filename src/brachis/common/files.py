@@ -44,20 +44,6 @@ BEGINNINGS = {
 _TEMPORARY = re.compile(r"\.brachis-[0-9a-f]{8}-([0-9]+)-[0-9a-f]{16}\.part")
 
 
-def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
-    """Return the status of what a name stands for, links followed; None where there is nothing of this name.
-
-    Raises
-    ------
-    OSError
-        The system refuses the name: it is too long, ends in a circle of links, or passes what is not a folder.
-    """
-    try:
-        return Path(path).stat()
-    except FileNotFoundError:
-        return None
-
-
 def is_file(path: str | os.PathLike[str]) -> bool:
     """Return whether there is a regular file; False for a name that the system refuses (`Path.is_file` raises)."""
     return os.path.isfile(path)  # noqa: PTH113
@@ -233,8 +219,9 @@ def atomic_write(
     check_beginning(path, beginning)
     with writing_errors(path):
         target = Path(path)
-        status = status_of(path)
-        in_place = status is not None and not stat.S_ISREG(status.st_mode)
+        in_place = False
+        with suppress(FileNotFoundError):
+            in_place = not stat.S_ISREG(target.stat().st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
         # Unlike tempfile's, a new file has the usual permissions.

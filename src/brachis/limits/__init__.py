@@ -16,6 +16,7 @@ True
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 from brachis.common.labels import Label
 from brachis.limits.checks import build_user_limits
@@ -34,15 +35,12 @@ from brachis.limits.protocol import (
     Partials,
     Role,
 )
-from brachis.limits.tolerance import (
+from brachis.limits.tool import (
+    build_constant,
     build_tool_distance,
     build_tool_range,
-    build_tool_tilt,
-)
-from brachis.limits.tool import (
-    build_tool_acceleration,
-    build_tool_angular_speed,
     build_tool_speed,
+    build_tool_tilt,
 )
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel, list_models
@@ -54,8 +52,8 @@ Build = Callable[[Robot, Task], Limit | None]
 _AFTER: dict[str, dict[str, Build]] = {
     "position": {
         "tool_speed": build_tool_speed,
-        "tool_acceleration": build_tool_acceleration,
-        "tool_angular_speed": build_tool_angular_speed,
+        "tool_acceleration": partial(build_constant, "acceleration", "m/s^2"),
+        "tool_angular_speed": partial(build_constant, "angular speed", "rad/s"),
     },
     "power": {
         "total_power": build_total_power,

@@ -1,4 +1,9 @@
-"""A limit of the user's own is checked before it is used: its members, the shapes of its arrays, its derivatives."""
+"""A limit of the user's own is checked before it is used: its members, the shapes of its arrays, its derivatives.
+
+Partial derivatives are compared with central differences of the values, joint by joint at some random moments. Limits
+may have kinks and steps, and their values may be noisy. So slopes are taken with two steps, and what these differ by is
+allowed. A partial derivative is refused if it is wrong at most of the moments.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,6 @@ import numpy as np
 from brachis.common.arguments import check_array, check_finite
 from brachis.common.labels import Label
 from brachis.errors import InputError
-from brachis.limits.derivatives import check_partials, sample_moments, write_posture
 from brachis.limits.protocol import Bound, Guarantee, Limit, Moments, Partials, Role
 from brachis.robot import Robot
 from brachis.robot.custom_limits import (
@@ -20,6 +24,19 @@ from brachis.robot.custom_limits import (
     check_ratios,
     has_check,
 )
+
+_COUNT = 6
+"""Moments at which derivatives are compared."""
+_STEP = 1e-3
+"""Step of the differences, as a fraction of how far motions go: single precision is enough for it."""
+_FURTHEST = 1.0
+"""Largest speed, acceleration and jerk of the moments, rad or m."""
+_PRECISION = 2e-3
+"""Difference between stated and found slope, as a fraction of the largest slope, above which the stated is wrong."""
+_ROUNDING = 1e-3
+"""Slopes smaller than this fraction of the values count as zero."""
+_MARGIN = 5.0
+"""Factor on the difference between slopes with two steps, which is allowed too."""
 
 
 def _is_label(label: object) -> bool:
@@ -131,7 +148,7 @@ def build_user_limits(
     names = {kind.replace("_", " ") for kind in kinds}
     for where, model in models.items():
         limit = bind_model(where, model, robot)
-        _check_members(limit, where)
+        _check_members(limit)
         if limit.name in names:
             raise InputError(
                 "a built-in limit has this kind already",
@@ -143,7 +160,7 @@ def build_user_limits(
             if str(label) in labels:
                 problem = "this label exists already; its subject and kind together must be unique"
                 raise InputError(problem, where=f"{where}.labels", found=str(label))
-        _check_functions(limit, robot, where)
+        _check_functions(limit, robot)
         if has_check(model):
             moments = sample_moments(robot)
             tau = moments.torque_of(robot.chain)
@@ -157,15 +174,15 @@ def build_user_limits(
     return limits
 
 
-def _check_members(limit: Limit, where: str) -> None:
+def _check_members(limit: Limit) -> None:
     """Refuse a limit that lacks a member, or has one that is not allowed."""
     parts = ("kind", "labels", "lower", "upper")
     missing = [name for name in parts if not hasattr(limit, name)]
     if missing:
         problem = "the limit lacks required attributes"
-        raise InputError(problem, where=where, found=f"no {', '.join(missing)}")
+        raise InputError(problem, where=limit.origin, found=f"no {', '.join(missing)}")
     labels = limit.labels
-    here = f"{where}.labels"
+    here = f"{limit.origin}.labels"
     if not (isinstance(labels, tuple | list) and all(map(_is_label, labels))):
         raise InputError(
             "wrong type",
@@ -178,11 +195,11 @@ def _check_members(limit: Limit, where: str) -> None:
             "the limit has no values", where=here, allowed="at least one label"
         )
     for name in ("lower", "upper"):
-        check_array(getattr(limit, name), (len(labels),), f"{where}.{name}")
+        check_array(getattr(limit, name), (len(labels),), f"{limit.origin}.{name}")
     if not np.all(limit.lower < limit.upper):
         raise InputError(
             "the lower bounds are not below the upper bounds",
-            where=where,
+            where=limit.origin,
             found=[limit.lower, limit.upper],
         )
     for name, (allowed, accepts) in _MEMBERS.items():
@@ -194,13 +211,13 @@ def _check_members(limit: Limit, where: str) -> None:
         if not is_allowed:
             raise InputError(
                 f"{name} is not valid",
-                where=f"{where}.{name}",
+                where=f"{limit.origin}.{name}",
                 found=f"{value!r:.200}",
                 allowed=allowed,
             )
 
 
-def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
+def _check_functions(limit: Limit, robot: Robot) -> None:
     """Refuse values and partial derivatives of the wrong type or shape, not finite, or that contradict each other.
 
     A limit may be undefined in some postures: those are left out, if they are not most of them.
@@ -209,20 +226,22 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
     count = len(moments.q)
     c = len(limit.labels)
     values = limit.values(moments)
-    check_array(values, (count, c), f"{where}.values", remark=f" for {count} moments")
+    check_array(
+        values, (count, c), f"{limit.origin}.values", remark=f" for {count} moments"
+    )
     is_known = np.isfinite(values).all(axis=1)
     if 2 * np.count_nonzero(is_known) <= count:
         moment, column = np.argwhere(~np.isfinite(values))[0]
         posture = write_posture(moments, moment)
         raise InputError(
             "the values are not finite",
-            where=f"{where}.values",
+            where=f"{limit.origin}.values",
             found=f"{values[moment, column]} for {limit.labels[column]!s} at {posture}",
             allowed="finite numbers in most postures within the joints' ranges, at moderate speeds",
         )
     known = Moments(*(getattr(moments, own.name)[is_known] for own in fields(moments)))
     partials = limit.partials(known)
-    here = f"{where}.partials"
+    here = f"{limit.origin}.partials"
     if not isinstance(partials, Partials):
         problem = "the return value is not a brachis.limits.Partials"
         raise InputError(problem, where=here, found=partials)
@@ -237,4 +256,135 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
         shape = (count, c) if name == "s" else (count, c, n)
         check_array(part, shape, f"{here}.{name}", remark=f" for {count} moments")
         check_finite(part, f"{here}.{name}")
-    check_partials(limit, known, robot, where)
+    check_partials(limit, known, robot)
+
+
+def _reaches(robot: Robot) -> np.ndarray:
+    """How far q, qdot, qddot and qdddot go, (4, n), to both sides of the middle; q no further than the others."""
+    low, high = _ranges(robot)
+    rate = np.full(robot.n, _FURTHEST)
+    speed = 0.5 * np.minimum(robot.limits.velocity, rate)
+    return np.array([np.minimum(0.5 * (high - low), rate), speed, rate, rate])
+
+
+def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Postures to look at, (n,) each: the middle of the ranges; half a turn, or 1 m, beside an open end."""
+    reach = np.where(robot.revolute, np.pi, 1.0)
+    lower = robot.limits.position_lower
+    upper = robot.limits.position_upper
+    near = np.clip(0.0, lower, upper)
+    low = np.maximum(lower, near - reach)
+    high = np.minimum(upper, near + reach)
+    inside = 0.1 * (high - low)
+    return low + inside, high - inside
+
+
+def sample_moments(robot: Robot) -> Moments:
+    """Return random moments within the joints' ranges, at moderate speeds."""
+    rng = np.random.default_rng(0)
+    low, high = _ranges(robot)
+    _, *reaches = _reaches(robot)
+    q = rng.uniform(low, high, (_COUNT, robot.n))
+    qdot, qddot, qdddot = (
+        rng.uniform(-reach, reach, (_COUNT, robot.n)) for reach in reaches
+    )
+    return Moments(q, qdot, qddot, qdddot, rng.uniform(0.1, 0.9, _COUNT))
+
+
+def write_posture(moments: Moments, number: int | np.intp) -> str:
+    """Write down the posture of one of some moments."""
+    q = ", ".join(f"{value:.4g}" for value in moments.q[number])
+    return f"q = [{q}]"
+
+
+def _differentiate(
+    limit: Limit, moments: Moments, name: str, reach: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Differentiate values by one of q, qdot, ..., s in units of its reach, (d,), once with each of two steps.
+
+    Both are (K, c, d), with d = n joints, and d = 1 for s.
+    """
+    count = len(moments.q)
+    steps = _STEP * np.array([1.0, -1.0, 2.0, -2.0])
+    shifts = np.multiply.outer(steps, np.diag(reach)).reshape(-1, len(reach))
+    states = {
+        own.name: np.concatenate([getattr(moments, own.name)] * len(shifts))
+        for own in fields(moments)
+    }
+    changed = states[name]
+    states[name] = changed + np.repeat(shifts, count, axis=0).reshape(changed.shape)
+    values = limit.values(Moments(**states))
+    total = len(states["q"])
+    check_array(
+        values,
+        (total, len(limit.labels)),
+        f"{limit.origin}.values",
+        remark=f" for {total} moments",
+    )
+    parts = values.reshape(len(steps), len(reach), count, -1)
+    ahead, behind, far_ahead, far_behind = np.moveaxis(parts, 1, -1)
+    return (ahead - behind) / (2.0 * _STEP), (far_ahead - far_behind) / (4.0 * _STEP)
+
+
+def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
+    """Refuse partial derivatives that contradict the values.
+
+    Parameters
+    ----------
+    limit : Limit
+        Its values and partials have the right shapes, and are finite.
+    moments : Moments
+        At which they are compared.
+    robot : Robot
+
+    Raises
+    ------
+    InputError
+        A partial derivative is wrong at most of the moments, or the values depend on qdddot and the limit's order is
+        2.
+    """
+    partials = limit.partials(moments)
+    rounding = _ROUNDING * np.abs(limit.values(moments)).max(axis=0)
+    names = ("q", "qdot", "qddot", "qdddot", "s")
+    for name, reach in zip(names, [*_reaches(robot), np.ones(1)], strict=True):
+        found, coarse = _differentiate(limit, moments, name, reach)
+        partial = getattr(partials, name)
+        stated = np.zeros_like(found)
+        if partial is not None:
+            stated = partial.reshape(found.shape) * reach
+        size = np.abs(found)
+        small = rounding[:, None] + 0.5 * _PRECISION * size.max(axis=0)
+        small = small + _PRECISION * np.abs(stated).max(axis=2, keepdims=True)
+        is_steep = np.maximum(np.abs(stated), size) > small
+        if name == "qdddot" and limit.order < 3:
+            _check_order(limit, is_steep.any(axis=2))
+        off = np.abs(stated - found)
+        allowed = small + _PRECISION * size + _MARGIN * np.abs(found - coarse)
+        is_wrong = off > allowed
+        times = is_wrong.sum(axis=0)
+        is_refused = (times > 1) & (2 * times > is_steep.sum(axis=0))
+        if not is_refused.any():
+            continue
+        joint, column = np.argwhere(is_refused.T)[0]
+        worst = np.argmax(np.where(is_wrong, off, -1.0)[:, column, joint])
+        by = "" if name == "s" else f" by {name} of joint {robot.joint_names[joint]!r}"
+        numbers = np.array([stated, found])[:, worst, column, joint] / reach[joint]
+        posture = write_posture(moments, worst)
+        raise InputError(
+            f"this partial derivative of {limit.labels[column]!s}{by} contradicts the values",
+            where=f"{limit.origin}.partials.{name}",
+            found=f"{numbers[0]:.6g} at {posture}",
+            allowed=f"{numbers[1]:.6g}, by differences of the values",
+        )
+
+
+def _check_order(limit: Limit, depends: np.ndarray) -> None:
+    """Refuse values that depend on qdddot, (K, c) bool, at most of the moments."""
+    columns = np.flatnonzero(2 * depends.sum(axis=0) > len(depends))
+    if len(columns):
+        raise InputError(
+            f"the value of {limit.labels[columns[0]]!s} depends on qdddot",
+            where=f"{limit.origin}.order",
+            found=limit.order,
+            allowed=3,
+        )

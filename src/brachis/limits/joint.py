@@ -57,7 +57,6 @@ class JointLimit(Limit):
         row = LIMIT_KINDS[self.kind]
         self._robot = robot
         self._joints = joints
-        self._is_of_all = np.array_equal(joints, np.arange(robot.n))
         self._ends = robot.limits.both_ways(self.kind)[:, joints]
         self._measure(*self._ends)
         units = [robot.position_units[i] for i in joints]
@@ -117,8 +116,8 @@ class JointLimit(Limit):
         """Quantity of all joints, (K, n), in SI units."""
 
     def values(self, motion: JointStates) -> np.ndarray:
-        own = self._of_joints(self.quantity(motion))
-        return (own - self._middle) * self._scale
+        quantity = self.quantity(motion).take(self._joints, axis=1)
+        return (quantity - self._middle) * self._scale
 
     def kernel_quantity(self, chain: Chain) -> ScaledQuantity | None:
         """Describe the values; nothing for subclasses, which may have values of their own."""
@@ -127,13 +126,9 @@ class JointLimit(Limit):
             return None
         return ScaledQuantity(name, self._joints, self._scale, chain)
 
-    def _of_joints(self, every: np.ndarray) -> np.ndarray:
-        """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""
-        return every if self._is_of_all else every.take(self._joints, axis=1)
-
     def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
         """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""
-        return self._of_joints(slopes) * self._scale[:, None]
+        return slopes.take(self._joints, axis=1) * self._scale[:, None]
 
 
 class _DerivativeLimit(JointLimit):

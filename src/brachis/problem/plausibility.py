@@ -467,27 +467,24 @@ def _curves(robot: Robot) -> Iterator[Issue]:
     usual_torque = LIMIT_KINDS["torque"].usual
     assert usual_torque is not None
     # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
-    usual_speed = UsualLimit({}, FASTEST, "velocity", 5.0, 5.0)
-    rows = zip(
-        robot.joint_names, robot.position_units, robot.limits.torque_speed, strict=True
-    )
-    for i, (name, unit, curve) in enumerate(rows):
+    rpm = {"rad": "rpm", "m": "mm per second"}
+    usual_speed = UsualLimit(rpm, FASTEST, "velocity", 5.0, 5.0)
+    behind_gear = "; at the joint, behind its gear"
+    for i, curve in enumerate(robot.limits.torque_speed):
         if not curve:
             continue
-        key = f"robot.limits.torque_speed.{name}"
-        meant = {"rad": "rpm", "m": "mm per second"}[unit]
-        yield from issue_above(
-            key,
-            f"the last speed of the curve looks like {meant}",
-            curve[-1][0],
-            _largest_usual(robot, usual_speed, i),
-            UNITS["velocity"][unit],
-            "; at the joint, behind its gear",
-        )
-        yield from issue_above(
-            key,
-            f"the torque of the curve looks like {usual_torque.mistaken_unit[unit]}",
-            curve[0][1] / scale,
-            _largest_usual(robot, usual_torque, i),
-            UNITS["torque"][unit],
-        )
+        unit = robot.position_units[i]
+        last_speed = curve[-1][0]
+        at_rest = curve[0][1] / scale
+        for title, value, kind, usual, aside in (
+            ("last speed", last_speed, "velocity", usual_speed, behind_gear),
+            ("torque", at_rest, "torque", usual_torque, ""),
+        ):
+            yield from issue_above(
+                f"robot.limits.torque_speed.{robot.joint_names[i]}",
+                f"the {title} of the curve looks like {usual.mistaken_unit[unit]}",
+                value,
+                _largest_usual(robot, usual, i),
+                UNITS[kind][unit],
+                aside,
+            )

@@ -119,8 +119,7 @@ class Problem(Summary):
             time_laws,
             tuple(user_limits),
         )
-        postures = problem.given_postures
-        limits = check_postures(task, task_map, limits, postures, path)
+        limits = check_postures(task, task_map, limits, problem.given_postures, path)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return replace(problem, limits=limits, end=end)
@@ -242,24 +241,24 @@ class Decomposition(Summary):
         return ClosedFormMap(task_map, path, solver, self.redundant, branch, start)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Decompositions(Sequence[Decomposition]):
     """The decompositions that the task allows. They are computed when first used; see `decompositions_of`.
 
     Searches in charts that begin at a given posture never ask for them.
 
-    Parameters
+    Attributes
     ----------
     problem : Problem
-    families : sequence of Family, optional
+    families : sequence of Family
     """
 
-    def __init__(self, problem: Problem, families: Sequence[ik.Family] = ()) -> None:
-        self._problem = problem
-        self._families = families
+    problem: Problem
+    families: Sequence[ik.Family]
 
     @cached_property
     def _found(self) -> list[Decomposition]:
-        return decompositions_of(self._problem, self._families)
+        return decompositions_of(self.problem, self.families)
 
     def __len__(self) -> int:
         """How many they are."""

@@ -86,8 +86,8 @@ class _Rows:
     @classmethod
     def of(
         cls, limit: Limit, path: JointPath, motion: Passage, narrower: Narrower
-    ) -> _Rows | None:
-        """Linearise a limit at a motion; None if it restricts neither velocity nor acceleration."""
+    ) -> _Rows:
+        """Linearise a limit at a motion."""
         partials = limit.partials(motion)
         values = limit.values(motion)
         below, above = np.broadcast_to(narrower, (2, *values.shape))
@@ -98,8 +98,6 @@ class _Rows:
         if partials.qdot is not None:
             by_rate = apply_each(partials.qdot, path.q_dp)
         if partials.qddot is None:
-            if partials.qdot is None:
-                return None
             room = np.where(by_rate > 0.0, upper, lower) - values
             ahead = np.full_like(values, np.inf)
             np.divide(room, by_rate, out=ahead, where=np.abs(by_rate) > _TINY)
@@ -177,12 +175,11 @@ class PhasePlane:
             Those of the last linearisation that agree with the limits at the motion.
         """
         known = {block.limit: block for block in agreeing}
-        linearised = [
+        rows = [
             known.get(limit)
             or _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
             for limit in self._limits
         ]
-        rows = [block for block in linearised if block is not None]
         self._motion = motion
         has_new_levels = any(
             block.by_u is None for block in rows if block not in agreeing
@@ -196,13 +193,12 @@ class PhasePlane:
             for block in older
             if block not in rows and block.is_tangent_below(motion)
         ]
-        self._set_bounds(
-            [block for block in (*rows, *earlier) if block.by_u is not None],
-            [block for block in rows if block.by_u is None],
-        )
+        self._set_bounds([*rows, *earlier])
 
-    def _set_bounds(self, sloped: Sequence[_Rows], levels: Sequence[_Rows]) -> None:
+    def _set_bounds(self, rows: Sequence[_Rows]) -> None:
         """Find the bounds on u and x that rows with and without acceleration set, `_levels` known."""
+        sloped = [block for block in rows if block.by_u is not None]
+        levels = [block for block in rows if block.by_u is None]
         blank = [np.empty((len(self._steps), 0))]
         self._labels = [
             str(label) for block in (*sloped, *levels) for label in block.limit.labels
@@ -244,7 +240,6 @@ class PhasePlane:
                     padded = np.concatenate(ends, axis=-2)
                     narrower = np.maximum(padded[..., 1:, :], padded[..., :-1, :])
                 level = _Rows.of(block.limit, self.path, motion, narrower)
-                assert level is not None
                 levels.append(level.upper)
         return np.hstack(levels)
 

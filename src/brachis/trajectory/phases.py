@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
 from brachis.common.arrays import bisect
 from brachis.common.summary import Summary
 from brachis.kernel import Spline
-from brachis.task import ProcessSpeed
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,63 +155,6 @@ def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray
         knots.append(own if begin == 0.0 else own[outer:])
     points = np.hstack([spline.control_points for spline in splines])
     return np.concatenate(knots), points
-
-
-def split_splines(
-    knots: np.ndarray, degree: int, control_points: np.ndarray, phase_ends: np.ndarray
-) -> tuple[PhaseSpline, ...]:
-    """Undo `join_splines`, to rounding.
-
-    Parameters
-    ----------
-    knots, degree, control_points
-        Of the whole motion.
-    phase_ends : (P,) ndarray
-        s, ascending.
-    """
-    outer = degree + 1
-    begins = np.append(0.0, phase_ends[:-1])
-    numbers = find_phase_knots(knots, degree)
-    splines = []
-    for begin, end, (first, last) in zip(
-        begins, phase_ends, pairwise(numbers), strict=True
-    ):
-        own = (knots[first : last + outer] * phase_ends[-1] - begin) / (end - begin)
-        own[:outer] = 0.0
-        own[-outer:] = 1.0
-        points = control_points[:, first:last]
-        splines.append(PhaseSpline(end - begin, own, degree, points))
-    return tuple(splines)
-
-
-def list_phases(
-    splines: Sequence[PhaseSpline],
-    phase_ends: np.ndarray,
-    speeds: Sequence[ProcessSpeed],
-) -> tuple[MotionPhase, ...]:
-    """Say what each phase is, by its curves, its end (s), and the given speeds of the task."""
-    begins = np.append(0.0, phase_ends[:-1])
-    phases = []
-    times = zip(begins.tolist(), phase_ends.tolist(), strict=True)
-    for spline, (begin, end) in zip(splines, times, strict=True):
-        s_begin, s_end = spline.control_points[0, [0, -1]].tolist()
-        is_dwell = s_begin == s_end
-        # The phases of a recorded motion are between its stops, and longer than the parts.
-        ends = (s_begin, s_end)
-        given = (part.speed for part in speeds if np.allclose(ends, part.s, 0.0, 1e-9))
-        speed = None if is_dwell else next(given, None)
-        phases.append(MotionPhase(begin, end, s_begin, s_end, speed, is_dwell))
-    return tuple(phases)
-
-
-def times_of_knots(
-    knots: np.ndarray, degree: int, phase_ends: np.ndarray
-) -> np.ndarray:
-    """Return joined knots in s; those where phases meet are exactly the ends of the phases, (P,), s."""
-    times = knots * phase_ends[-1]
-    first = find_phase_knots(knots, degree)[1:]
-    times[first[:, None] + np.arange(degree + 1)] = phase_ends[:, None]
-    return times
 
 
 def find_phase_knots(knots: np.ndarray, degree: int) -> np.ndarray:

@@ -68,8 +68,11 @@ class Samples(Summary):
     @property
     def columns(self) -> dict[str, str]:
         """Those of `COLUMNS` that are known."""
-        is_known = self.tau is not None
-        return {key: COLUMNS[key] for key in COLUMNS if is_known or key != "tau"}
+        return {
+            prefix: quantity
+            for prefix, quantity in COLUMNS.items()
+            if getattr(self, quantity) is not None
+        }
 
     def __len__(self) -> int:
         """Return the number of times, K."""

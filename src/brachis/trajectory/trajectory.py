@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, wraps
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar
 
@@ -22,13 +23,7 @@ from brachis.errors import InputError, UnknownNameError
 from brachis.kernel import Spline
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
-from brachis.trajectory.phases import (
-    MotionPhase,
-    PhaseSpline,
-    list_phases,
-    split_splines,
-    times_of_knots,
-)
+from brachis.trajectory.phases import MotionPhase, PhaseSpline, find_phase_knots
 from brachis.trajectory.pieces import Pieces, piece_coefficients
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
@@ -161,21 +156,46 @@ class Trajectory(Summary):
         return self._spline(self.control_points[1:].T)
 
     def _spline(self, control_points: np.ndarray) -> Spline:
-        knots = times_of_knots(self.knots, self.degree, self.phase_ends)
-        return Spline(knots, control_points, self.degree)
+        """Put control points on knots in s; those where phases meet are exactly the ends of the phases."""
+        times = self.knots * self.phase_ends[-1]
+        first = find_phase_knots(self.knots, self.degree)[1:]
+        times[first[:, None] + np.arange(self.degree + 1)] = self.phase_ends[:, None]
+        return Spline(times, control_points, self.degree)
 
     @cached_property
     def phase_splines(self) -> tuple[PhaseSpline, ...]:
-        """Curves of each phase: s, then the redundant joints or sigma."""
-        return split_splines(
-            self.knots, self.degree, self.control_points, self.phase_ends
-        )
+        """Curves of each phase: s, then the redundant joints or sigma. `join_splines` undone, to rounding."""
+        outer = self.degree + 1
+        numbers = find_phase_knots(self.knots, self.degree)
+        ends = np.append(0.0, self.phase_ends)
+        splines = []
+        for (begin, end), (first, last) in zip(
+            pairwise(ends), pairwise(numbers), strict=True
+        ):
+            times = self.knots[first : last + outer] * ends[-1]
+            knots = (times - begin) / (end - begin)
+            knots[:outer] = 0.0
+            knots[-outer:] = 1.0
+            points = self.control_points[:, first:last]
+            splines.append(PhaseSpline(end - begin, knots, self.degree, points))
+        return tuple(splines)
 
     @cached_property
     def phases(self) -> tuple[MotionPhase, ...]:
         """What each phase is: its times, its part of the path, and its given speed."""
+        ends = [0.0, *self.phase_ends.tolist()]
         speeds = self.task.tool_limits.process_speed
-        return list_phases(self.phase_splines, self.phase_ends, speeds)
+        phases = []
+        times = pairwise(ends)
+        for (begin, end), spline in zip(times, self.phase_splines, strict=True):
+            s_begin, s_end = spline.control_points[0, [0, -1]].tolist()
+            is_dwell = s_begin == s_end
+            # The phases of a recorded motion are between its stops, and longer than the parts.
+            s = (s_begin, s_end)
+            given = (part.speed for part in speeds if np.allclose(s, part.s, 0.0, 1e-9))
+            speed = None if is_dwell else next(given, None)
+            phases.append(MotionPhase(begin, end, *s, speed, is_dwell))
+        return tuple(phases)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Path coordinate s at times `t`, same shape."""
@@ -332,7 +352,7 @@ class Trajectory(Summary):
             "branch": self.branch,
             "degree": self.degree,
             "joint_names": self.joint_names,
-            "recovered": None if self.recovered is None else self.recovered.to_file(),
+            "recovered": self.recovered and self.recovered.to_file(),
             "own_limits": self.own_limits,
             "sensitivities": self.sensitivities and self.sensitivities.to_file(),
         }

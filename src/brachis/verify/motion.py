@@ -197,10 +197,10 @@ class MotionStates:
         u = u[first]
         blocks = range(_AT_ONCE, max(len(piece), 1), _AT_ONCE)
         parts = zip(np.split(piece, blocks), np.split(u, blocks), strict=True)
-        return cls._join([cls._evaluate(pieces, *part) for part in parts])
+        return cls.join([cls._evaluate(pieces, *part) for part in parts])
 
     @classmethod
-    def _join(cls, parts: list[MotionStates]) -> MotionStates:
+    def join(cls, parts: list[MotionStates]) -> MotionStates:
         """Put states one after the other."""
         rows = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*map(np.concatenate, rows))
@@ -231,7 +231,7 @@ class MotionStates:
 
     def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
-        both = self._join([self, other])
+        both = self.join([self, other])
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order
 
@@ -340,10 +340,9 @@ def _spread(given: Given) -> Places:
     middle = 0.5 * (edges[1:] + edges[:-1])
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]
-    each = np.clip(_USUAL_INSTANTS / len(knots), _FEWEST, None)
-    by_interval = (
-        share * min(given.options.points_per_interval, each) - 1e-6
-    )  # less rounding
+    most_steps = max(_USUAL_INSTANTS / len(knots), _FEWEST)
+    steps_per_interval = min(given.options.points_per_interval, most_steps)
+    by_interval = share * steps_per_interval - 1e-6  # less rounding
     travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)
     by_travel = travel[first] * (high - low) / _TRAVEL
     wanted = np.nan_to_num(np.maximum(by_interval, by_travel))

@@ -24,14 +24,15 @@ from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
     check_continuity,
     check_ends,
+    check_process_speed,
     check_progress,
     check_splines,
+    check_stops,
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Given
-from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
@@ -123,9 +124,12 @@ def verify_trajectory(
     )
 
 
-def _path_errors(given: Given, targets: np.ndarray) -> np.ndarray:
-    """Return the tool's distance, m, or largest angle of an axis, rad, from task coordinates, (K, c): (K,)."""
+def _path_errors(given: Given) -> np.ndarray:
+    """Return the tool's distance, m, or largest angle of an axis, rad, from the path at the saved s(t), (K,)."""
     task_map = given.task_map
+    targets = given.path.sample(np.clip(given.states.s, 0.0, 1.0)).target
+    if isinstance(task_map, JointSpace):
+        return np.linalg.norm(given.states.q - targets, axis=1)
     positions, rotations = tool_placements(given.robot, given.states.q, given.joints)
     axes = list(task_map.axes)
     distances = np.linalg.norm(positions[:, axes] - targets[:, : len(axes)], axis=1)
@@ -146,13 +150,7 @@ def _path_errors(given: Given, targets: np.ndarray) -> np.ndarray:
 
 def _check_path(given: Given) -> Check:
     """Check the largest distance of the tool from the path at the saved s(t)."""
-    states = given.states
-    task_map = given.task_map
-    targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
-    if isinstance(task_map, JointSpace):
-        errors = np.linalg.norm(states.q - targets, axis=1)
-    else:
-        errors = _path_errors(given, targets)
+    errors = _path_errors(given)
     worst = np.argmax(errors)
     tolerance = given.options.path_tolerance
     remark = ""
@@ -161,5 +159,5 @@ def _check_path(given: Given) -> Check:
         tolerance = max(tolerance, recovered.tolerance)
         remark = "the path was recovered from the motion"
     error = errors[worst]
-    time = states.t[worst]
+    time = given.states.t[worst]
     return Check("path error", error, tolerance, "m, rad", time=time, remark=remark)
