@@ -83,7 +83,7 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
         end={"joints": end}, path=[{"line": {"by": (places[1] - places[0]).tolist()}}]
     )
     (level,) = SEARCH_LEVELS["fast"]
-    guesses = module.chart_guesses(problem, decompositions_of(problem), level)
+    guesses = module.lattice_guesses(problem, decompositions_of(problem), level)
     assert isinstance(guesses, list)
     assert any(guess.origin.startswith("random") for guess in guesses)
     for guess in guesses:
