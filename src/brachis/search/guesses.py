@@ -55,7 +55,8 @@ class SearchLevel:
     decompositions : int
         Decompositions whose guesses are ranked; those farthest from singularity at the start come first.
     ranked : int
-        Guesses in charts that are ranked, or of each decomposition; four times as many joint paths are looked at.
+        Guesses in charts that are ranked, or of each decomposition. In charts four times as many joint paths are looked
+        at, on branches as many for each of a free start.
     refined : int
         Candidates that are refined and verified, no more, as long as they may beat the best one.
     cells_per_turn, nodes : int
@@ -137,6 +138,9 @@ def lattice_guesses(
     PlanningError
         No motion along any joint path can hold a speed, or a mean of a load.
     """
+    looked_at = SCREENED * level.ranked
+    if keeps_branch:
+        looked_at = level.ranked * len(decompositions[0].branches)
     for finer in (1, 2):
         lattice = Lattice(
             problem,
@@ -148,7 +152,7 @@ def lattice_guesses(
             only_minima=level.only_minima and not keeps_branch,
             deadline=deadline,
         )
-        joint_paths = lattice.joint_paths(SCREENED * level.ranked)
+        joint_paths = lattice.joint_paths(looked_at)
         if not isinstance(joint_paths, DeadEnd):
             break
     if isinstance(joint_paths, DeadEnd):
