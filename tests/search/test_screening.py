@@ -47,13 +47,11 @@ def guesses():
     robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
     problem = Problem.of(robot, task)
     (level,) = module.SEARCH_LEVELS["fast"]
-    many = dataclasses.replace(
-        level, in_charts=100, only_minima=False, cells_per_turn=24
-    )
+    many = dataclasses.replace(level, ranked=100, only_minima=False, cells_per_turn=24)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "screen", lambda guesses, *_others: guesses)
         patch.setattr(module, "random_joint_paths", lambda *_arguments: [])
-        found = module.chart_guesses(problem, decompositions_of(problem), many)
+        found = module.lattice_guesses(problem, decompositions_of(problem), many)
     assert isinstance(found, list)
     assert len(found) > MOST
     return found[:12]
@@ -156,15 +154,16 @@ def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
     problem = Problem.of(robot_from_settings(task.robot), task)
     (decomposition,) = decompositions_of(problem)
     (level,) = module.SEARCH_LEVELS["fast"]
-    found = module.lattice_guesses(decomposition, level)
+    keeps = {"keeps_branch": True}
+    found = module.lattice_guesses(problem, [decomposition], level, **keeps)
     assert isinstance(found, list)
-    assert len(found) == level.joint_paths // 2
+    assert 1 < len(found) <= level.ranked
     assert all(guess.is_improved for guess in found)
     estimates = [guess.estimate for guess in found]
     assert estimates == sorted(estimates)
     # Those of the shortest joint paths alone.
-    few = dataclasses.replace(level, joint_paths=2)
-    (shortest,) = module.lattice_guesses(decomposition, few)
+    few = dataclasses.replace(level, ranked=1)
+    (shortest,) = module.lattice_guesses(problem, [decomposition], few, **keeps)
     assert shortest.is_improved
     assert estimates[0] <= shortest.estimate
 
