@@ -264,9 +264,8 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
         target=program,
     )
     assert settled.reports[-1] is report
-    assert (
-        settled.not_completed
-        == "the motion has 13 intervals, and was not solved with all 100"
+    assert settled.not_completed.startswith(
+        "the motion has 13 intervals, and was not solved with all 100"
     )
 
 

@@ -27,6 +27,7 @@ from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import (
     Solve,
     SolvedProgram,
+    SolverSession,
     attempt_once,
     improve,
     judge_early_end,
@@ -179,8 +180,22 @@ def refine_mesh(
             return _COARSER
         return None if finer.variables == program.variables else (finer, x)
 
-    attempt = partial(attempt_once, solve, accept_early_end=True)
-    return improve(solved, [halve] * 20, attempt)
+    is_lost = False
+
+    def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
+        """Solve with one solver, and if that gives no motion, with the one for large programs."""
+        nonlocal is_lost
+        tried = attempt_once(solve, program, x, accept_early_end=True)
+        is_lost = not tried.usable
+        if not is_lost or deadline.passed or not isinstance(solve, SolverSession):
+            return tried
+        session = replace(solve, backend=solve.for_large or solve.backend)
+        again = attempt_once(session, program, x, accept_early_end=True)
+        is_lost = not again.usable
+        return replace(again, reports=(*tried.reports, *again.reports))
+
+    finest = improve(solved, [halve] * 20, attempt)
+    return replace(finest, not_completed=_COARSER) if is_lost else finest
 
 
 def _choose_intervals(
