@@ -12,7 +12,7 @@ import brachis
 from brachis.common.deadline import NEVER, Deadline
 from brachis.optimise import mesh
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
-from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.mesh import (
     adapt_mesh,
     coarsest,
@@ -142,6 +142,26 @@ def test_a_round_beyond_its_end_gains_little(solved):
     )
     assert again.program.intervals > fine.program.intervals
     assert again.t_end > (1.0 - tolerance) * fine.t_end
+
+
+class Broken:
+    """A solver that breaks down in every session."""
+
+    name = "broken"
+    is_interior = True
+
+    def solve(self, program, x, _options, _progress):
+        return failing(program, x)
+
+
+@pytest.mark.parametrize("other", ["ipopt", None])
+def test_a_round_that_fails_is_left_to_the_other_solver(solved, other):
+    for_large = solvers_for(other)[0] if other else None
+    session = SolverSession(Broken(), SolverOptions(), NEVER, for_large=for_large)
+    spline = SplineSettings(intervals="auto", tolerance=0.02)
+    fine = refine_mesh(solved, session, spline, NEVER)
+    assert (fine.program.intervals > solved.program.intervals) == bool(other)
+    assert (fine.not_completed == "") == bool(other)
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
