@@ -274,6 +274,12 @@ MECHANISMS = (
         use=_SEARCH + "hopeless.explain_speeds",
     ),
     Mechanism(
+        "differential_ik",
+        "no guesses by differential inverse kinematics",
+        {_SEARCH + "schedule.numeric_guesses": return_empty},
+        is_used=is_found,
+    ),
+    Mechanism(
         "begin_with_timing",
         "solves over time begin with even knots",
         {_SEARCH + "over_time.begin_with_timing": return_none},

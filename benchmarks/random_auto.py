@@ -56,13 +56,7 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
         return False
     return any(
         not isinstance(
-            lattice_guesses(
-                decomposition.problem,
-                [decomposition],
-                SEARCH_LEVELS["fast"][0],
-                keeps_branch=True,
-            ),
-            DeadEnd,
+            lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0]), DeadEnd
         )
         for decomposition in found
     )

@@ -25,18 +25,21 @@ def table(columns):
 
 
 def test_the_documented_efforts_are_the_real_ones():
-    efforts = table(columns=4)
-    assert set(efforts) == set(SEARCH_LEVELS)
-    for name, (looked, ranked, refined) in efforts.items():
+    in_charts, in_closed_forms = table(columns=4), table(columns=5)
+    assert set(in_charts) == set(in_closed_forms) == set(SEARCH_LEVELS)
+    for name, (looked, plans, refined) in in_charts.items():
         level = [level for level in SEARCH_LEVELS[name] if not level.fallback][-1]
-        assert looked.split(",")[0] == str(SCREENED * level.ranked)
+        assert looked.split(",")[0] == str(SCREENED * level.in_charts)
         assert ("," in looked) is (name != "exhaustive" and not level.only_minima)
-        assert (ranked, refined) == (str(level.ranked), str(level.refined))
-
-
-def test_the_documented_numbers_of_decompositions_are_the_real_ones():
-    text = PAGE.read_text(encoding="utf-8")
-    for name, levels in SEARCH_LEVELS.items():
-        count = [level for level in levels if not level.fallback][-1].decompositions
-        written = "all" if count >= 10_000 else str(count)
-        assert f"{written} with `{name}`" in text
+        assert (plans, refined) == (str(level.in_charts), str(level.refined))
+    for name, (decompositions, seeds, plans, refined) in in_closed_forms.items():
+        level = [level for level in SEARCH_LEVELS[name] if not level.fallback][-1]
+        assert decompositions == {1: "the first one", 6: "6", 20: "20"}.get(
+            level.decompositions, "all"
+        )
+        assert seeds.split(",")[0] == str(level.joint_paths)
+        assert ("and 8" in seeds) is (level.numeric == 8)
+        assert plans == (
+            str(level.in_closed_forms) if level.in_closed_forms < 10_000 else "all"
+        )
+        assert refined == str(level.refined)

@@ -15,10 +15,10 @@ from brachis.errors import PathError, PlanningError
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_no_motion
 from brachis.search.guesses import SEARCH_LEVELS, lattice_guesses
 from brachis.search.joint_path import DeadEnd
-from support.lattices import branch_lattice
 from support.pose_arms import panda
 
 ROOT = Path(__file__).parents[2]
@@ -73,7 +73,7 @@ def test_courses_are_motions_of_the_robot(case):
     robot, limits = given.robot, given.robot.limits
     found = 0
     for decomposition in decompositions_of(given):
-        joint_paths = branch_lattice(decomposition).joint_paths(4)
+        joint_paths = ClosedFormLattice(decomposition).joint_paths(4)
         if isinstance(joint_paths, DeadEnd):
             continue
         found += len(joint_paths)
@@ -109,18 +109,18 @@ def test_courses_are_motions_of_the_robot(case):
 
 def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
     (decomposition, *_) = decompositions_of(problem(scara(), redundant_joints=["j1"]))
-    first, *others = branch_lattice(decomposition).joint_paths(6)
+    first, *others = ClosedFormLattice(decomposition).joint_paths(6)
     assert others
     assert all(other.length >= first.length for other in others)
 
 
 def test_an_end_posture_is_reached():
-    free = branch_lattice(
+    free = ClosedFormLattice(
         decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]
     ).joint_paths(3)
     end = free[-1].q[-1]
     given = problem(scara(), redundant_joints=["j1"], end={"joints": end})
-    joint_paths = branch_lattice(decompositions_of(given)[0]).joint_paths(3)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
     assert all(np.abs(joint_path.q[-1] - end).max() < 0.2 for joint_path in joint_paths)
 
 
@@ -132,7 +132,7 @@ def test_lifts_follow_the_course():
         start={"joints": [0.3, 0.9]},
         path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}],
     )
-    (joint_path,) = branch_lattice(decompositions_of(given)[0]).joint_paths(1)
+    (joint_path,) = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(
         6 * math.pi, abs=1e-6
     )
@@ -165,9 +165,7 @@ def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
     given = problem(scara(**options), **changes)
     ends = [
-        lattice_guesses(
-            given, [decomposition], SEARCH_LEVELS["fast"][0], keeps_branch=True
-        )
+        lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0])
         for decomposition in decompositions_of(given)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)

@@ -11,9 +11,9 @@ import pytest
 import brachis
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import DeadEnd
-from brachis.search.stations import stations
-from support.lattices import branch_lattice
+from brachis.search.lattice import stations
 
 ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -48,7 +48,7 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     (decomposition,) = decompositions_of(
         problem(robot, start="free", path_start=list(here), path=turns)
     )
-    joint_paths = branch_lattice(decomposition).joint_paths(4)
+    joint_paths = ClosedFormLattice(decomposition).joint_paths(4)
     assert not isinstance(joint_paths, DeadEnd)
     assert all(
         -2 * math.pi <= q <= 2 * math.pi
@@ -65,7 +65,7 @@ def test_a_circle_too_many_for_the_range_is_a_dead_end_at_its_joint():
     (decomposition,) = decompositions_of(
         problem(robot, start="free", path_start=list(here), path=turns)
     )
-    end = branch_lattice(decomposition).joint_paths(4)
+    end = ClosedFormLattice(decomposition).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
     assert "the range of joint 'j1' ends" in end.cause
@@ -89,7 +89,7 @@ def test_a_free_start_on_a_long_rail(reach):
     given = Problem.of(
         robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task)
     )
-    joint_paths = branch_lattice(decompositions_of(given)[0]).joint_paths(2)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(2)
     assert not isinstance(joint_paths, DeadEnd)
     assert all(abs(joint_path.q[0, 0] - 20.0) < 3.0 for joint_path in joint_paths)
 
@@ -110,7 +110,7 @@ def test_both_branches_of_a_free_start():
         path=line,
         redundant_joints=["j1"],
     )
-    joint_paths = branch_lattice(decompositions_of(given)[0]).joint_paths(4)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(4)
     assert {joint_path.branch for joint_path in joint_paths} == {0, 1}
 
 
@@ -125,7 +125,7 @@ def test_a_free_start_that_no_torque_holds_says_so():
         path=line,
         redundant_joints=["j1"],
     )
-    end = branch_lattice(decompositions_of(given)[0]).joint_paths(1)
+    end = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
     assert "the torque limit of j1 cannot hold the arm against gravity" in end.cause
@@ -137,8 +137,7 @@ def test_acceleration_limits_alone_have_shortest_courses():
     given = problem(
         robot, start={"joints": [0.5, -2.0, 2.0]}, path=line, redundant_joints=["j1"]
     )
-    lattice = branch_lattice(decompositions_of(given)[0], only_minima=False)
-    joint_paths = lattice.joint_paths(3)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
     assert len(joint_paths) == 3
     assert joint_paths[0].length > 0.0
     steps = np.abs(np.diff(joint_paths[0].q[:, 0], n=2))
@@ -153,7 +152,7 @@ def test_small_circles_have_stations_enough(turns, joints):
     )
     assert len(stations(given.path, given.task_map)) > 24 * turns / 2
     (decomposition,) = decompositions_of(given)
-    assert not isinstance(branch_lattice(decomposition).joint_paths(1), DeadEnd)
+    assert not isinstance(ClosedFormLattice(decomposition).joint_paths(1), DeadEnd)
 
 
 def test_an_end_posture_without_redundancy_may_be_rounded():
@@ -165,7 +164,7 @@ def test_an_end_posture_without_redundancy_may_be_rounded():
     end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
     given = problem(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
     assert not isinstance(
-        branch_lattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd
+        ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd
     )
 
 
@@ -208,7 +207,7 @@ def test_a_free_start_is_in_the_turn_from_which_the_given_end_is_reached(turned)
     task |= back_from(end, robot, [0.0, 0.4, 0.0])
     found = 0
     for decomposition in decompositions_of(Problem.of(robot, brachis.load_task(task))):
-        joint_paths = branch_lattice(decomposition).joint_paths(2)
+        joint_paths = ClosedFormLattice(decomposition).joint_paths(2)
         assert not isinstance(joint_paths, DeadEnd)
         assert all(
             np.abs(joint_path.q[-1] - end).max() < 1e-9 for joint_path in joint_paths
@@ -248,7 +247,7 @@ def test_a_dead_end_back_from_the_end_says_so():
         end={"joints": end.tolist()},
         path=path,
     )
-    dead = branch_lattice(decompositions_of(given)[0]).joint_paths(1)
+    dead = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(dead, DeadEnd)
     assert dead.interval[0] == 0.0
     assert 0.0 < dead.interval[1] < 1.0

@@ -42,7 +42,7 @@ def rms(trajectory: Trajectory) -> np.ndarray:
 
 
 def free_roll() -> brachis.Task:
-    return task_with(brachis.examples.free_roll, effort="single", intervals=14)
+    return task_with(brachis.examples.free_roll, effort="single", intervals=16)
 
 
 def seven_joints() -> brachis.Task:
@@ -84,7 +84,7 @@ def result(request):
 def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
     fastest = result.candidate.trajectory
     assert max(reversals(fastest)) > 2, "the fastest motion has nothing to calm"
-    assert max(reversals(result.trajectory)) <= 0.5 * max(reversals(fastest))
+    assert max(reversals(result.trajectory)) <= 2
     assert result.verified
     assert result.t_end <= (1.0 + 1e-4) * fastest.t_end
     found = result.least_motion

@@ -23,10 +23,12 @@ from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import over_time, pipeline, portfolio, schedule
+from brachis.search import guesses, over_time, pipeline, portfolio, schedule
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.guesses import SEARCH_LEVELS
-from brachis.search.lattice import Lattice
+from brachis.search.joint_path import DeadEnd
+from brachis.search.posture_lattice import PostureLattice
 from brachis.search.stages import NOT_TRIED, RANKED, SLOW, Candidate, facts_of
 from brachis.task import load_task
 
@@ -217,6 +219,56 @@ def test_numeric_guesses_stay_an_option(robot):
     }
 
 
+class NoPosture:
+    """A lattice that ends halfway."""
+
+    def __init__(self, *_arguments: object, **_options: object) -> None:
+        pass
+
+    def joint_paths(self, _most: int) -> DeadEnd:
+        return DeadEnd(0.5, "nothing")
+
+
+def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(
+    robot, monkeypatch
+):
+    monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
+    result = brachis.plan(robot, task())
+    assert result.verified
+    assert {candidate.redundant_joints for candidate in result.candidates} == {
+        (),
+        ("j1",),
+        ("j2",),
+        ("j3",),
+    }
+    assert (
+        result.t_end <= 1.001 * brachis.plan(robot, task(redundant_joints=["j1"])).t_end
+    )
+    assert [
+        candidate.status for candidate in result.candidates if not candidate.branch
+    ] == ["from s = 0.5 on nothing"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
+)
+def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
+    robot, monkeypatch, asked, lattices
+):
+    monkeypatch.setattr(guesses, "ClosedFormLattice", NoPosture)
+    monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
+    result = brachis.plan(robot, task(**asked))
+    assert result.verified
+    assert result.candidates[0].origin.startswith("numeric")
+    assert (
+        sum(
+            candidate.status == "from s = 0.5 on nothing"
+            for candidate in result.candidates
+        )
+        == lattices
+    )
+
+
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
     honest, finished, calls = (
         pipeline.rank_candidate,
@@ -327,9 +379,9 @@ class Clock:
         """Jump at the end of the `at`-th call of a function, and of every later one; the calls are counted."""
         honest, calls = getattr(where, name), []
 
-        def counted(*arguments: Any, **options: Any) -> Any:
+        def counted(*arguments: Any) -> Any:
             calls.append(1)
-            made = honest(*arguments, **options)
+            made = honest(*arguments)
             self.now += by * (len(calls) >= at)
             return made
 
@@ -359,7 +411,7 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
     ("asked", "solved", "left"),
     [
         ({}, 1, "of 2 candidates 1 not tried"),
-        (BRANCH, 2, "of 7 candidates 5 not tried, 1 not finished"),
+        (BRANCH, 2, "of 5 candidates 3 not tried, 1 not finished"),
     ],
 )
 @pytest.mark.usefixtures("splines_are_too_fast")
@@ -381,7 +433,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
 
 
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, clock):
-    calls = clock.jump(Lattice, "_next", at=5)
+    calls = clock.jump(PostureLattice, "_next", at=5)
     message = r"within the time limit of 60 s: the lattice of all postures was not searched completely; .*\. Raise"
     with pytest.raises(PlanningError, match=message):
         brachis.plan(robot, task())
@@ -391,7 +443,7 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, c
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joints(
     robot, clock
 ):
-    clock.jump(Lattice, "_next", at=1)
+    clock.jump(PostureLattice, "_next", at=1)
     with pytest.raises(
         PlanningError,
         match="within the time limit of 60 s: the lattice of all postures",
@@ -425,7 +477,7 @@ def test_the_search_for_a_reason_ends_with_the_time(robot):
 def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
     robot, usual, clock
 ):
-    clock.jump(Lattice, "_first_layer", at=2)
+    clock.jump(PostureLattice, "_first_layer", at=2)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.verified
     assert result.interrupted
@@ -447,15 +499,15 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
 
 
 def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clock):
-    clock.jump(schedule, "lattice_guesses", at=1, by=13.0)
+    clock.jump(schedule, "lattice_guesses", at=1, by=30.0)
     result = brachis.plan(robot, task(**EVERY_CHOICE))
     assert result.verified
-    assert len({candidate.redundant_joints for candidate in result.candidates}) == 2
+    assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
     assert any(undone.startswith("the lattice of") for undone in result.not_completed)
 
 
 def test_a_lattice_ends_between_its_layers(robot, clock):
-    calls = clock.jump(Lattice, "_next", at=5)
+    calls = clock.jump(ClosedFormLattice, "_next", at=5)
     with pytest.raises(PlanningError, match="was not searched completely"):
         brachis.plan(robot, task(redundant_joints=["j1"]))
     assert len(calls) == 5
@@ -589,7 +641,7 @@ def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
 def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):
     tool = robot.tool_placement(START).translation
     post = brachis.Cylinder(0.1, 1.0, name="post", position=[tool[0] - 0.6, tool[1], 0])
-    calls = clock.jump(schedule, "lattice_guesses", at=1)
+    calls = clock.jump(schedule, "_guess_on_some_branches", at=1)
     with pytest.raises(PathError, match=r"post .*search\.time_limit") as refused:
         brachis.plan(
             robot,

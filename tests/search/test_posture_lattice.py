@@ -15,11 +15,11 @@ from brachis.common.deadline import Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_TIME, DeadEnd
-from brachis.search.lattice import Lattice
+from brachis.search.posture_lattice import PostureLattice
 from brachis.task import task_with
 from support.chains import planar_robot
-from support.lattices import branch_lattice
 from support.screw_arms import seven_joints
 from support.spatial import START as RAIL_START
 from support.spatial import rail_arm
@@ -58,7 +58,7 @@ def line(
 
 
 def lengthened(given: Problem, **options: Any) -> Any:
-    return Lattice(given, [], **options).joint_paths(4)
+    return PostureLattice(given, [], **options).joint_paths(4)
 
 
 CASES = {
@@ -152,7 +152,7 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
         problem(robot, start={"joints": start}, path=path, redundant_joints=["j3"])
     )
     for finer in (1, 3):
-        end = branch_lattice(
+        end = ClosedFormLattice(
             by_j3, cells_per_turn=72 * finer, density=float(finer)
         ).joint_paths(4)
         assert isinstance(end, DeadEnd)
@@ -171,7 +171,8 @@ def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_for
         path=[{"line": {"length": 1.0, "angle_deg": angle}}],
     )
     best = min(
-        branch_lattice(one).joint_paths(1)[0].length for one in decompositions_of(given)
+        ClosedFormLattice(one).joint_paths(1)[0].length
+        for one in decompositions_of(given)
     )
     assert lengthened(given)[0].length < 1.15 * best
 
@@ -195,16 +196,18 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
     expected = {
         component(joint_path.q[0])
         for one in decompositions
-        for joint_path in branch_lattice(one, cells_per_turn=36).joint_paths(6)
+        for joint_path in ClosedFormLattice(one, cells_per_turn=36).joint_paths(6)
     }
     assert expected == {-1, 1}
-    joint_paths = Lattice(
+    joint_paths = PostureLattice(
         given, decompositions if known else [], cells_per_turn=36
     ).joint_paths(6)
     for joint_path in joint_paths:
         assert len({component(q) for q in joint_path.q}) == 1
     assert {component(joint_path.q[0]) for joint_path in joint_paths} == expected
-    best = min(branch_lattice(one).joint_paths(1)[0].length for one in decompositions)
+    best = min(
+        ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions
+    )
     assert joint_paths[0].length < 1.15 * best
 
 
@@ -219,9 +222,10 @@ def test_a_free_start_of_seven_joints_is_as_good_as_the_best_branch():
         path=[{"line": {"by": [0.0, 0.15, 0.05]}}],
     )
     decompositions = [one for one in decompositions_of(given) if one.redundant == (2,)]
-    found = Lattice(given, decompositions, cells_per_turn=24).joint_paths(8)
+    found = PostureLattice(given, decompositions, cells_per_turn=24).joint_paths(8)
     best = [
-        branch_lattice(one, cells_per_turn=24).joint_paths(8) for one in decompositions
+        ClosedFormLattice(one, cells_per_turn=24).joint_paths(8)
+        for one in decompositions
     ]
     lengths = [
         joint_paths[0].length
@@ -293,14 +297,16 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     here = robot.tool_placement(start).translation[:2].tolist()
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
     given = problem(robot, start="free", path_start=here, path=turns)
-    joint_paths = Lattice(given, decompositions_of(given), density=0.2).joint_paths(4)
+    joint_paths = PostureLattice(
+        given, decompositions_of(given), density=0.2
+    ).joint_paths(4)
     assert all(
         -TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0]
     )
     assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
     turns[0]["circle"]["turns"] = 2.1 * way
     given = problem(robot, start="free", path_start=here, path=turns)
-    end = Lattice(given, decompositions_of(given), density=0.2).joint_paths(4)
+    end = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
     assert "the range of joint 'j1' ends" in end.cause
@@ -433,7 +439,7 @@ def test_a_given_end_is_reached_with_several_redundant_joints(start, end):
     tool = [robot.tool_placement(np.array(q)).translation[:2] for q in (start, end)]
     by = (tool[1] - tool[0]).tolist()
     given = line(robot, start, by, end={"joints": end})
-    joint_paths = Lattice(given, [], nodes=60).joint_paths(4)
+    joint_paths = PostureLattice(given, [], nodes=60).joint_paths(4)
     assert isinstance(joint_paths, list)
     assert joint_paths
     np.testing.assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)

@@ -13,7 +13,7 @@ from brachis.robot import Robot
 from brachis.search import guesses as module
 from brachis.search.guesses import (
     SEARCH_LEVELS,
-    lattice_guesses,
+    chart_guesses,
     random_joint_paths,
 )
 from brachis.task import load_task
@@ -88,7 +88,7 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
         end={"joints": end}, path=[{"line": {"by": (places[1] - places[0]).tolist()}}]
     )
     (level,) = SEARCH_LEVELS["fast"]
-    guesses = module.lattice_guesses(problem, decompositions_of(problem), level)
+    guesses = module.chart_guesses(problem, decompositions_of(problem), level)
     assert isinstance(guesses, list)
     assert any(guess.origin.startswith("random") for guess in guesses)
     for guess in guesses:
@@ -106,6 +106,6 @@ class LateLattice(Deadline):
 def test_they_are_tried_alone_where_the_lattice_has_no_time():
     level = SEARCH_LEVELS["fast"][0]
     problem = problem_of()
-    guesses = lattice_guesses(problem, [], level, LateLattice())
+    guesses = chart_guesses(problem, [], level, LateLattice())
     assert guesses
     assert all(guess.origin.startswith("random") for guess in guesses)

@@ -47,11 +47,13 @@ def guesses():
     robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
     problem = Problem.of(robot, task)
     (level,) = module.SEARCH_LEVELS["fast"]
-    many = dataclasses.replace(level, ranked=100, only_minima=False, cells_per_turn=24)
+    many = dataclasses.replace(
+        level, in_charts=100, only_minima=False, cells_per_turn=24
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "screen", lambda guesses, *_others: guesses)
         patch.setattr(module, "random_joint_paths", lambda *_arguments: [])
-        found = module.lattice_guesses(problem, decompositions_of(problem), many)
+        found = module.chart_guesses(problem, decompositions_of(problem), many)
     assert isinstance(found, list)
     assert len(found) > MOST
     return found[:12]
@@ -154,16 +156,15 @@ def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
     problem = Problem.of(robot_from_settings(task.robot), task)
     (decomposition,) = decompositions_of(problem)
     (level,) = module.SEARCH_LEVELS["fast"]
-    keeps = {"keeps_branch": True}
-    found = module.lattice_guesses(problem, [decomposition], level, **keeps)
+    found = module.lattice_guesses(decomposition, level)
     assert isinstance(found, list)
-    assert 1 < len(found) <= level.ranked
+    assert len(found) == level.joint_paths // 2
     assert all(guess.is_improved for guess in found)
     estimates = [guess.estimate for guess in found]
     assert estimates == sorted(estimates)
     # Those of the shortest joint paths alone.
-    few = dataclasses.replace(level, ranked=1)
-    (shortest,) = module.lattice_guesses(problem, [decomposition], few, **keeps)
+    few = dataclasses.replace(level, joint_paths=2)
+    (shortest,) = module.lattice_guesses(decomposition, few)
     assert shortest.is_improved
     assert estimates[0] <= shortest.estimate
 

@@ -46,7 +46,7 @@ PROGRAMS = {
     "obstacle": (
         lambda: brachis.transcribe(brachis.examples.round_the_post)[0],
         ["t_end", "s[3]"],
-        "joint_1[20]",
+        "joint_3[20]",
     ),
     "stop": (
         line_with_a_stop,

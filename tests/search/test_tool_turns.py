@@ -9,11 +9,10 @@ import brachis
 from brachis.errors import PathError
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_for
-from brachis.search.joint_path import NO_ANSWER, DeadEnd
-from brachis.search.lattice import Lattice
-from brachis.search.postures import reaches
+from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.joint_path import NO_ANSWER, DeadEnd, reaches
+from brachis.search.posture_lattice import PostureLattice
 from brachis.search.stations import spread_stations, stations
-from support.lattices import branch_lattice
 
 TURNS = [
     ("tx90l_rail", [0.6, -0.2, 0.5], [180, 0, 0], [0, 0.4, 0], [0, 0, 1], 120.0, 0.01),
@@ -80,9 +79,9 @@ def test_stations_of_a_line_are_even():
 def test_lattices_follow_quick_turns(case):
     given = problem(case)
     (first, *_) = decompositions_of(given)
-    lattices = [branch_lattice(first)]
+    lattices = [ClosedFormLattice(first)]
     if case is TURNS[0]:
-        lattices.append(Lattice(given, [first]))
+        lattices.append(PostureLattice(given, [first]))
     for lattice in lattices:
         found = lattice.joint_paths(1)
         assert not isinstance(found, DeadEnd), str(found)
@@ -99,7 +98,7 @@ def test_a_quick_turn_is_planned():
 def test_a_lattice_that_is_too_coarse_does_not_say_out_of_reach():
     given = problem(TURNS[1])
     (first, *_) = decompositions_of(given)
-    found = Lattice(given, [first], density=0.02).joint_paths(1)
+    found = PostureLattice(given, [first], density=0.02).joint_paths(1)
     assert isinstance(found, DeadEnd)
     assert found.cause != NO_ANSWER
     assert reaches(given, found.s)
@@ -111,7 +110,7 @@ def test_out_of_reach_is_out_of_reach():
     assert reaches(given, 0.0)
     assert not reaches(given, 1.0)
     (first, *_) = decompositions_of(given)
-    found = branch_lattice(first).joint_paths(1)
+    found = ClosedFormLattice(first).joint_paths(1)
     assert isinstance(found, DeadEnd)
     assert found.cause == NO_ANSWER
     with pytest.raises(PathError, match="out of reach"):

@@ -15,7 +15,6 @@ from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.mesh import FEW_INTERVALS
 from brachis.optimise.path_program import (
     PathPhase,
     PathProgram,
@@ -37,8 +36,10 @@ _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
-ROUGH_MARGIN = 0.02
+_ROUGH_MARGIN = 0.02
 """Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
+_FEWEST = 12
+"""Intervals of a phase over which a search over time begins, no fewer if its timing needs as many."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ COARSE = PathEffort(
     places=200,
     is_rough_before=True,
     is_rough_after=True,
-    margin=ROUGH_MARGIN,
+    margin=_ROUGH_MARGIN,
     options=SolverOptions(
         tolerance=1e-3,
         max_iterations=25,
@@ -93,7 +94,7 @@ ROUGH = PathEffort(
     intervals=(16,),
     places=800,
     is_rough_before=True,
-    margin=ROUGH_MARGIN,
+    margin=_ROUGH_MARGIN,
     options=SolverOptions(
         tolerance=3e-4,
         max_iterations=40,
@@ -175,17 +176,18 @@ def begin_with_timing(
         Slowed down until the limits hold at the collocation points; None where the limits allow no timing.
     """
     total = least_time(timings)
+    if not np.isfinite(total):
+        return None
     phases = []
     parts = []
     for phase, phase_timing in zip(program.phases, timings, strict=True):
-        if phase_timing is None or phase_timing.timing is None:
+        assert phase_timing is not None
+        share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
+        begun = begin(phase, phase_timing, lost, share, points)
+        if begun is None:
             return None
-        share = max(FEW_INTERVALS, int(intervals * phase_timing.t_end / total))
-        begun, x_of_phase = begin(
-            phase, phase_timing, phase_timing.timing, lost, share, points
-        )
-        phases.append(begun)
-        parts.append(x_of_phase)
+        phases.append(begun[0])
+        parts.append(begun[1])
     first = program.with_phases(phases)
     try:
         return first, shortest_time(first, np.concatenate(parts))

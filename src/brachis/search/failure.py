@@ -21,13 +21,15 @@ from brachis.problem.plausibility import of_places, say_how_far
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
+from brachis.search.closed_form_lattice import solve_all
 from brachis.search.hopeless import speeds_of
 from brachis.search.joint_path import (
     ALL_POSTURES,
     DeadEnd,
     least_excess,
+    reaches,
+    sampling_box,
 )
-from brachis.search.postures import reaches, sampling_box, solve_all
 from brachis.search.stages import Candidate
 from brachis.task import SolverSettings, Task
 

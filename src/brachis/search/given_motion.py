@@ -7,7 +7,7 @@ the time law. So limits, splines, coordinates and the path may be others than wh
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -171,9 +171,18 @@ def widen_plan(planned: Planned, problem: Problem) -> Planned:
         wider[..., columns] = values
         return wider
 
+    rows = motion.chart_rows
+    if rows.size:
+        rows = np.concatenate([widen(rows[..., :-1]), rows[..., -1:]], axis=-1)
     motion = replace(
-        _with_joints(motion, problem.task, robot, widen),
+        motion,
+        task=problem.task,
+        robot=robot,
         q=_positions(problem, motion, motion.times),
+        qdot=widen(motion.qdot),
+        qddot=widen(motion.qddot),
+        qddot_before=widen(motion.qddot_before),
+        chart_rows=rows,
     )
     verification = verify_trajectory(motion, own_limits=problem.user_limits)
     return replace(planned, trajectory=motion, verification=verification)
@@ -199,30 +208,20 @@ def narrow_motion(motion: Trajectory) -> Trajectory:
         return motion
     robot, _ = bind(robot, task.task_space, task.tolerances)
     columns = [wider.joint_names.index(name) for name in robot.joint_names]
-    narrower = _with_joints(motion, task, robot, lambda values: values[..., columns])
-    return narrow_motion(narrower)
-
-
-def _with_joints(
-    motion: Trajectory,
-    task: Task,
-    robot: Robot,
-    convert: Callable[[np.ndarray], np.ndarray],
-) -> Trajectory:
-    """Return a motion with the joints of another robot; `convert` turns values of all joints, (..., n), into theirs."""
     rows = motion.chart_rows
     if rows.size:
-        rows = np.concatenate([convert(rows[..., :-1]), rows[..., -1:]], axis=-1)
-    return replace(
+        rows = rows[..., [*columns, wider.n]]
+    narrower = replace(
         motion,
         task=task,
         robot=robot,
-        q=convert(motion.q),
-        qdot=convert(motion.qdot),
-        qddot=convert(motion.qddot),
-        qddot_before=convert(motion.qddot_before),
+        q=motion.q[:, columns],
+        qdot=motion.qdot[:, columns],
+        qddot=motion.qddot[:, columns],
+        qddot_before=motion.qddot_before[:, columns],
         chart_rows=rows,
     )
+    return narrow_motion(narrower)
 
 
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:

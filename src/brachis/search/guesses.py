@@ -20,9 +20,9 @@ from brachis.errors import PathError, UnreachableError
 from brachis.kernel import Spline, collocation
 from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
 from brachis.limits import Role
-from brachis.optimise.retiming import ROUGH_MARGIN
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.differential_ik import differential_ik_paths
 from brachis.search.holding import explain_beyond
 from brachis.search.hopeless import refuse_hopeless
@@ -31,12 +31,12 @@ from brachis.search.joint_path import (
     NO_TIME,
     DeadEnd,
     JointPath,
+    sampling_box,
 )
-from brachis.search.lattice import Lattice
+from brachis.search.lattice import LARGEST_STEP
 from brachis.search.phase_plane import fastest_times, least_time
-from brachis.search.postures import sampling_box
+from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screen
-from brachis.search.self_motion import LARGEST_STEP
 from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
 
@@ -53,22 +53,30 @@ class SearchLevel:
     Attributes
     ----------
     decompositions : int
-        Decompositions whose guesses are ranked; those farthest from singularity at the start come first.
-    ranked : int
-        Guesses in charts that are ranked, or of each decomposition. In charts four times as many joint paths are looked
-        at, on branches as many for each of a free start.
+        Decompositions that are looked at; those farthest from singularity at the start come first.
+    joint_paths : int
+        Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
+    numeric : int
+        Joint paths by numeric inverse kinematics as well, if the start posture is given.
+    in_charts : int
+        Guesses in charts that are ranked; four times as many joint paths are looked at.
+    in_closed_forms : int
+        Guesses in closed forms that are ranked; those with the least estimated time come first.
     refined : int
         Candidates that are refined and verified, no more, as long as they may beat the best one.
     cells_per_turn, nodes : int
         Of the lattice.
     only_minima : bool
-        Whether only joint paths of locally least length are taken.
+        Whether of the lattice of all postures only joint paths of locally least length are taken.
     fallback : bool
         Whether it is gone through only while no motion is verified.
     """
 
     decompositions: int
-    ranked: int
+    joint_paths: int
+    numeric: int
+    in_charts: int
+    in_closed_forms: int
     refined: int
     cells_per_turn: int = 72
     nodes: int = 120
@@ -78,7 +86,9 @@ class SearchLevel:
 
 _LATTICE_SHARE = 0.5
 """Part of the time left after which the lattice is given up, and only random joint paths are tried."""
-_STATIONS = 97
+_RANDOM = 4
+"""Random joint paths for each one that a level plans."""
+_RANDOM_STATIONS = 97
 """Stations along a random joint path, about: in 14 tasks 81 % of the drawn postures arrive, as with 385; 78 with 13."""
 _DRAWN = 8
 """Postures drawn for each random joint path: 81 % arrive in the mean of 14 tasks, 14 % in the worst one."""
@@ -88,15 +98,17 @@ _DRIFT = 2.0
 The best of 16 joint paths is 0.5 % slower than with the best drift of 1, 2, 4 and 8, in the mean of 14 tasks; with the
 other drifts 0.8 to 1.1 %, although larger ones lead to more distinct joint paths.
 """
+_LOOKED_AT = 4
+"""Joint paths that are looked at for each one that is chosen, if several joints are redundant."""
 _NEARLY = 0.2
 """Violation of a limit at rest with which a joint path still is a guess."""
-_SINGLE = SearchLevel(1, 1, refined=1)
-_FAST = SearchLevel(6, 4, refined=4)
+_SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
+_FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
 _THOROUGH = SearchLevel(
-    20, 8, refined=12, cells_per_turn=96, nodes=300, only_minima=False
+    20, 8, 8, 8, 100, 12, cells_per_turn=96, nodes=300, only_minima=False
 )
 _EXHAUSTIVE = SearchLevel(
-    10_000, 12, refined=40, cells_per_turn=144, nodes=600, only_minima=False
+    10_000, 30, 8, 12, 10_000, 40, cells_per_turn=144, nodes=600, only_minima=False
 )
 
 SEARCH_LEVELS = {
@@ -109,118 +121,63 @@ SEARCH_LEVELS = {
 
 
 def lattice_guesses(
-    problem: Problem,
-    decompositions: Sequence[Decomposition],
+    decomposition: Decomposition,
     level: SearchLevel,
     deadline: Deadline = NEVER,
     listener: Listener = ignore,
-    *,
-    keeps_branch: bool = False,
 ) -> list[InitialGuess] | DeadEnd:
-    """Take the shortest distinct joint paths from a lattice, and choose the most promising guesses among them.
+    """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
+
+    If several joints are redundant, more joint paths are looked at, and the most promising ones are chosen.
 
     Parameters
     ----------
-    problem : Problem
-    decompositions : sequence of Decomposition
-        Their closed forms give postures to begin with if neither end is given.
+    decomposition : Decomposition
     level : SearchLevel
     deadline : Deadline, optional
     listener : callable, optional
-    keeps_branch : bool, optional
-        Whether joint paths stay on a branch of the only decomposition; otherwise each gets a chart around it.
 
     Returns
     -------
     list of InitialGuess or DeadEnd
-        Those with the least estimated times first.
-
-    Raises
-    ------
-    PlanningError
-        No motion along any joint path can hold a speed, or a mean of a load.
     """
-    named = _name_joint_paths(problem, decompositions, level, deadline, keeps_branch)
-    if isinstance(named, DeadEnd):
-        return named
-    guesses: list[InitialGuess] = []
-    for origin, joint_path in named:
-        if guesses and deadline.passed:
-            break
-        guess = (
-            _guess_on_branch(decompositions[0], joint_path, origin)
-            if keeps_branch
-            else guess_in_chart(joint_path, origin)
-        )
-        if guess is not None:
-            guesses.append(guess)
-    if not guesses:
-        return DeadEnd(0.0, NO_TIME if deadline.passed else NO_CHART)
-    guesses.sort(key=lambda guess: guess.estimate)
-    refuse_hopeless(guesses)
-    # Joint paths whose estimated time is three times the least one are hopeless.
-    longest = 3.0 * guesses[0].estimate
-    hopeful = [guess for guess in guesses if guess.estimate <= longest]
-    return screen(hopeful, level.ranked, deadline, listener)
+    r = len(decomposition.redundant)
+    per_branch = max(1, level.joint_paths // max(1, r))
+    looked_at = _LOOKED_AT * per_branch if r > 1 and per_branch > 1 else per_branch
+    guesses = _take_guesses(decomposition, level, looked_at, deadline)
+    count = per_branch * len(decomposition.branches)
+    if isinstance(guesses, DeadEnd):
+        return guesses
+    return screen(guesses, count, deadline, listener)
 
 
-def _name_joint_paths(
-    problem: Problem,
-    decompositions: Sequence[Decomposition],
-    level: SearchLevel,
-    deadline: Deadline,
-    keeps_branch: bool,
-) -> list[tuple[str, JointPath]] | DeadEnd:
-    """Take joint paths from a lattice, and random ones, each with the name of its origin; see `lattice_guesses`."""
-    looked_at = SCREENED * level.ranked
-    if keeps_branch:
-        looked_at = level.ranked * len(decompositions[0].branches)
-    is_random_possible = bool(problem.r) and not keeps_branch
-    until = deadline.part(_LATTICE_SHARE) if is_random_possible else deadline
-    for finer in (1, 2):
-        lattice = Lattice(
-            problem,
-            decompositions,
-            keeps_branch=keeps_branch,
+def _take_guesses(
+    decomposition: Decomposition, level: SearchLevel, count: int, deadline: Deadline
+) -> list[InitialGuess] | DeadEnd:
+    """Take guesses from up to `count` joint paths for every branch from a decomposition's lattice."""
+    for finer, density in ((1, 1.0), (3, 2.0)):
+        lattice = ClosedFormLattice(
+            decomposition,
             cells_per_turn=finer * level.cells_per_turn,
-            density=float(finer),
-            nodes=finer * level.nodes // 2,
-            only_minima=level.only_minima and not keeps_branch,
-            deadline=until,
+            density=density,
+            nodes=finer * level.nodes,
+            deadline=deadline,
         )
-        joint_paths = lattice.joint_paths(looked_at)
-        is_late = isinstance(joint_paths, DeadEnd) and joint_paths.cause == NO_TIME
-        if is_late or not isinstance(joint_paths, DeadEnd):
-            break
-    if isinstance(joint_paths, DeadEnd):
-        if not (is_late and is_random_possible):
-            return joint_paths
-        joint_paths = []
-    named = [
-        (
-            f"lattice {number}"
-            + (f", from {joint_path.seed}" if joint_path.seed else ""),
-            joint_path,
-        )
-        for number, joint_path in enumerate(joint_paths, 1)
-    ]
-    # Backwards from a given end the lattice of one redundant joint has a single joint path.
-    is_backwards = problem.start is None and problem.end is not None
-    is_sampled = (problem.r > 1 or is_backwards) and level.ranked > 1
-    if is_random_possible and (is_late or is_sampled):
-        drawn = random_joint_paths(problem, SCREENED * level.ranked, deadline)
-        named += [
-            (f"random {number}", joint_path)
-            for number, joint_path in enumerate(drawn, 1)
-        ]
-    return named
+        joint_paths = lattice.joint_paths(count * len(decomposition.branches))
+        if not isinstance(joint_paths, DeadEnd):
+            return [
+                _guess_on_branch(decomposition, joint_path, f"lattice {number}")
+                for number, joint_path in enumerate(joint_paths, 1)
+            ]
+        dead_end = joint_paths
+    return dead_end
 
 
 def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; at last linear interpolation."""
     s = joint_path.s
     # More finely than at the lattice's stations.
-    fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, _STATIONS))
+    fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
     weights = np.ones((len(s), 1))
     weights[[0, -1]] = 1e3  # nearly exact at both ends
     for pieces in (3, 8):
@@ -242,7 +199,7 @@ def _guess_on_branch(
         if np.isfinite(q).all():
             # It keeps clear of the branch boundary, if the start posture does.
             margins = joint_map.branch_margins(q)
-            least = min(ROUGH_MARGIN, margins[0].min(initial=np.inf))
+            least = min(0.02, margins[0].min(initial=np.inf))
             if margins.min(initial=np.inf) > 0.5 * least:
                 break
     else:
@@ -292,6 +249,87 @@ def numeric_guesses(
     return guesses
 
 
+def chart_guesses(
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    level: SearchLevel,
+    deadline: Deadline = NEVER,
+    listener: Listener = ignore,
+) -> list[InitialGuess] | DeadEnd:
+    """Take the shortest distinct joint paths from the lattice of all postures, each with a chart around it.
+
+    Parameters
+    ----------
+    problem : Problem
+    decompositions : sequence of Decomposition
+        Their closed forms give postures to begin with if neither end is given.
+    level : SearchLevel
+    deadline : Deadline, optional
+    listener : callable, optional
+
+    Returns
+    -------
+    list of InitialGuess or DeadEnd
+        Those with the least estimated times first.
+
+    Raises
+    ------
+    PlanningError
+        No motion along any joint path can hold a speed, or a mean of a load.
+    """
+    for finer in (1, 2):
+        lattice = PostureLattice(
+            problem,
+            decompositions,
+            cells_per_turn=finer * level.cells_per_turn,
+            density=float(finer),
+            nodes=finer * level.nodes // 2,
+            only_minima=level.only_minima,
+            deadline=deadline.part(_LATTICE_SHARE),
+        )
+        joint_paths = lattice.joint_paths(SCREENED * level.in_charts)
+        is_late = isinstance(joint_paths, DeadEnd) and joint_paths.cause == NO_TIME
+        if is_late or not isinstance(joint_paths, DeadEnd):
+            break
+    if isinstance(joint_paths, DeadEnd):
+        if not (is_late and problem.r):
+            return joint_paths
+        joint_paths = []
+    named = [
+        (
+            f"lattice {number}"
+            + (f", from {joint_path.seed}" if joint_path.seed else ""),
+            joint_path,
+        )
+        for number, joint_path in enumerate(joint_paths, 1)
+    ]
+    # Backwards from a given end the lattice of one redundant joint has a single joint path.
+    is_backwards = problem.start is None and problem.end is not None
+    is_sampled = problem.r > 1 or is_backwards
+    if is_late or (is_sampled and level.in_charts > 1):
+        drawn = random_joint_paths(problem, _RANDOM * level.in_charts, deadline)
+        named += [
+            (f"random {number}", joint_path)
+            for number, joint_path in enumerate(drawn, 1)
+        ]
+    newton = Newton(problem.task_map)
+    guesses: list[InitialGuess] = []
+    for origin, joint_path in named:
+        if guesses and deadline.passed:
+            break
+        guess = guess_in_chart(newton, joint_path, origin)
+        if guess is not None:
+            guesses.append(guess)
+    if not guesses:
+        return DeadEnd(0.0, NO_TIME if deadline.passed else NO_CHART)
+    guesses.sort(key=lambda guess: guess.estimate)
+    refuse_hopeless(guesses)
+    # Joint paths whose estimated time is three times the least one are hopeless.
+    longest = 3.0 * guesses[0].estimate
+    hopeful = [guess for guess in guesses if guess.estimate <= longest]
+    return screen(hopeful, level.in_charts, deadline, listener)
+
+
 def random_joint_paths(
     problem: Problem, count: int, deadline: Deadline = NEVER
 ) -> list[JointPath]:
@@ -313,7 +351,7 @@ def random_joint_paths(
     rng = np.random.default_rng(problem.task.search.seed)
     newton = Newton(problem.task_map)
     limits = problem.robot.limits
-    s = spread_stations(problem, _STATIONS)
+    s = spread_stations(problem, _RANDOM_STATIONS)
     is_backwards = problem.start is None and problem.end is not None
     step = -1 if is_backwards else 1
     ends = [problem.start, problem.end][::step]
@@ -350,10 +388,11 @@ def random_joint_paths(
     return list(itertools.islice(allowed, count))
 
 
-def guess_in_chart(joint_path: JointPath, origin: str) -> InitialGuess | None:
+def guess_in_chart(
+    newton: Newton, joint_path: JointPath, origin: str
+) -> InitialGuess | None:
     """Smooth a joint path, lay a chart around it, and estimate its time; None if no chart can follow it."""
     problem = joint_path.problem
-    newton = Newton(problem.task_map)
     for s, smoothed in _smooth(joint_path):
         try:
             q = bring_onto_path(problem, newton, s, smoothed)
@@ -446,9 +485,9 @@ def first_guess(
         return joint_space_guess(problem)
     level = SEARCH_LEVELS["fast"][0]
     if not decompositions:
-        guesses = lattice_guesses(problem, decompositions, level)
+        guesses = chart_guesses(problem, decompositions, level)
     for decomposition in decompositions:
-        guesses = lattice_guesses(problem, [decomposition], level, keeps_branch=True)
+        guesses = _take_guesses(decomposition, level, 1, NEVER)
         if not isinstance(guesses, DeadEnd):
             break
     if isinstance(guesses, DeadEnd):

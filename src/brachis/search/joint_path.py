@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.kinematics import Newton
 from brachis.limits import Limit, Moments
 from brachis.limits.joint import reciprocals_near
 from brachis.problem.feasibility import in_figures
@@ -20,6 +21,8 @@ OTHER_BRANCH = "the branch ends"
 NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
 NO_TIME = "the time was up"
+_TRIES = 1000
+"""Random postures from which Newton's method begins, before a place counts as out of reach."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,35 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
     """
     by_acceleration, by_velocity = reciprocals_near(robot, limits, q)
     return by_acceleration if by_acceleration.any() else by_velocity
+
+
+def sampling_box(
+    robot: Robot, near: np.ndarray | float = 0.0, opened: Sequence[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Box, (n,) and (n,), from which postures are drawn: the ranges, or a turn, or 10 m around a posture `near`.
+
+    `opened` joints are taken as if they had no range.
+    """
+    limits = robot.limits
+    is_open = np.isin(np.arange(robot.n), opened)
+    lower = np.where(is_open, -np.inf, limits.position_lower)
+    upper = np.where(is_open, np.inf, limits.position_upper)
+    reach = np.where(robot.revolute, np.pi, 10.0)
+    slides = np.clip(near, limits.position_lower, limits.position_upper)
+    middle = np.where(robot.revolute, 0.0, slides)
+    highest = np.where(np.isfinite(upper), upper, middle + reach)
+    low = np.where(np.isfinite(lower), lower, highest - 2.0 * reach)
+    high = np.where(np.isfinite(upper), upper, low + 2.0 * reach)
+    return low, high
+
+
+def reaches(problem: Problem, s: float) -> bool:
+    """Tell whether Newton's method finds a posture at a path coordinate from any of many random ones."""
+    low, high = sampling_box(problem.robot)
+    drawn = np.random.default_rng(0).uniform(low, high, (_TRIES, problem.robot.n))
+    targets = np.repeat(problem.path.sample([s]).target, _TRIES, axis=0)
+    postures = Newton(problem.task_map).nearest(targets, drawn)
+    return bool(np.isfinite(postures).all(axis=1).any())
 
 
 def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:

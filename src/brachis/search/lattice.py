@@ -5,14 +5,8 @@ The path is cut into stations. Layer by layer from the given start, the nodes of
 that are within the joint ranges, near, and allowed at rest (the torque limits hold the
 arm against gravity). Of all edges into a node the one with the least total length stays.
 If the end posture is given and the start is not, the layers run backwards from the
-end. Nodes are all postures that a continuous motion reaches (see `self_motion`), whatever
-branch or choice of joints they are of; or, where the task names its redundant joints or
-its branch, those on a branch of that closed form, and clear of its boundary.
-
-If neither end is given, the first layer comes from all closed forms there are, which see
-the whole self-motion manifold, or, for arms without one, from random postures. Of several
-redundant joints a layer keeps a bounded number of nodes, half of them the nearest and half
-far apart.
+end. `ClosedFormLattice` takes its nodes from the closed form of one choice of redundant
+joints, `PostureLattice` from Newton's method.
 
 Turns of angles by 2 pi follow the joint path. From a given posture, nodes in different
 turns are different nodes. If neither end is given, all turns of a joint path are
@@ -28,16 +22,17 @@ straight one is 2 sqrt(length).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import TypedDict
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kernel import largest_parts
 from brachis.limits import HasLatticeWeights
-from brachis.optimise.retiming import ROUGH_MARGIN
-from brachis.problem.problem import Decomposition, Problem
+from brachis.problem.problem import Problem
 from brachis.robot.joints import TURN
 from brachis.search.joint_path import (
     JUMPS,
@@ -49,12 +44,13 @@ from brachis.search.joint_path import (
     distinct,
     least_excess,
     leaving_range,
+    reaches,
     weights_near,
 )
-from brachis.search.postures import reaches, sampling_box, solve_all, spread_redundant
-from brachis.search.self_motion import LARGEST_STEP, SAME, SelfMotion, shortest
 from brachis.search.stations import stations
 
+LARGEST_STEP = 0.8
+"""Largest step of a joint between stations, rad or m."""
 _HOMEWARD = 0.6
 """Part of the largest step that joints may need at every station before a given end."""
 _LOOKS = 9
@@ -63,10 +59,6 @@ _OTHER_WAYS = 3
 """Ways to a node, after the shortest one, that are tried where something is in the way."""
 _SLACK = 1e-9
 """Rounding of joint positions, rad or m, and of ratios to limits."""
-_LONGER = 1.5
-"""Factor on the least length to a posture above which a joint path to it comes a long way round."""
-_ALWAYS = 1e-3
-"""Length, s^2, up to which no way counts as long."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +68,7 @@ class Layer:
     Attributes
     ----------
     branch : (K,) int ndarray
-        What joint paths keep: index into the closed form's branches, or which postures they began with.
+        What joint paths keep: index into the closed form's branches, or where they began.
     q : (K, n) ndarray
         Postures, rad or m, continuous along the joint paths there.
     low, high : (K, n) ndarray
@@ -114,18 +106,55 @@ def farthest(points: np.ndarray, references: np.ndarray, count: int) -> list[int
     return chosen
 
 
-class Lattice:
+def shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """Return where each different row of `keys`, (E, k), has its least `length`, (E,)."""
+    order = np.lexsort((length, *keys.T[::-1]))
+    rows = keys[order]
+    return order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))]
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Pairs of a node and a posture at the next station.
+
+    Attributes
+    ----------
+    parent : (E,) int ndarray
+        Node in the layer before.
+    step : (E, n) ndarray
+        From the node to the posture, NaN for one that does not exist.
+    key : (E, k) int ndarray
+        Equal for edges to the same node.
+    elsewhere : (E,) bool ndarray, optional
+        Whether there is a posture on any branch; by default there is.
+    allowed : (E,) bool ndarray, optional
+        Whether the step is one that a motion may make; by default it is.
+    """
+
+    parent: np.ndarray
+    step: np.ndarray
+    key: np.ndarray
+    elsewhere: np.ndarray | bool = True
+    allowed: np.ndarray | bool = True
+
+
+class Options(TypedDict, total=False):
+    """Options of a lattice, as of `Lattice`."""
+
+    cells_per_turn: int
+    density: float
+    nodes: int
+    deadline: Deadline
+
+
+class Lattice(ABC):
     """Lattice of postures along a path.
 
     Parameters
     ----------
     problem : Problem
-    decompositions : sequence of Decomposition
-        Their closed forms give the first layer if neither end is given.
-    keeps_branch : bool, optional
-        Whether joint paths stay on a branch of the only decomposition.
-    only_minima : bool, optional
-        Whether of one redundant joint only joint paths of locally least length are taken.
+    turning : (n,) bool ndarray
+        Joints whose turn is open if neither end is given.
     cells_per_turn : int, optional
         Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
     density : float, optional
@@ -139,10 +168,8 @@ class Lattice:
     def __init__(
         self,
         problem: Problem,
-        decompositions: Sequence[Decomposition],
+        turning: np.ndarray,
         *,
-        keeps_branch: bool = False,
-        only_minima: bool = True,
         cells_per_turn: int = 72,
         density: float = 1.0,
         nodes: int = 120,
@@ -151,9 +178,6 @@ class Lattice:
         self.problem = problem
         self.s = stations(problem.path, problem.task_map, density)
         self._robot = problem.robot
-        self._decompositions = decompositions
-        self._keeps_branch = keeps_branch
-        self._only_minima = only_minima
         self._cells_per_turn = cells_per_turn
         self._nodes = nodes
         self._deadline = deadline
@@ -165,29 +189,35 @@ class Lattice:
         self._upper = limits.position_upper + _SLACK
         # With a free start all turns are equivalent, and stay open until the joint path is known; a joint without a
         # range needs no turn, unless a given end has to be met.
-        turning = problem.robot.revolute
         self._open_turns = turning & (self._origin is None)
         self._to_end = problem.end is not None and not self._backwards
         ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | self._to_end
-        counts_turns = turning & ranged & ~self._open_turns
-        self._self_motion = SelfMotion(
-            problem,
-            self._targets,
-            problem.end if self._to_end else None,
-            turning & ~counts_turns,
-            cells_per_turn,
-            keeps_branch=keeps_branch,
-        )
-        # Distance within which nodes are neighbours on the self-motion manifold.
-        self._around = 3.0 * self._self_motion.size.max()
-        # Postures at a free start, (K, n), that each of the decompositions gave; or random ones.
-        self._seeds: list[np.ndarray] = []
-        # Branch margin that nodes on a branch keep.
-        self._clear = ROUGH_MARGIN
-        if keeps_branch:
-            (self._decomposition,) = decompositions
-            if self._origin is not None:
-                self._clear = min(ROUGH_MARGIN, 0.5 * self._decomposition.clearance)
+        self._counts_turns = turning & ranged & ~self._open_turns
+
+    _given_branch: int = 0
+    """Branch of the given start or end posture."""
+    _modulo: np.ndarray
+    """Joints, (n,) bool, whose steps are taken modulo 2 pi."""
+
+    @abstractmethod
+    def _start_nodes(self, rng: np.random.Generator) -> Layer:
+        """Make nodes at a free start, whatever the joint ranges are."""
+
+    @abstractmethod
+    def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
+        """List edges from the nodes of a layer to postures at the next station."""
+
+    @abstractmethod
+    def _thin(self, layer: Layer) -> Layer:
+        """Keep no more nodes than a layer may have."""
+
+    def _choose_start_nodes(self, layer: Layer) -> Layer:
+        """Choose among the nodes of a free start."""
+        return self._thin(layer)
+
+    @abstractmethod
+    def _at_end(self, last: Layer) -> np.ndarray:
+        """Tell which nodes of the last layer, (K,) bool, meet the given end posture."""
 
     def joint_paths(self, count: int) -> list[JointPath] | DeadEnd:
         """Find joint paths along the path.
@@ -244,8 +274,8 @@ class Lattice:
     def _first_layer(self, rng: np.random.Generator) -> Layer | str:
         """Make the nodes with which joint paths begin, or tell what refuses them."""
         if self._origin is not None:
-            branch = self._decomposition.branches[0] if self._keeps_branch else 0
-            return Layer.start(self._origin[None].astype(float), np.array([branch]))
+            branch = np.array([self._given_branch])
+            return Layer.start(self._origin[None].astype(float), branch)
         layer = self._start_nodes(rng)
         if not len(layer.q):
             return NO_ANSWER
@@ -259,27 +289,31 @@ class Lattice:
         self, before: Layer, station: int, rng: np.random.Generator
     ) -> Layer | str:
         """Join the nodes of a layer to the next station, or tell why none can be."""
-        edges = self._self_motion.edges(before.q, station, rng)
+        edges = self._edges(before, station, rng)
         parent = edges.parent
         q = before.q[parent] + edges.step
         low = np.minimum(before.low[parent], q)
         high = np.maximum(before.high[parent], q)
-        inside = self._inside(low, high)
-        good = edges.allowed & inside.all(axis=1)
+        exists = np.isfinite(q).all(axis=1)
+        with np.errstate(invalid="ignore"):
+            inside = self._inside(low, high)
+            near = edges.allowed & np.all(np.abs(edges.step) <= LARGEST_STEP, axis=1)
+        good = exists & inside.all(axis=1) & near
         if not good.any():
             # The cause of those that came nearest to being possible.
-            if edges.allowed.any():
-                return leaving_range(self._robot, inside[edges.allowed])
-            return JUMPS if len(q) else NO_ANSWER
+            if (exists & near).any():
+                return leaving_range(self._robot, inside[exists & near])
+            if (edges.elsewhere & ~exists).any():
+                return OTHER_BRANCH
+            return JUMPS if exists.any() else NO_ANSWER
         parent = parent[good]
         steps = self._lengths(before.q, edges.step[good], parent)
         length = before.length[parent] + steps
         branch = before.branch[parent]
         layer = Layer(branch, q[good], low[good], high[good], length, parent)
-        keys = np.column_stack([branch, edges.key[good]])
-        chosen = self._shortest_free(before, layer, keys)
+        chosen = self._shortest_free(before, layer, edges.key[good])
         if not len(chosen):
-            blocked = shortest(length, keys)
+            blocked = shortest(length, edges.key[good])
             ends = before.q[parent[blocked]], layer.q[blocked]
             return self._blame(np.linspace(*ends, _LOOKS, axis=1)) or JUMPS
         return self._keep(self._in_reach(layer[chosen], station), self._thin)
@@ -324,26 +358,12 @@ class Lattice:
         return free
 
     def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
-        """Choose among the nodes in which the arm may rest, on their branches, or tell what refuses them."""
-        if self._keeps_branch:
-            layer = layer[self._are_clear(layer)]
-            if not len(layer.q):
-                return OTHER_BRANCH
+        """Choose among the nodes in which the arm may rest, or tell what refuses them."""
         held = np.ones(len(layer.q), dtype=bool)
         for limit in self.problem.limits:
             if limit.at_rest == "posture":
                 held &= limit.holds_at_rest(layer.q, _SLACK)
         return choose(layer[held]) if held.any() else self._blame(layer.q[:, None])
-
-    def _are_clear(self, layer: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are on their branch and clear of its boundary."""
-        solver = self._decomposition.match.solver
-        margins = np.empty(len(layer.q))
-        for branch in np.unique(layer.branch):
-            on_branch = layer.branch == branch
-            values = solver.branch_margins(layer.q[on_branch], int(branch))
-            margins[on_branch] = values.min(axis=1, initial=np.inf)
-        return margins >= self._clear
 
     def _blame(self, q: np.ndarray) -> str:
         """Say which limit is exceeded most in the best posture, or on the best way, (K, L, n), and by how much."""
@@ -379,110 +399,16 @@ class Lattice:
         far = half + np.unique(farthest(scaled[half:], scaled[:half], count - half))
         return np.sort(np.concatenate([order[:half], order[far]]))
 
+    def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Return the steps, (E, n), from postures to others, modulo 2 pi."""
+        step = q - before
+        return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
+
     def _choose(
-        self, joint_paths: list[JointPath], ends: Layer, count: int
+        self, joint_paths: list[JointPath], _ends: Layer, count: int
     ) -> list[JointPath]:
-        """Choose joint paths no longer than those to nodes around, then some that differ, and name their seeds.
-
-        Of several redundant joints the nodes are samples, which have no such minima.
-        """
-        chosen = []
-        is_single = self.problem.r <= 1
-        if is_single:
-            first, second = self._self_motion.near(ends.q, ends.q, self._around)
-            same_label = ends.branch[first] == ends.branch[second]
-            around = np.full(len(ends.q), np.inf)
-            np.minimum.at(around, first[same_label], ends.length[second[same_label]])
-            chosen = np.flatnonzero(around >= ends.length)[:count].tolist()
-        if not (is_single and self._only_minima):
-            indices = distinct(joint_paths, count)
-            chosen += [i for i in indices if i not in chosen][: count - len(chosen)]
-        return [
-            replace(joint_paths[i], seed=self._seed_of(joint_paths[i].q[0]))
-            for i in chosen
-        ]
-
-    def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Make nodes all over the self-motion manifold at the path's beginning, one in a cell, whatever the ranges."""
-        target = self._targets[:1]
-        count = 4 * self._nodes
-        branches = []
-        for decomposition in self._decompositions:
-            q_r = spread_redundant(decomposition, self._cells_per_turn, count, rng)
-            q = solve_all(decomposition, np.repeat(target, len(q_r), axis=0), q_r)
-            q = q[:, list(decomposition.branches)]
-            exists = np.isfinite(q).all(axis=3)
-            self._seeds.append(q[exists])
-            branches.append(np.array(decomposition.branches)[np.nonzero(exists)[1]])
-        if not self._seeds:
-            low, high = sampling_box(self._robot)
-            drawn = rng.uniform(low, high, (count, len(low)))
-            newton = self._self_motion.newton
-            q = newton.nearest(np.repeat(target, count, axis=0), drawn)
-            self._seeds.append(q[np.isfinite(q).all(axis=1)])
-        q = np.concatenate(self._seeds)
-        branch = np.zeros(len(q), dtype=int)
-        if self._keeps_branch:
-            (branch,) = branches
-        cells = self._self_motion.key(q, self._self_motion.size)
-        keys = np.column_stack([branch, cells])
-        _, one_per_cell = np.unique(keys, axis=0, return_index=True)
-        return Layer.start(q[one_per_cell], branch[one_per_cell])
-
-    def _seed_of(self, q: np.ndarray) -> str:
-        """Name the closed form that gave a start posture, (n,); empty if the task gives it."""
-        if not self._seeds:
-            return ""
-        if not self._decompositions:
-            return "random"
-        steps = [self._self_motion.step(q, seeds) for seeds in self._seeds]
-        distances = [np.abs(step).max(axis=1).min(initial=np.inf) for step in steps]
-        return self._decompositions[int(np.argmin(distances))].name
-
-    def _choose_start_nodes(self, layer: Layer) -> Layer:
-        """Label the start nodes: joint paths of different labels do not displace each other.
-
-        A label is a branch that joint paths keep. Otherwise it is, of one redundant joint, a connected component of the
-        self-motion manifold; of several, a few postures far from each other have one each.
-        """
-        if self._keeps_branch:
-            return self._thin(layer)
-        q = layer.q
-        if self.problem.r > 1:
-            scaled = q / self._self_motion.size
-            q = q[np.unique([0, *farthest(scaled, scaled[:1], 11)])]
-            return Layer.start(q, np.arange(len(q)))
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        pairs = self._self_motion.near(q, q, self._around)
-        graph = coo_array((np.ones(len(pairs[0])), pairs), shape=(len(q), len(q)))
-        return Layer.start(q, connected_components(graph, directed=False)[1])
-
-    def _at_end(self, last: Layer) -> np.ndarray:
-        """Tell which nodes of the last layer, (K,) bool, meet the given end posture."""
-        return np.abs(last.q - self.problem.end).max(axis=1) < SAME
-
-    def _thin(self, layer: Layer) -> Layer:
-        """Keep a bounded number of nodes of each label; of one redundant joint, those that come no long way round."""
-        if self.problem.r <= 1:
-            return layer[self._is_short(layer)]
-        labels = np.unique(layer.branch)
-        per_label = max(10, self._nodes // len(labels))
-        nodes_by_label = (np.flatnonzero(layer.branch == label) for label in labels)
-        chosen = [
-            nodes[self._choose_some(layer[nodes], per_label)]
-            for nodes in nodes_by_label
-        ]
-        return layer[np.concatenate(chosen)]
-
-    def _is_short(self, layer: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are not much longer than those of other labels in the same posture."""
-        keys = self._self_motion.key(layer.q)
-        postures = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-        least = np.full(len(keys), np.inf)
-        np.minimum.at(least, postures, layer.length)
-        return layer.length <= _LONGER * least[postures] + _ALWAYS
+        """Choose up to `count` of the joint paths, which end at these nodes: some that differ."""
+        return [joint_paths[i] for i in distinct(joint_paths, count)]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""

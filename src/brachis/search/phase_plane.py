@@ -25,9 +25,10 @@ from brachis.optimise.program import Program
 from brachis.path.legs import Leg
 from brachis.problem.problem import Problem
 from brachis.search.stages import InitialGuess
-from brachis.search.stations import STATIONS
 from brachis.timing import JointPath, PhasePlane
 
+_STATIONS = 401
+"""Stations along a joint path of a guess."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
 _ROUGH = 0.99
@@ -136,7 +137,7 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
         # The fastest one within the limits.
         return min(points, key=itemgetter(0, 1))[-1]
     # Over few knots splines may leave the branch where the joint path bends.
-    straight = [np.linspace(curves[0], curves[-1], STATIONS) for curves in guess.legs]
+    straight = [np.linspace(curves[0], curves[-1], _STATIONS) for curves in guess.legs]
     return starting_point(program, straight, (None,) * len(straight))
 
 
@@ -148,12 +149,12 @@ def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | N
     if phase.time_law is not None or phase.joint_map.path is None:
         return curves, None
     try:
-        phase_timing = PhaseTiming.through(phase, curves, STATIONS, is_rough=True)
+        phase_timing = PhaseTiming.through(phase, curves, _STATIONS, is_rough=True)
     except UnreachableError:
         return curves, None
     if phase_timing.timing is None:
         return curves, None
-    t = np.linspace(0.0, phase_timing.t_end, STATIONS)
+    t = np.linspace(0.0, phase_timing.t_end, _STATIONS)
     return phase_timing.course.curves(phase_timing.timing, t)[0], phase_timing.t_end
 
 

@@ -1,29 +1,34 @@
 """What the search tries, batch after batch: initial guesses with solvers.
 
 If the task leaves the choice of redundant joints open, guesses come from the lattice of all postures, and plans are
-made in charts. A task that names its redundant joints or its branch gets these alone. Along a path of joints there is
-one guess, and no choice.
+made in charts; the closed forms of single choices are tried only while nothing is verified. A task that names its
+redundant joints or its branch gets these alone. Along a path of joints there is one guess, and no choice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import solvers_for
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
+from brachis.search.differential_ik import STRATEGIES
 from brachis.search.guesses import (
     SEARCH_LEVELS,
     SearchLevel,
+    chart_guesses,
     joint_space_guess,
     lattice_guesses,
     numeric_guesses,
 )
 from brachis.search.hopeless import refuse_hopeless
-from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_path import NO_TIME, DeadEnd
+from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
 _SIZE = 12
@@ -98,25 +103,24 @@ def batches(
         for number, solver_guess in enumerate(_with_solvers([guess], solvers)):
             yield Batch([solver_guess], 1, fallback=number > 0)
         return
-    guesses = []
-    for level in levels:
-        if level.fallback:
-            # The search may end here, before lattices are looked at.
-            yield Batch()
-        soon = deadline.part(_LATTICE_SHARE)
-        level_guesses, lattices = _find_guesses(
-            problem, decompositions, level, soon, listener
-        )
-        guesses += level_guesses
-        for first in range(0, max(1, len(level_guesses)), _SIZE):
-            yield Batch(
-                _with_solvers(level_guesses[first : first + _SIZE], solvers[:1]),
-                level.refined,
-                level.fallback,
-                [] if first else lattices,
-            )
-    for solver in solvers[1:]:
-        yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+    if has_charts(problem, decompositions):
+        find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
+        guesses = yield from _level_by_level(levels, solvers, find)
+        for solver in solvers[1:]:
+            yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+        levels = tuple(replace(level, fallback=True) for level in levels)
+    if not decompositions:
+        return
+    find = partial(_guess_on_branches, decompositions, deadline, listener)
+    guesses = yield from _level_by_level(levels, solvers, find)
+    many = len(guesses) + len(STRATEGIES)
+    tried = {(guess.joint_map.redundant_joints, guess.origin) for guess in guesses}
+    yield Batch(_with_solvers(guesses[:_SIZE], solvers[1:2]), many)
+    for decomposition in decompositions[: levels[-1].decompositions]:
+        for guess in numeric_guesses(decomposition, len(STRATEGIES), deadline):
+            if (guess.joint_map.redundant_joints, guess.origin) not in tried:
+                yield Batch(_with_solvers([guess], solvers[:2]), many)
+    yield Batch(_with_solvers(guesses[:2], solvers[2:]), many)
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
@@ -128,39 +132,111 @@ def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> boo
     return problem.r > 0 or not decompositions
 
 
-def _find_guesses(
+def _level_by_level(
+    levels: Sequence[SearchLevel],
+    solvers: Sequence[str],
+    find: Callable[[SearchLevel], GuessesAndLattices],
+) -> Generator[Batch, None, list[InitialGuess]]:
+    """Yield batches of the guesses of each level, with the first solver; return the guesses of all levels."""
+    guesses = []
+    for level in levels:
+        if level.fallback:
+            # The search may end here, before lattices are looked at.
+            yield Batch()
+        level_guesses, lattices = find(level)
+        guesses += level_guesses
+        for first in range(0, max(1, len(level_guesses)), _SIZE):
+            yield Batch(
+                _with_solvers(level_guesses[first : first + _SIZE], solvers[:1]),
+                level.refined,
+                level.fallback,
+                [] if first else lattices,
+            )
+    return guesses
+
+
+def _guess_in_charts(
     problem: Problem,
     decompositions: Sequence[Decomposition],
+    deadline: Deadline,
+    listener: Listener,
+    level: SearchLevel,
+) -> GuessesAndLattices:
+    """Find guesses in charts."""
+    listener("looking for joint paths on the lattice of all postures")
+    soon = deadline.part(_LATTICE_SHARE)
+    outcome = chart_guesses(problem, decompositions, level, soon, listener)
+    if isinstance(outcome, DeadEnd):
+        return [], [(None, outcome)]
+    return outcome, []
+
+
+def _guess_on_branches(
+    decompositions: Sequence[Decomposition],
+    deadline: Deadline,
+    listener: Listener,
+    level: SearchLevel,
+) -> GuessesAndLattices:
+    """Find guesses on the branches of closed forms; decompositions without a joint path make room for others."""
+    lattices: Lattices = []
+    for first in range(0, len(decompositions), level.decompositions):
+        some_decompositions = decompositions[first : first + level.decompositions]
+        guesses, new_lattices = _guess_on_some_branches(
+            some_decompositions, deadline, listener, level
+        )
+        lattices += new_lattices
+        if guesses:
+            refuse_hopeless(guesses)
+            return guesses, lattices
+    return [], lattices
+
+
+def _guess_on_some_branches(
+    decompositions: Sequence[Decomposition],
+    deadline: Deadline,
+    listener: Listener,
+    level: SearchLevel,
+) -> GuessesAndLattices:
+    """Take a guess from every decomposition in turn, from each those with the least estimated times first."""
+    search = decompositions[0].problem.task.search
+    if search.guesses == "numeric":
+        count = level.joint_paths
+        numeric = (
+            numeric_guesses(decomposition, count, deadline)
+            for decomposition in decompositions
+        )
+        return list(itertools.chain(*numeric)), []
+    deadline = deadline.part(_LATTICE_SHARE)
+    outcomes = run_in_processes(
+        _guess_for, decompositions, level, deadline, jobs=search.jobs, listener=listener
+    )
+    ranked: list[tuple[int, InitialGuess]] = []
+    lattices: Lattices = []
+    for decomposition, outcome in zip(decompositions, list(outcomes), strict=True):
+        if isinstance(outcome, DeadEnd):
+            lattices.append((decomposition, outcome))
+            continue
+        # Those that another process found have a copy of the problem.
+        guesses = [replace(guess, problem=decomposition.problem) for guess in outcome]
+        guesses.sort(key=lambda guess: guess.estimate)
+        ranked += enumerate(
+            guesses + numeric_guesses(decomposition, level.numeric, deadline)
+        )
+    ranked.sort(key=lambda item: (item[0], item[1].estimate))
+    count = level.in_closed_forms // max(1, len(decompositions[0].redundant))
+    return [guess for _, guess in ranked[: max(1, count)]], lattices
+
+
+def _guess_for(
+    decomposition: Decomposition,
     level: SearchLevel,
     deadline: Deadline,
     listener: Listener,
-) -> GuessesAndLattices:
-    """Find guesses in charts, or on the branches of closed forms: of the first decompositions that have any."""
-    if has_charts(problem, decompositions):
-        listener("looking for joint paths on the lattice of all postures")
-        outcome = lattice_guesses(problem, decompositions, level, deadline, listener)
-        if isinstance(outcome, DeadEnd):
-            return [], [(None, outcome)]
-        return outcome, []
-    guesses: list[InitialGuess] = []
-    lattices: Lattices = []
-    remaining = level.decompositions
-    for decomposition in decompositions:
-        if not remaining:
-            break
-        if problem.task.search.guesses == "numeric":
-            outcome = numeric_guesses(decomposition, level.ranked, deadline)
-        else:
-            listener(f"looking for joint paths on branches of {decomposition.name}")
-            outcome = lattice_guesses(
-                problem, [decomposition], level, deadline, listener, keeps_branch=True
-            )
-        if isinstance(outcome, DeadEnd):
-            lattices.append((decomposition, outcome))
-        elif outcome:
-            guesses += outcome
-            remaining -= 1
-    if guesses:
-        refuse_hopeless(guesses)
-    guesses.sort(key=lambda guess: guess.estimate)
-    return guesses, lattices
+) -> list[InitialGuess] | DeadEnd:
+    if deadline.passed:
+        return DeadEnd(0.0, NO_TIME)
+    place = "branches"
+    if decomposition.redundant:
+        place = f"lattice of {decomposition.name}"
+    listener(f"looking for joint paths on the {place}")
+    return lattice_guesses(decomposition, level, deadline, listener)

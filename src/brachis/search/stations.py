@@ -14,7 +14,7 @@ from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
 from brachis.robot.plausibility import link_lengths
 
-STATIONS = 401
+_STATIONS = 401
 """Stations along a joint path of a guess."""
 _LEAST_STATIONS = 41
 """Fewest stations along a leg."""
@@ -71,7 +71,7 @@ def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
     return np.interp(np.linspace(0.0, steps[-1], count + 1), steps, s)
 
 
-def spread_stations(problem: Problem, count: int = STATIONS) -> np.ndarray:
+def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
     """Spread about so many path coordinates, (S,), over the legs, the ends of the legs among them."""
     s, steps = measure(problem.path, problem.task_map)
     parts = [np.zeros(1)]
