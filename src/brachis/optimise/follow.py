@@ -161,14 +161,21 @@ def follow(
 
 
 def begin(
-    phase: Phase, phase_timing: PhaseTiming, lost: float, intervals: int, points: int
-) -> tuple[Phase, np.ndarray] | None:
-    """Lay splines along the fastest timing over few intervals; limits may be exceeded.
+    phase: Phase,
+    phase_timing: PhaseTiming,
+    timing: Timing,
+    lost: float,
+    intervals: int,
+    points: int,
+) -> tuple[Phase, np.ndarray]:
+    """Lay splines along a timing over few intervals; limits may be exceeded.
 
     Parameters
     ----------
     phase, phase_timing, points
         As of `follow`.
+    timing : Timing
+        Of the joint path.
     lost : float
         Part of the time that the intervals may lose together.
     intervals : int
@@ -178,14 +185,9 @@ def begin(
     -------
     phase : Phase
     x : (v,) ndarray
-        None where the limits allow no timing.
     """
-    if phase_timing.timing is None:
-        return None
-    breaks = _knots(
-        phase, phase_timing, phase_timing.timing, lost, _FIRST_WAIT, intervals
-    )
-    motion, _ = _lay_splines(phase, phase_timing, phase_timing.timing, breaks)
+    breaks = _knots(phase, phase_timing, timing, lost, _FIRST_WAIT, intervals)
+    motion, _ = _lay_splines(phase, phase_timing, timing, breaks)
     return _as_phase(phase, motion, points)
 
 

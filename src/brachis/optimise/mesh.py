@@ -38,7 +38,7 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
-_FEW_INTERVALS = 12
+FEW_INTERVALS = 12
 """Least number of intervals of a phase over which a solve begins."""
 _SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
@@ -103,7 +103,7 @@ def _transfer(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    counts = [phase.intervals / _FEW_INTERVALS for phase in program.phases]
+    counts = [phase.intervals / FEW_INTERVALS for phase in program.phases]
     halvings = [int(np.log2(max(count, 1.0))) for count in counts]
     for k in range(max(halvings), 0, -1):
         pairs = zip(program.phases, halvings, strict=True)
@@ -127,7 +127,7 @@ COARSE_INTERVALS = 10
 """Intervals with which a mesh begins."""
 _FEW_VARIABLES = 150
 """Up to so many it is cheap to halve every interval, in case the wrong ones were thought to lose most."""
-_MOST_VARIABLES = 300
+_MOST_VARIABLES = 2 * _FEW_VARIABLES
 """Solves with more take seconds each, and gain some 0.1 %."""
 _COARSER = "the mesh is coarser than spline.tolerance asks for"
 

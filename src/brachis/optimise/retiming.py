@@ -15,6 +15,7 @@ from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
+from brachis.optimise.mesh import FEW_INTERVALS
 from brachis.optimise.path_program import (
     PathPhase,
     PathProgram,
@@ -36,10 +37,8 @@ _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
-_ROUGH_MARGIN = 0.02
+ROUGH_MARGIN = 0.02
 """Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
-_FEWEST = 12
-"""Intervals of a phase over which a search over time begins, no fewer if its timing needs as many."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ COARSE = PathEffort(
     places=200,
     is_rough_before=True,
     is_rough_after=True,
-    margin=_ROUGH_MARGIN,
+    margin=ROUGH_MARGIN,
     options=SolverOptions(
         tolerance=1e-3,
         max_iterations=25,
@@ -94,7 +93,7 @@ ROUGH = PathEffort(
     intervals=(16,),
     places=800,
     is_rough_before=True,
-    margin=_ROUGH_MARGIN,
+    margin=ROUGH_MARGIN,
     options=SolverOptions(
         tolerance=3e-4,
         max_iterations=40,
@@ -176,18 +175,17 @@ def begin_with_timing(
         Slowed down until the limits hold at the collocation points; None where the limits allow no timing.
     """
     total = least_time(timings)
-    if not np.isfinite(total):
-        return None
     phases = []
     parts = []
     for phase, phase_timing in zip(program.phases, timings, strict=True):
-        assert phase_timing is not None
-        share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
-        begun = begin(phase, phase_timing, lost, share, points)
-        if begun is None:
+        if phase_timing is None or phase_timing.timing is None:
             return None
-        phases.append(begun[0])
-        parts.append(begun[1])
+        share = max(FEW_INTERVALS, int(intervals * phase_timing.t_end / total))
+        begun, x_of_phase = begin(
+            phase, phase_timing, phase_timing.timing, lost, share, points
+        )
+        phases.append(begun)
+        parts.append(x_of_phase)
     first = program.with_phases(phases)
     try:
         return first, shortest_time(first, np.concatenate(parts))
