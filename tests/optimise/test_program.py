@@ -12,7 +12,7 @@ import pytest
 
 from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER
-from brachis.explain import multipliers_of, sensitivities_at
+from brachis.explain import figures_of, multipliers_of, sensitivities_at
 from brachis.kinematics import DirectJointMap
 from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
@@ -190,7 +190,8 @@ def test_a_limit_of_several_phases_is_one_figure():
     )
     (entry,) = found.limits
     assert entry.change(1.0) == pytest.approx(-0.5 * report.objective, rel=1e-3)
-    relaxed = program.relax(TORQUE, entry.bound, 0.21 * FORCE)
+    ((limit, bound),) = figures_of(program)[entry.label, entry.side]
+    relaxed = program.relax(limit, bound, 0.21 * FORCE)
     assert len(relaxed.limits) == 1
     assert solve(relaxed, report.x).objective == pytest.approx(
         report.objective / 1.1, rel=1e-4

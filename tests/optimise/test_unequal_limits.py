@@ -66,9 +66,7 @@ def test_the_plan_with_equal_limits_breaks_the_unequal_ones_and_sensitivities_na
     assert check.value == pytest.approx(PUSH / BRAKE, rel=1e-3)
     entries = report(bound).sensitivities.limits
     told = {
-        entry.side: entry.derivative
-        for entry in entries
-        if entry.limit.kind == "torque"
+        entry.side: entry.derivative for entry in entries if entry.label.kind == "force"
     }
     for end, figure in (("lower", -BRAKE), ("upper", PUSH)):
         # t^2 = 2 m L (1 / |F1| + 1 / F2), so that dt / d|F| = -m L / (t F^2)
