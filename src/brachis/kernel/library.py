@@ -74,8 +74,6 @@ _ARGUMENTS = {
     name: [_split(word) for word in words.split()[1:]]
     for name, words in FUNCTIONS.items()
 }
-
-
 _DIGITS = {str(digit): digit for digit in range(10)}
 
 
