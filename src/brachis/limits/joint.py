@@ -125,7 +125,7 @@ class JointLimit(Limit):
         name = _QUANTITIES.get(type(self))
         if name is None or self._robot.chain is not chain:
             return None
-        return ScaledQuantity(name, self._joints, self._scale, chain)
+        return ScaledQuantity(name, self._joints, self._middle, self._scale, chain)
 
     def _of_joints(self, every: np.ndarray) -> np.ndarray:
         """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.kernel import Chain, FormulaQuantity
 from brachis.kinematics import JointMap
 from brachis.limits.protocol import (
     Guarantee,
@@ -52,6 +53,10 @@ class BranchMargin(Limit):
     def values(self, motion: JointStates) -> np.ndarray:
         """Margins (K, c); the motion is a state of the joint map."""
         return self._joint_map.margins(motion)
+
+    def kernel_quantity(self, _chain: Chain) -> FormulaQuantity | None:
+        """Describe the margins; nothing for subclasses, which may have values of their own."""
+        return self._joint_map.margin_quantity() if type(self) is BranchMargin else None
 
     def partials(self, motion: JointStates) -> Partials:
         by_q, by_s = self._joint_map.margin_gradient(motion)
