@@ -9,11 +9,14 @@ import pytest
 
 from brachis.kernel import (
     CurvePattern,
+    Formula,
+    FormulaQuantity,
     MotionSlopes,
     ScaledQuantity,
     ValueGroups,
     VariableSlopes,
     differentiate,
+    formula,
 )
 from kernel.test_chain import chain_of, random_model
 
@@ -100,16 +103,23 @@ def test_scaled_quantities(chain, quantity):
     """Each is its partials, which are rows of the unit matrix or derivatives of the torque, times the factors."""
     rng = np.random.default_rng(5)
     joints = np.array([3, 0, 3])
-    factors = rng.normal(size=3)
-    scaled = ScaledQuantity(quantity, joints, factors, chain)
+    offsets, factors = rng.normal(size=(2, 3))
+    scaled = ScaledQuantity(quantity, joints, offsets, factors, chain)
     states = rng.normal(size=(4, POINTS, N))
     parts = list(rng.normal(size=(5, POINTS, N, 3)))
+    torque = chain.torques(*states[:3])
+    quantities = dict(zip(("q", "qdot", "qddot", "qdddot"), states, strict=True))
+    quantities["torque"] = torque
     groups = ValueGroups([scaled], [3])
+    (values,) = groups.values(states, torque)
+    known = (quantities[quantity][:, joints] - offsets) * factors
+    np.testing.assert_array_equal(values, known)
+
     partials = np.zeros((4, POINTS, N, N))
     if quantity == "torque":
         partials[:3] = chain.torque_derivatives(*states[:3])
     else:
-        partials[("q", "qdot", "qddot", "qdddot").index(quantity)] = np.eye(N)
+        partials[list(quantities).index(quantity)] = np.eye(N)
     partials = partials[:, :, joints] * factors[:, None]
     has_jerk = quantity == "qdddot"
     motion = MotionSlopes(*parts[:4], parts[4] if has_jerk else None)
@@ -118,16 +128,44 @@ def test_scaled_quantities(chain, quantity):
     np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
 
 
-def test_groups_can_be_sent_to_another_process(chain):
-    one = np.ones(1)
-    groups = ValueGroups([ScaledQuantity("torque", np.array([2]), one, chain)], [1])
+def test_formulas_of_the_posture():
+    """Margins are such: numbers of a formula, times signs."""
     rng = np.random.default_rng(7)
     states = rng.normal(size=(3, POINTS, N))
-    motion = MotionSlopes(*rng.normal(size=(4, POINTS, N, 3)))
+
+    def function(q):
+        return np.stack([q[:, 0] * q[:, 2], formula.sin(q[:, 4])], axis=1)
+
+    factors = np.array([2.0, -1.0])
+    margins = FormulaQuantity(
+        Formula.of(function, N), Formula.gradient(function, N), factors
+    )
+    groups = ValueGroups([None, margins], [1, 2])
+    values = groups.values(states)[1]
+    np.testing.assert_allclose(values, function(states[0]) * factors, atol=1e-14)
+    parts = rng.normal(size=(5, POINTS, N, 3))
+    by_q = margins.slopes_of(states[0]) * factors[:, None]
+    zero = np.zeros_like(by_q)
+    given = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
+    motion = MotionSlopes(*parts[:4])
+    found, _ = differentiate(groups, motion, states, given)
+    known = slopes_of((by_q, zero, zero, zero), parts, with_jerk=False)
+    np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
+    with pytest.raises(ValueError, match="have the shapes"):
+        ValueGroups([margins], [3])
+
+
+def test_groups_can_be_sent_to_another_process(chain):
+    one = np.ones(1)
+    groups = ValueGroups(
+        [ScaledQuantity("torque", np.array([2]), one, one, chain)], [1]
+    )
+    states = np.random.default_rng(7).normal(size=(3, POINTS, N))
     again = copy.deepcopy(groups)  # as another process gets it
-    known, _ = differentiate(groups, motion, states, [])
+    torque = np.random.default_rng(8).normal(size=(POINTS, N))
+    (known,) = groups.values(states, torque)
     del groups
-    found, _ = differentiate(again, motion, states, [])
+    (found,) = again.values(states, torque)
     np.testing.assert_array_equal(found, known)
 
 
@@ -155,18 +193,25 @@ def test_what_does_not_fit_is_refused(chain):
     with pytest.raises(ValueError, match="other points"):
         differentiate(groups, motion, states, partials, variables)
     one = np.ones(1)
-    beyond = ScaledQuantity("q", np.array([N]), one, chain)
+    beyond = ScaledQuantity("q", np.array([N]), one, one, chain)
     with pytest.raises(ValueError, match="joint"):
         ValueGroups([beyond], [1])
     first = np.zeros(1, dtype=int)
-    torque = ScaledQuantity("torque", first, one, chain)
+    torque = ScaledQuantity("torque", first, one, one, chain)
     groups = ValueGroups([torque], [1])
+    with pytest.raises(ValueError, match="needs the torque"):
+        groups.values(states)
+    with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
+        groups.values(states[:, :, :3], states[0, :, :3])
     fewer = MotionSlopes(*np.zeros((4, POINTS, 3, 3)))
     with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
         differentiate(groups, fewer, states[:, :, :3], [])
-    other = chain_of(*random_model(N, 2))
+    other = chain_of(*random_model(3, 1))
+    with pytest.raises(ValueError, match="different numbers"):
+        ValueGroups([torque, ScaledQuantity("q", first, one, one, other)], [1, 1])
+    again = chain_of(*random_model(N, 2))
     with pytest.raises(ValueError, match="more than one chain"):
-        ValueGroups([torque, ScaledQuantity("q", first, one, other)], [1, 1])
+        ValueGroups([torque, ScaledQuantity("torque", first, one, one, again)], [1, 1])
 
 
 def test_partials_by_the_jerk_need_its_slopes(chain):
@@ -181,6 +226,8 @@ def test_partials_by_the_jerk_need_its_slopes(chain):
             [((None, None, None, partials), None)],
         )
     one = np.ones(1)
-    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, chain)
+    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
     with pytest.raises(ValueError, match="qdddot_y"):
         differentiate(ValueGroups([jerk], [1]), motion, states, [])
+    with pytest.raises(ValueError, match="qdddot"):
+        ValueGroups([jerk], [1]).values(states)

@@ -9,8 +9,10 @@ from brachis.kernel import (
     Branch,
     Fault,
     Formula,
+    FormulaQuantity,
     PathMotion,
     Prescribed,
+    ValueGroups,
 )
 from brachis.robot.chain import chain_of
 from support.random_chains import random_model
@@ -164,7 +166,7 @@ def test_a_branch_of_another_chain_is_refused():
         PathMotion.prepare(chain, ASKED, given, branch=branch)
 
 
-def test_a_formula_of_answers():
+def test_formulas_of_answers_and_of_margins():
     rng = np.random.default_rng(5)
     chain = chain_of(*random_model(N, 1))
     mask = np.zeros(N, dtype=bool)
@@ -174,12 +176,21 @@ def test_a_formula_of_answers():
             targets = targets * targets + q_r
         return (targets * 0.0 + q_r)[:, None]
 
+    def margins(q):
+        return q[:, :1] * q[:, 1:2]
+
     branch = Branch(
         REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, Formula.of(answers, 2, 1)
     )
+    quantity = FormulaQuantity(
+        Formula.of(margins, N), Formula.gradient(margins, N), np.ones(1)
+    )
+    groups = ValueGroups([quantity], [1])
     names = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds", "targets")
     given = {name: rng.uniform(0.1, 0.5, (7, 2)) for name in names}
     given["rows"] = np.eye(N, N + 1)[[1]]
     motion = PathMotion.prepare(chain, ASKED, given, branch=branch)
     assert motion.evaluate() is None
     np.testing.assert_allclose(motion.q, given["y"][:, [1, 1, 1]], atol=1e-15)
+    (values,) = groups.values((motion.q,))
+    np.testing.assert_allclose(values, margins(motion.q), atol=1e-15)

@@ -60,7 +60,7 @@ def work() -> None:
     given["rows"] = np.eye(N, N + 1)[[0]]
     given["y"] = rng.normal(size=(POINTS, 2))
     every = np.arange(N)
-    torque = ScaledQuantity("torque", every, np.ones(N), chain)
+    torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
     groups = ValueGroups([torque, None], [N, N])
     motion = PathMotion.prepare(chain, asked, given)
     motion.q[:] = q
@@ -69,6 +69,7 @@ def work() -> None:
     motion.singular_slopes(*find_least_singular(motion.inverse))
     for quantity in ("speed", "angular speed", "acceleration"):
         chain.tool_size_slopes(quantity, q, qdot, qddot)
+    groups.values((q, qdot, qddot), q)
     slopes = MotionSlopes(motion.gradient, *motion.derivatives())
     places = np.arange(POINTS)
     of_curves = CurvePattern(places, places % 2, POINTS, 2)

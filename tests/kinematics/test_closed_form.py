@@ -165,6 +165,7 @@ def test_what_a_subclass_computes_itself_is_asked_for():
     state = own.state(y, *rates)
     assert solver.calls == 1
     np.testing.assert_array_equal(state.q, known.state(y, *rates).q)
+    assert margin.kernel_quantity(robot.chain) is None
     evaluation = Evaluator(own, [margin]).evaluate(y, *rates)
     expected = 0.1 * known.branch_margins(state.q)
     np.testing.assert_allclose(evaluation.values, expected, atol=1e-14)

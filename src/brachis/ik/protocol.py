@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from brachis.ik.screws import ChainGeometry
-from brachis.kernel import Formula
+from brachis.kernel import Formula, FormulaQuantity
 from brachis.robot import TaskMap
 
 
@@ -80,6 +80,13 @@ class IKSolver(ABC):
         """
         return None
 
+    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
+        """Return the formulas of margins and slopes in postures of n joints.
+
+        None but in `FormulaMargins`: the planner then asks `branch_margins` and `margin_gradient`.
+        """
+        return None
+
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Differentiate the branch margins with respect to all joints, (K, k, n), exact by complex steps."""
         count, n = q.shape
@@ -122,6 +129,17 @@ class FormulaMargins(IKSolver):
 
     def _slopes(self, n: int) -> Formula:
         return self._formula(("slopes", n), Formula.gradient, self.margins, n)
+
+    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
+        """Return margins and slopes with the branch's signs; None where a subclass computes one of them itself."""
+        own = type(self)
+        if own.branch_margins is not FormulaMargins.branch_margins:
+            return None
+        if own.margin_gradient is not FormulaMargins.margin_gradient:
+            return None
+        values = self._values(n)
+        signs = np.broadcast_to(self.margin_signs(branch), values.shape)
+        return FormulaQuantity(values, self._slopes(n), signs)
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Evaluate the margins by their formula."""

@@ -22,6 +22,7 @@ from brachis.ik.newton import Newton
 from brachis.ik.protocol import IKSolver
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import meeting_point
+from brachis.kernel import FormulaQuantity
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose
@@ -266,6 +267,10 @@ class PolishedSolver(IKSolver):
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return the margins of the ideal chain."""
         return self.ideal.branch_margins(q, branch)
+
+    def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
+        """Return the formulas of the ideal chain."""
+        return self.ideal.margin_formulas(branch, n)
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return the slopes of the margins of the ideal chain."""

@@ -21,7 +21,12 @@ from brachis.kernel.postures import Branch
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.splines import Basis, Spline, blossom, collocation
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
-from brachis.kernel.value_groups import ScaledQuantity, ValueGroups
+from brachis.kernel.value_groups import (
+    FormulaQuantity,
+    Quantity,
+    ScaledQuantity,
+    ValueGroups,
+)
 
 __all__ = [
     "Basis",
@@ -30,9 +35,11 @@ __all__ = [
     "CurvePattern",
     "Fault",
     "Formula",
+    "FormulaQuantity",
     "MotionSlopes",
     "PathMotion",
     "Prescribed",
+    "Quantity",
     "ScaledQuantity",
     "Spline",
     "TorqueDerivatives",

@@ -147,11 +147,43 @@ void brachis_differentiate(
     const variables *by, double *found
 )
 {
+    for (const group *each = of; each < of + groups; each++) {
+        double *slopes = each->by[0].numbers;
+        if (each->quantity == FORMULA) {
+            brachis_formula(each->slopes_of, count, states[0], n, NULL, 0, slopes);
+        }
+        for (long i = 0; i < count * each->values * n && each->quantity == FORMULA; i++) {
+            slopes[i] *= each->factors[i / n % each->values];
+        }
+    }
     if (arm) {
         brachis_torque_slopes(arm, count, width, states, motion);
     }
     WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
     if (by) {
         brachis_entries(count, columns, width, table, by, found);
+    }
+}
+
+/* Values of the groups that are quantities of joints or formulas, each (K, values), one behind the other; `quantities` are q and
+its three derivatives and the torque, (K, n). */
+void brachis_values(
+    long count, long n, const double **quantities, long groups, const group *of, double *found
+)
+{
+    for (const group *own = of; own < of + groups; own++) {
+        if (own->quantity == FORMULA) {
+            brachis_formula(own->values_of, count, quantities[0], n, NULL, 0, found);
+        }
+        for (long i = 0; i < count * own->values && own->quantity == FORMULA; i++) {
+            found[i] *= own->factors[i % own->values];
+        }
+        for (long k = 0; k < count && own->quantity >= 0 && own->quantity <= TORQUE; k++) {
+            const double *quantity = quantities[own->quantity] + k * n;
+            for (long i = 0; i < own->values; i++) {
+                found[k * own->values + i] = (quantity[own->joints[i]] - own->offsets[i]) * own->factors[i];
+            }
+        }
+        found += count * own->values;
     }
 }

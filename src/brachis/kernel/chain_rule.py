@@ -164,7 +164,7 @@ def differentiate(
     slopes = [keep_address(own, shape, kept) for own in parts]
     of_states = [keep_address(own, (count, n), kept) for own in states[:3]]
     arm = None
-    if groups.chain is not None and groups.has_torque:
+    if groups.chain is not None:
         slopes.append(keep_address(np.empty((3, *shape)), (3, *shape), kept))
         arm = groups.chain.address
     columns = groups.size

@@ -48,10 +48,11 @@ FUNCTIONS = {
     "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",
     "brachis_entries": "- K v c [oKvc] p >[ev]",
     "brachis_differentiate": "- l l l p p p l p l l p p p",
+    "brachis_values": "- l l p l p p",
     "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
     "brachis_solve_band": "- l l l p p",
     "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
-    "brachis_curves": "- o K w c L [oKw] l[K] [cL] >[oKc]",
+    "brachis_curves": "- l l l l l p p p p",
     "brachis_formula": "- p l p l p l p",
 }
 """What functions return and take: pointer, long, double, int, or nothing.
@@ -74,8 +75,6 @@ _ARGUMENTS = {
     name: [_split(word) for word in words.split()[1:]]
     for name, words in FUNCTIONS.items()
 }
-
-
 _DIGITS = {str(digit): digit for digit in range(10)}
 
 

@@ -84,16 +84,18 @@ typedef struct {
     long step;
 } partial;
 
-enum { TORQUE = 4 };
+enum { TORQUE = 4, FORMULA };
 
-/* A group of values. Either each value is (quantity of one joint - a constant) * factor, with `quantity` 0 to 3 for q and its
-derivatives and TORQUE for the torque. Or `quantity` is -1, and partial derivatives by q, qdot, qddot and qdddot, and by s,
-(K, values), are given; a null pointer stands for zeros. */
+/* A group of values. Either each value is (quantity of one joint - offset) * factor, with `quantity` 0 to 3 for q and its
+derivatives and TORQUE for the torque. Or it is a number of a FORMULA of the posture times a factor; its slopes by q go to
+`by[0]`. Or `quantity` is -1, and partial derivatives by q, qdot, qddot and qdddot, and by s, (K, values), are given; a null
+pointer stands for zeros. */
 typedef struct {
     long values;
     long quantity;
-    const long *joints;    /* (values) */
-    const double *factors; /* (values) */
+    const long *joints;              /* (values) */
+    const double *offsets, *factors; /* (values) */
+    const formula *values_of, *slopes_of;
     partial by[4];
     const double *by_s;
 } group;

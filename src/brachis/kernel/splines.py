@@ -159,9 +159,13 @@ class Basis:
 
     def sum(self, control_points: np.ndarray) -> np.ndarray:
         """Values of splines with control points, (c, L), and their derivatives, (orders, K, c)."""
-        many = control_points.shape[1]
-        if len(self._first) and many < self._needed:
+        orders, count, width = self._values.shape
+        curves, many = control_points.shape
+        if count and many < self._needed:
             raise ValueError(f"a control point does not exist; there are {many}")
-        arrays = (self._values, self._first, control_points)
-        values: np.ndarray = compute("brachis_curves", *arrays)
+        # Shapes are known here, and this is called most often.
+        values = np.empty((orders, count, curves))
+        points = as_contiguous(control_points, (curves, many))
+        arrays = (self._values, self._first, points, values)
+        call("brachis_curves", orders, count, width, curves, many, *arrays)
         return values

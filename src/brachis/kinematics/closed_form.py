@@ -21,7 +21,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from brachis.ik import IKSolver
-from brachis.kernel import Branch, Fault, PathMotion
+from brachis.kernel import Branch, Fault, FormulaQuantity, PathMotion
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
@@ -108,6 +108,10 @@ class ClosedFormMap(PathMap):
     def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
         """Differentiate the margins of the branch; they do not depend on s."""
         return self.solver.margin_gradient(state.q, self.branch), None
+
+    def margin_quantity(self) -> FormulaQuantity | None:
+        """Return the margins as the kernel takes them."""
+        return self.solver.margin_formulas(self.branch, self.robot.n)
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""

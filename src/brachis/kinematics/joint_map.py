@@ -27,7 +27,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
-from brachis.kernel import MotionSlopes
+from brachis.kernel import FormulaQuantity, MotionSlopes, ValueGroups
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
@@ -79,6 +79,14 @@ class JointState(SharedTorques):
     def slopes(self) -> MotionSlopes:
         """The exact derivatives as the kernel takes them, but for those of the jerk."""
         return MotionSlopes(self.gradient, *self.derivatives)
+
+    def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
+        """Compute values of limits, (K, size) of each group; nothing is set where a group has partials."""
+        states = [self.q, self.qdot, self.qddot]
+        if groups.has_jerk:
+            states.append(self.qdddot)
+        torque = None if groups.chain is None else self.torque_of(groups.chain)
+        return groups.values(states, torque)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
@@ -198,6 +206,10 @@ class JointMap(ABC):
     def margins(self, state: Any) -> np.ndarray:
         """Margins, (K, b), of a state that this map gave; see `start_margins`."""
         return np.empty((len(state.q), 0))
+
+    def margin_quantity(self) -> FormulaQuantity | None:
+        """Return the margins as the kernel computes them by itself; None where it does not."""
+        return None
 
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""

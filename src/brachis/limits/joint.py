@@ -124,7 +124,7 @@ class JointLimit(Limit):
         name = _QUANTITIES.get(type(self))
         if name is None or self._robot.chain is not chain:
             return None
-        return ScaledQuantity(name, self._joints, self._scale, chain)
+        return ScaledQuantity(name, self._joints, self._middle, self._scale, chain)
 
     def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
         """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""

@@ -23,7 +23,7 @@ from typing import Any, Literal, Protocol, Self, TypeVar
 import numpy as np
 
 from brachis.common.labels import Label
-from brachis.kernel import Chain, ScaledQuantity, TorqueDerivatives
+from brachis.kernel import Chain, Quantity, TorqueDerivatives
 from brachis.robot import Robot
 from brachis.robot.custom_limits import name_failures
 from brachis.robot.dynamics import SharedTorques
@@ -300,8 +300,8 @@ class Limit(Description, ABC):
     def partials(self, motion: JointStates) -> Partials:
         """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
 
-    def kernel_quantity(self, chain: Chain) -> ScaledQuantity | None:
-        """Describe the values as what the kernel differentiates by itself, of a chain; None where it does not."""
+    def kernel_quantity(self, chain: Chain) -> Quantity | None:
+        """Describe the values as what the kernel computes by itself, of a chain; None where it does not."""
         return None
 
     def restrict_to(self, q: np.ndarray) -> Limit | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.labels import Label
+from brachis.kernel import Chain, FormulaQuantity
 from brachis.kinematics import JointMap
 from brachis.limits.protocol import Guarantee, JointStates, Limit, Partials, Role
 
@@ -46,6 +47,10 @@ class BranchMargin(Limit):
     def values(self, motion: JointStates) -> np.ndarray:
         """Margins (K, c); the motion is a state of the joint map."""
         return self._joint_map.margins(motion)
+
+    def kernel_quantity(self, _chain: Chain) -> FormulaQuantity | None:
+        """Describe the margins."""
+        return self._joint_map.margin_quantity()
 
     def partials(self, motion: JointStates) -> Partials:
         by_q, by_s = self._joint_map.margin_gradient(motion)

@@ -94,7 +94,11 @@ class Evaluation:
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
         """Values of every limit, (K, its own c)."""
-        return tuple(limit.values(self.motion) for limit in self.limits)
+        motion = self.motion
+        values = motion.values_of(self.groups)
+        for number in self.groups.with_partials:
+            values[number] = self.limits[number].values(motion)
+        return tuple(values)
 
     @cached_property
     def values(self) -> np.ndarray:
