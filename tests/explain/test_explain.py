@@ -49,11 +49,25 @@ def test_a_higher_process_speed_saves_what_is_said(seams, speed):
 
 
 def test_waits_and_speeds_have_their_rows(seams):
-    (wait,) = seams.sensitivities.task
+    wait, _ = seams.sensitivities.task
     assert wait.saved == 0.5
     lines = str(seams.bottleneck()).splitlines()
     assert lines[0] == "without the dwell at s = 0.6025 saves 13 % (500 ms)"
     assert lines[1].startswith("a process speed of 0.22 m/s in place of 0.2 m/s saves")
+
+
+def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
+    _, stop = seams.sensitivities.task
+    assert stop.is_bound
+    task = seams.task.to_dict()
+    first, second = task["path"]
+    # The corner is passed on an arc, as far as the leads to the seams are long.
+    path = [{"line": {"by": first["line"]["by"]}, "blend": 0.01}, second]
+    moving = brachis.plan({**task, "path": path})
+    least = seams.t_end - 0.5 - stop.saved
+    assert moving.t_end > least - 0.01
+    text = f"without the stop at s = 0.6025 saves at most {100 * stop.saved / seams.t_end:.2g} %"
+    assert text in str(seams.bottleneck())
 
 
 def test_a_cause_has_one_row(seams):

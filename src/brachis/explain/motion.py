@@ -8,6 +8,7 @@ from dataclasses import replace
 from brachis.explain.given_speeds import Lagrangian, speed_sensitivities
 from brachis.explain.multipliers import multipliers_of
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
+from brachis.explain.stops import stop_savings
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
 from brachis.problem.problem import Problem
@@ -20,7 +21,7 @@ _BALANCED = 0.02
 def explain_motion(
     problem: Problem, motion: SolvedProgram, optimum: SolvedProgram
 ) -> Sensitivities:
-    """Derive what limits, process speeds and dwells cost.
+    """Derive what limits, process speeds, dwells and stops cost.
 
     Parameters
     ----------
@@ -41,15 +42,15 @@ def explain_motion(
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    dwells = _list_dwells(problem)
+    of_task = (*_list_dwells(problem), *stop_savings(problem, motion))
     program = optimum.program
     report = optimum.report
     is_timed = motion.report.solver == SOLVER
     if report.solver == SOLVER:
-        return replace(sensitivities_of_timing(motion), task=dwells)
+        return replace(sensitivities_of_timing(motion), task=of_task)
     multipliers = multipliers_of(program, report.x, report.multipliers)
     if is_timed and multipliers.residual > _BALANCED:
-        return replace(sensitivities_of_timing(motion), task=dwells)
+        return replace(sensitivities_of_timing(motion), task=of_task)
     costs = sensitivities_at(program, multipliers)
     lagrangian = Lagrangian(program, report.x, multipliers)
     speeds = speed_sensitivities(problem, lagrangian)
@@ -57,7 +58,7 @@ def explain_motion(
     of_limits = (
         replace(entry, derivative=faster * entry.derivative) for entry in costs.limits
     )
-    return replace(costs, limits=_join(of_limits, speeds), task=dwells)
+    return replace(costs, limits=_join(of_limits, speeds), task=of_task)
 
 
 def _join(

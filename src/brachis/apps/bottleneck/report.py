@@ -257,13 +257,15 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
             "motion is not an optimum, and the savings below are rough"
         )
     savings = [
-        (-entry.change(_FRACTION), _more_room(entry, degrees=degrees))
+        (-entry.change(_FRACTION), f"{_more_room(entry, degrees=degrees)} saves")
         for entry in found.limits
     ]
-    savings += [(saving.saved, saving.change) for saving in found.task]
+    for entry in found.task:
+        words = "saves at most" if entry.is_bound else "saves"
+        savings.append((entry.saved, f"{entry.change} {words}"))
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
-    lines += [f"{change} saves {_part(saved, t_end)}" for saved, change in costly]
+    lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
     if len(costly) < len(savings):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     if found.source == TIMINGS:
