@@ -23,8 +23,8 @@ _FEWEST_STEPS = 24.0
 _MOST_STEPS = 600
 """Most steps of a lattice."""
 _LONGEST_STEP = 0.05
-"""Longest step of a lattice, m, of arms up to 2 m long."""
-_LONGEST_SHARE = 0.025
+"""Longest step of a lattice, m, of arms up to 3.3 m long."""
+_LONGEST_SHARE = 0.015
 """Part of the length of longer arms that a step may be."""
 _LARGEST_TURN = 0.25
 """Largest turn in a step of a lattice, rad, of the direction of motion or of the tool."""
