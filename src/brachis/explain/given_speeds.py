@@ -87,11 +87,11 @@ def speed_sensitivities(
     return tuple(costs)
 
 
-def _with_speed(problem: Problem, speed: float, other: float) -> Problem:
+def _with_speed(problem: Problem, speed: float, changed: float) -> Problem:
     """Return the problem with another process speed, m/s, in place of one, on the same parts of the path."""
     limits = problem.task.tool_limits
     parts = tuple(
-        part.model_copy(update={"speed": other}) if part.speed == speed else part
+        part.model_copy(update={"speed": changed}) if part.speed == speed else part
         for part in limits.process_speed
     )
     limits = limits.model_copy(update={"process_speed": parts})

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from scipy import sparse
 
 
+_INDEPENDENT = 1e-9
+"""Length of what is left of a slope without those before it, below which it depends on them."""
+
+
 def jacobian_matrix(program: Program, x: np.ndarray) -> sparse.csr_array:
     """Differentiate the rows of a program at x, (v,): a matrix, (c, v).
 
@@ -80,20 +84,25 @@ class ActiveSet:
         rows = np.concatenate([low, high])
         signs = np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
-        kept = slopes.any(axis=1)
+        is_movable = slopes.any(axis=1)
         unit = np.eye(len(x))
         at_lower = x <= program.x_lower + near
         at_upper = x >= program.x_upper - near
-        slopes = np.vstack([slopes[kept], unit[at_lower], -unit[at_upper]])
-        rows = rows[kept]
+        slopes = np.vstack([slopes[is_movable], unit[at_lower], -unit[at_upper]])
+        rows = rows[is_movable]
         twice = len(rows) - len(np.unique(rows)) + int((at_lower & at_upper).sum())
-        return cls(slopes, rows, signs[kept], twice)
+        return cls(slopes, rows, signs[is_movable], twice)
 
     @cached_property
     def dependent(self) -> bool:
         """Whether several sets of multipliers may balance a gradient; those of equalities have either sign."""
-        count = len(self.slopes) - self.equalities
-        return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < count)
+        count, variables = self.slopes.shape
+        if count - self.equalities > variables:
+            return True
+        # A slope that depends on those before it leaves nothing on the diagonal.
+        diagonal = np.diag(np.linalg.qr(self.slopes.T, mode="r"))
+        remaining = np.count_nonzero(np.abs(diagonal) > _INDEPENDENT)
+        return bool(remaining < count - self.equalities)
 
     def weights_of(
         self, gradient: np.ndarray, multipliers: np.ndarray | None
@@ -104,8 +113,8 @@ class ActiveSet:
         """
         if multipliers is not None:
             of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
-            rest = gradient - of_rows @ self.slopes[: len(of_rows)]
-            of_variables = np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)
+            unbalanced = gradient - of_rows @ self.slopes[: len(of_rows)]
+            of_variables = np.maximum(self.slopes[len(of_rows) :] @ unbalanced, 0.0)
             return np.concatenate([of_rows, of_variables])
         from scipy.optimize import nnls
 
@@ -166,14 +175,16 @@ class Multipliers:
         if not self.active_set.dependent:
             return -saved
         from scipy.optimize import linprog
+        from scipy.sparse import csc_array
 
-        # Of all weights that balance as much, those that promise the least.
-        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes)
-        return -float(rates @ (self.weights if found.x is None else found.x))
+        # Of all weights that balance as much, those that promise the least. The stubs do not know sparse matrices.
+        columns = csc_array(slopes.T)
+        modest = linprog(rates, A_eq=columns, b_eq=self.weights @ slopes).x  # type: ignore[call-overload]
+        return -float(rates @ (self.weights if modest is None else modest))
 
 
 def multipliers_of(
-    program: Program, x: np.ndarray, given: np.ndarray | None = None
+    program: Program, x: np.ndarray, of_solver: np.ndarray | None = None
 ) -> Multipliers:
     """Find the multipliers at an answer.
 
@@ -181,8 +192,8 @@ def multipliers_of(
     ----------
     program : Program
     x : (v,) ndarray
-    given : (c,) ndarray, optional
-        The solver's own multipliers of the rows; L = t_E - given . rows.
+    of_solver : (c,) ndarray, optional
+        The solver's multipliers of the rows; L = t_E - of_solver . rows.
 
     Returns
     -------
@@ -194,19 +205,19 @@ def multipliers_of(
         A collocation point is out of the branch's reach.
     """
     gradient = program.gradient(x)
-    sources = {"solver": given, "least squares": None}
-    if given is None:
+    sources = {"solver": of_solver, "least squares": None}
+    if of_solver is None:
         del sources["solver"]
     tried = []
     # A row that is near its bound without being active would count as one that takes over within any step.
     for near in (1e-8, 1e-7, 1e-6, 1e-5):
         active_set = ActiveSet.at(program, x, near)
-        for source, own in sources.items():
-            weights = active_set.weights_of(gradient, own)
-            rest = np.linalg.norm(gradient - weights @ active_set.slopes)
-            residual = float(rest / np.linalg.norm(gradient))
-            found = Multipliers(active_set, weights, source, residual)
+        for source, of_rows in sources.items():
+            weights = active_set.weights_of(gradient, of_rows)
+            unbalanced = np.linalg.norm(gradient - weights @ active_set.slopes)
+            residual = float(unbalanced / np.linalg.norm(gradient))
+            multipliers = Multipliers(active_set, weights, source, residual)
             if residual <= 1e-5:
-                return found
-            tried.append(found)
+                return multipliers
+            tried.append(multipliers)
     return min(tried, key=lambda multipliers: multipliers.residual)

@@ -137,7 +137,7 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     changes: defaultdict[Figure, float] = defaultdict(float)
     bounds: dict[Figure, Bound] = {}
     for phase, x in solved.program.split(solved.x):
-        timing = PhaseTiming.of(phase, x)
+        timing = PhaseTiming.of(phase, x, is_rough=True)
         if timing is None or timing.timing is None:
             continue
         evaluation = phase.evaluate(x)

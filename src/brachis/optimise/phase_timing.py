@@ -25,6 +25,8 @@ _ROUGH_AGREEMENT = 1e-3
 """Change of the time, as a part of it, with which a rough timing ends."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
+_FEW_PLACES = 2
+"""The same of a rough timing."""
 _LOSS_OF_SWITCHES = 0.1
 """What switches within steps between stations may cost together, in mean steps: that is 0.0025 % with 4000. Drives that
 take a slide to its speed within microseconds lost 0.01 % without, and their ramps could not be told from rest."""
@@ -64,12 +66,18 @@ class PhaseTiming:
         return self.timing.t_end if self.fixed_duration is None else self.fixed_duration
 
     @classmethod
-    def of(cls, phase: Phase, x: np.ndarray) -> PhaseTiming | None:
-        """Time the joint path of a phase; None where its speed is given, or where it cannot be evaluated."""
+    def of(
+        cls, phase: Phase, x: np.ndarray, *, is_rough: bool = False
+    ) -> PhaseTiming | None:
+        """Time the joint path of a phase; None where its speed is given, or where it cannot be evaluated.
+
+        Roughly it is timed once, at few places.
+        """
         if phase.time_law is not None:
             return None
         motion = phase.motion(x)
-        count = max(_LEAST_PLACES, -(-PLACES // phase.intervals))
+        least = _FEW_PLACES if is_rough else _LEAST_PLACES
+        count = max(least, -(-PLACES // phase.intervals))
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
 
         def lay(t: np.ndarray) -> PhaseTiming:
@@ -85,7 +93,7 @@ class PhaseTiming:
             return cls(course, rates, course.solve(rates))
 
         try:
-            return _resolve_ramps(lay, t)
+            return lay(t) if is_rough else _resolve_ramps(lay, t)
         except UnreachableError:
             return None
 
