@@ -55,7 +55,7 @@ def motion():
         ),
         (
             lambda: brachis.import_motion("a.csv"),
-            "robot.urdf: the URDF is missing; allowed: path of a URDF file",
+            "robot: the robot is missing; allowed: a URDF file",
         ),
         (
             lambda: brachis.plan("scara4", path=brachis.Line(by=[0.1, 0.0])),

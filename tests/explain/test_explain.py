@@ -66,7 +66,8 @@ def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
     moving = brachis.plan({**task, "path": path})
     least = seams.t_end - 0.5 - stop.saved
     assert moving.t_end > least - 0.01
-    text = f"without the stop at s = 0.6025 saves at most {100 * stop.saved / seams.t_end:.2g} %"
+    saved = f"saves no more than {100 * stop.saved / seams.t_end:.2g} %"
+    text = f"without the stop at s = 0.6025, along the same joint path, {saved}"
     assert text in str(seams.bottleneck())
 
 
@@ -75,6 +76,13 @@ def test_a_cause_has_one_row(seams):
     rows = [(entry.label, entry.side) for entry in entries]
     assert len(set(rows)) == len(rows)
     assert not [entry for entry in entries if "lead" in entry.label.kind]
+
+
+def test_a_check_leaves_process_speeds_out(seams):
+    checked = brachis.bottleneck.check_sensitivities(seams.candidate.optimum)
+    kinds = {entry.sensitivity.label.kind for entry in checked.entries}
+    assert kinds
+    assert not [kind for kind in kinds if "process speed" in kind]
 
 
 def test_a_broken_sensitivity_is_refused(seams, tmp_path):

@@ -101,7 +101,7 @@ REFUSED = [
         {"spline": {"through": [[1, 1, 1]], "joints": ["a", "b", "c"]}},
         r"spline\.joints.*'c'.*a, b, x",
     ),
-    ({"spline": {"through": [[1, 1]], "joints": ["a", "b"]}}, r"joints are missing"),
+    ({"spline": {"through": [[1, 1]], "joints": ["a", "b"]}}, r"not each named once"),
     (
         {"line": {"by": [1, 2, 3]}, "orientation": "fixed"},
         "needs a task space of poses",

@@ -35,38 +35,43 @@ def explain_motion(
     Returns
     -------
     Sensitivities
-        From timings of the motion's joint path where it was laid along one, and the optimum is none.
+        From timings of the joint path if splines were laid along its timing, and no program over time balances the
+        gradient.
 
     Raises
     ------
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    of_task = (*_list_dwells(problem), *stop_savings(problem, motion))
+    task_savings = [*_list_dwells(problem), *stop_savings(problem, motion)]
+    task_savings.sort(key=lambda saving: -saving.saved)
     program = optimum.program
     report = optimum.report
     is_timed = motion.report.solver == SOLVER
     if report.solver == SOLVER:
-        return replace(sensitivities_of_timing(motion), task=of_task)
+        return replace(sensitivities_of_timing(motion), task=tuple(task_savings))
     multipliers = multipliers_of(program, report.x, report.multipliers)
     if is_timed and multipliers.residual > _BALANCED:
-        return replace(sensitivities_of_timing(motion), task=of_task)
+        return replace(sensitivities_of_timing(motion), task=tuple(task_savings))
     costs = sensitivities_at(program, multipliers)
     lagrangian = Lagrangian(program, report.x, multipliers)
     speeds = speed_sensitivities(problem, lagrangian)
-    faster = motion.t_end / optimum.t_end
-    of_limits = (
-        replace(entry, derivative=faster * entry.derivative) for entry in costs.limits
+    time_ratio = motion.t_end / optimum.t_end
+    scaled_costs = (
+        replace(entry, derivative=time_ratio * entry.derivative)
+        for entry in costs.limits
     )
-    return replace(costs, limits=_join(of_limits, speeds), task=of_task)
+    return replace(
+        costs, limits=_merge_speed_costs(scaled_costs, speeds), task=tuple(task_savings)
+    )
 
 
-def _join(
-    of_limits: Iterable[Sensitivity], of_speeds: Iterable[Sensitivity]
+def _merge_speed_costs(
+    limit_costs: Iterable[Sensitivity], speed_costs: Iterable[Sensitivity]
 ) -> tuple[Sensitivity, ...]:
     """Join what the limits in the leads of process speeds cost with what these speeds cost themselves."""
-    joined = {(entry.label, entry.side): entry for entry in of_speeds}
-    for entry in of_limits:
+    joined = {(entry.label, entry.side): entry for entry in speed_costs}
+    for entry in limit_costs:
         figure = entry.label, entry.side
         derivative = entry.derivative
         if figure in joined:
@@ -75,11 +80,10 @@ def _join(
     return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))
 
 
-def _list_dwells(problem: Problem) -> tuple[TaskSaving, ...]:
-    """List what the task's waits take, the longest first."""
-    waits = [
+def _list_dwells(problem: Problem) -> list[TaskSaving]:
+    """List what the task's waits take."""
+    return [
         TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
         for leg in problem.legs
         if leg.dwell
     ]
-    return tuple(sorted(waits, key=lambda wait: -wait.saved))

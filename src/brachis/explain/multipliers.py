@@ -120,7 +120,10 @@ class ActiveSet:
 
         if not len(self.slopes):
             return np.empty(0)
-        return np.asarray(nnls(self.slopes.T, gradient)[0])
+        try:
+            return np.asarray(nnls(self.slopes.T, gradient)[0])
+        except RuntimeError:  # too many iterations
+            return np.zeros(len(self.slopes))
 
 
 @dataclass(frozen=True, eq=False)

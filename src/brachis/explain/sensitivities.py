@@ -58,7 +58,7 @@ def _figure(limit: Limit, bound: Bound) -> Figure:
 
 def label_of_speed(cause: str, speed: float, key: str) -> Label:
     """Name a speed, m/s, that holds on several parts of the path."""
-    return Label("tool", f"{cause} of {speed:.4g} m/s", "m/s", key, cause=cause)
+    return Label("tool", f"{cause} of {speed:.10g} m/s", "m/s", key, cause=cause)
 
 
 def sensitivities(solved: SolvedProgram) -> Sensitivities:

@@ -12,16 +12,16 @@ from brachis.problem.problem import Problem
 from brachis.timing import Course, TimedCourse
 from brachis.trajectory.sensitivities import TaskSaving
 
-_PLACES = 400
-"""Places at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
-_HALVINGS = 8
+_POINTS = 400
+"""Points at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
+_HALVINGS = 12
 """Halvings of the range in which the largest speed is looked for."""
-_LARGEST = 64.0
-"""Factor on the largest rate of the motion up to which it is looked for."""
+_RATE_RANGE = 64.0
+"""Factor on the largest rate of the motion, and its inverse, between which it is looked for."""
 
 
-def stop_savings(problem: Problem, motion: SolvedProgram) -> tuple[TaskSaving, ...]:
-    """Bound what the motion would gain along the same joint path without each of its stops, those that cost most first.
+def stop_savings(problem: Problem, motion: SolvedProgram) -> list[TaskSaving]:
+    """Bound what the motion would gain along the same joint path without each of its stops.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ def stop_savings(problem: Problem, motion: SolvedProgram) -> tuple[TaskSaving, .
         if not leg.stops:
             continue
         saved = _gain(*phases[number], -1) + _gain(*phases[number + 1], 0)
-        change = f"without the stop at s = {leg.end:.4g}"
+        change = f"without the stop at s = {leg.end:.4g}, along the same joint path,"
         savings.append(TaskSaving(change, saved, is_bound=True))
-    return tuple(sorted(savings, key=lambda saving: -saving.saved))
+    return savings
 
 
 def _gain(phase: Phase, x: np.ndarray, end: int) -> float:
@@ -46,7 +46,7 @@ def _gain(phase: Phase, x: np.ndarray, end: int) -> float:
         return 0.0
     curves = phase.motion(x)
     breaks = curves.breaks
-    t = spread(breaks, max(2, _PLACES // len(breaks)))
+    t = spread(breaks, max(2, _POINTS // len(breaks)))
     try:
         course = TimedCourse(
             Course(t, *curves.at(t)[:3]), phase.joint_map, phase.limits
@@ -58,10 +58,10 @@ def _gain(phase: Phase, x: np.ndarray, end: int) -> float:
     if at_rest is None:
         return 0.0
     least = at_rest.t_end
-    low = 0.0
-    high = _LARGEST * float(at_rest.rate.max())
+    low = float(at_rest.rate.max()) / _RATE_RANGE
+    high = float(at_rest.rate.max()) * _RATE_RANGE
     for _ in range(_HALVINGS):
-        rates[end] = (low * high) ** 0.5 if low else high / _LARGEST
+        rates[end] = (low * high) ** 0.5
         timing = course.solve((rates[0], rates[1]))
         if timing is None:
             high = rates[end]

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -187,9 +188,10 @@ def refine_mesh(
         nonlocal is_lost
         tried = attempt_once(solve, program, x, accept_early_end=True)
         is_lost = not tried.usable
-        if not is_lost or deadline.passed or not isinstance(solve, SolverSession):
+        other = solve.for_large if isinstance(solve, SolverSession) else None
+        if not is_lost or deadline.passed or other is None:
             return tried
-        session = replace(solve, backend=solve.for_large or solve.backend)
+        session = replace(cast(SolverSession, solve), backend=other)
         again = attempt_once(session, program, x, accept_early_end=True)
         is_lost = not again.usable
         return replace(again, reports=(*tried.reports, *again.reports))

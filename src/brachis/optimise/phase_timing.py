@@ -71,7 +71,7 @@ class PhaseTiming:
     ) -> PhaseTiming | None:
         """Time the joint path of a phase; None where its speed is given, or where it cannot be evaluated.
 
-        Roughly it is timed once, at few places.
+        Roughly: once, without resolving ramps, and at fewer places in each of many intervals.
         """
         if phase.time_law is not None:
             return None

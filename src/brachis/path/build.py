@@ -165,7 +165,7 @@ class JointCoordinates(RowCoordinates):
         check_names("joint", names, own, where)
         if sorted(names) != sorted(own):
             raise PathError(
-                "joints are missing",
+                "the joints are not each named once",
                 found=list(names),
                 allowed=", ".join(own),
                 where=where,

@@ -68,7 +68,7 @@ class PlannedMotion(Summary):
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """What limits, process speeds and dwells cost, from the multipliers of the plan."""
+        """What limits, process speeds, dwells and stops cost, from the multipliers of the plan."""
         candidate = self.candidate
         return explain_motion(candidate.problem, candidate.refined, candidate.optimum)
 

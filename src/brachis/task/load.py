@@ -284,9 +284,12 @@ def task_from(
     if changes:
         content = with_keys(content, changes)
     source = _name_source(source, changes)
-    content = with_limits_of_file(content, source, folder)
-    content = with_scene_of_file(content, source, folder)
-    task = validate(Task, content, source)
+    try:
+        content = with_limits_of_file(content, source, folder)
+        content = with_scene_of_file(content, source, folder)
+        task = validate(Task, content, source)
+    except RecursionError:
+        raise TaskError("the task contains itself", where=source) from None
     task = _with_start(expand_csv_files(task, source, folder), source)
     return _with_absolute_files(task, folder)
 

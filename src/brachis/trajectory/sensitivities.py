@@ -17,7 +17,7 @@ _STATIONARY = 1e-3
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one figure of a limit costs.
+    """What one figure of a limit, or a process speed, costs.
 
     Attributes
     ----------
@@ -64,16 +64,16 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class TaskSaving:
-    """What a change of the task saves that is no limit: a process speed, a dwell, a stop.
+    """What a change of the task saves that is no limit: without a dwell, or a stop.
 
     Attributes
     ----------
     change : str
-        In words, for example ``10 % more process speed at s = 0.1 to 0.5 (0.02 m/s)``.
+        In words, for example ``without the dwell at s = 0.3``.
     saved : float
         By how much the motion gets shorter, s.
     is_bound : bool
-        Whether it saves no more than that; otherwise about that.
+        Whether it saves no more than that along the same joint path; otherwise that is what it saves.
     """
 
     change: str
@@ -115,7 +115,7 @@ class Sensitivities(Summary):
     Attributes
     ----------
     limits : tuple of Sensitivity
-        All figures of all limits but safeguards, the costliest first.
+        All figures of all limits but safeguards, and process speeds, the costliest first.
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str

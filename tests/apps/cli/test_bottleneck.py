@@ -8,6 +8,7 @@ import re
 
 import pytest
 
+import brachis
 from brachis import planner
 from brachis.apps import plots
 from brachis.errors import InputError
@@ -37,6 +38,17 @@ def test_in_plain_words(run, task, write):
     )
     assert "reference" not in outcome.out
     assert "checked" not in outcome.out
+
+
+def test_of_a_planned_file_nothing_is_solved_again(run, task, write, tmp_path):
+    task["spline"]["intervals"] = 10
+    assert run("plan", write(task), "--out", tmp_path / "out", "--no-figures").code == 0
+    file = tmp_path / "out/result.npz"
+    assert brachis.Trajectory.load(file).sensitivities.reliable
+    outcome = run("bottleneck", file, "--verbose")
+    assert outcome.code == 0, outcome.err
+    assert "more torque at j1" in outcome.out
+    assert "solving the problem" not in outcome.err
 
 
 def test_check_and_reference(run, task, write):

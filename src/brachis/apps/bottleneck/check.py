@@ -34,6 +34,7 @@ from brachis.explain import (
     multipliers_of,
     sensitivities,
 )
+from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.backends import SolverOptions, residual, solvers_for
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
@@ -188,8 +189,8 @@ def check_sensitivities(
         figures = figures_of(program)
         for entry in (predictions or sensitivities(refined)).limits:
             bounds = figures.get((entry.label, entry.side))
-            if bounds is None:  # a process speed, which is no limit of the program
-                continue
+            if bounds is None or entry.label.cause == PROCESS_SPEED:
+                continue  # s(t) follows from the speed: no row of the program stands for it
             # If a limit changes nothing, the answer stays an optimum.
             if abs(entry.change(step)) <= 1e-9 * t_end(base):
                 same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True)

@@ -1,4 +1,4 @@
-"""The optimisation problem of a motion, solved again: what a saved motion, or a timed one, has no multipliers of.
+"""The optimisation problem of a saved motion, solved again: for files without sensitivities, and for checks.
 
 Task, URDF, redundant joints and branch (or the chart), knots and control points are saved. The problem is built over
 these knots, with the branch margin that the motion keeps, solved from the saved control points and refined as in a

@@ -146,15 +146,14 @@ def report(
     Parameters
     ----------
     motion : Result, Trajectory or path
-        Of `brachis.plan`; or a trajectory, a loaded one for example, or its file, whose problem is solved again
-        (`solve_again`).
+        Of `brachis.plan`; or a trajectory, or its file. Without saved sensitivities, or with `check` or `reference`,
+        its problem is solved again (`solve_again`).
     check : bool, optional
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
         Plan again with discontinuous torque allowed on a fine mesh: the best value known, not a proven bound.
     families, own_limits : sequence, optional
-        Those with which the motion was planned, as of `brachis.plan`; they are not saved with it. A result needs them
-        only if its solver was the timing of the joint path.
+        Those with which the motion was planned, as of `brachis.plan`; they are not saved with it.
     listener : callable, optional
         Is told what is being done, in one line of text.
 
@@ -165,8 +164,7 @@ def report(
     Raises
     ------
     InputError
-        The result was made without keeping its solved program; a trajectory's closed form is not known here; or
-        families or limits are not valid.
+        A trajectory's closed form is not known here; or families or limits are not valid.
     PlanningError
         A trajectory is not an optimum of its problem; or, with `check`, no solver could solve the problem again.
 
@@ -261,7 +259,7 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
         for entry in found.limits
     ]
     for entry in found.task:
-        words = "saves at most" if entry.is_bound else "saves"
+        words = "saves no more than" if entry.is_bound else "saves"
         savings.append((entry.saved, f"{entry.change} {words}"))
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]

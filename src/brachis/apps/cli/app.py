@@ -24,6 +24,7 @@ from brachis.errors import (
     InputError,
     ResultFileError,
     TaskError,
+    check_names,
 )
 
 _EPILOG = """
@@ -343,6 +344,9 @@ def urdf_of(given: Path) -> Path:
     Raises
     ------
     UnknownNameError
-        There is no file of this name, but a robot of a name like it.
+        There is neither a file nor a robot of this name.
     """
-    return Path(brachis.robots.locate(str(given)))  # type: ignore[arg-type]
+    if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
+        return given
+    check_names("URDF file or robot", [str(given)], brachis.robots.names(), "URDF")
+    return brachis.robots.path_of(str(given))

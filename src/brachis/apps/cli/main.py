@@ -6,6 +6,7 @@ also for an error. The exit codes are in `brachis.apps.cli.app`.
 
 from __future__ import annotations
 
+import errno
 import sys
 import traceback
 from collections.abc import Callable
@@ -30,6 +31,9 @@ from brachis.errors import BrachisError
 
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
 """Base class of Typer's errors for wrong options; Typer does not export it."""
+
+_UNWRITABLE = {errno.ENOSPC, errno.EPIPE, errno.EBADF, errno.EIO}
+"""Errors of streams that cannot be written."""
 
 _COMMANDS: tuple[Callable[..., None], ...] = (
     starting.robots,
@@ -100,7 +104,8 @@ def _run(*, as_json: bool) -> int:
     except _UsageError as error:
         return print_usage_error(error, as_json=as_json)
     except Exception as error:
-        if isinstance(error, OSError) and error.filename is None:
+        is_unnamed = isinstance(error, OSError) and error.filename is None
+        if is_unnamed and cast(OSError, error).errno in _UNWRITABLE:
             raise
         if get_verbosity() is Verbosity.VERBOSE:
             traceback.print_exc()

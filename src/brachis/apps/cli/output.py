@@ -117,11 +117,16 @@ def _widths(least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
     """Print the checks, one a row."""
+    from brachis.verify import POSITION_SCALE
+
     verdict = "passed" if verification.passed else "FAILED"
     rows = []
+    scales = []
     for check in verification.checks:
         outcome = "ok" if check.passed else "FAILED"
-        if check.remark:
+        if check.remark == POSITION_SCALE:
+            scales.append(f"{check.name}: {check.remark}")
+        elif check.remark:
             outcome += f" ({check.remark})"
         time_text = "" if check.time is None else f"{check.time:.4f}"
         figures = check.figures(degrees=degrees)
@@ -132,6 +137,7 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
         rows,
         numbers=("worst", "allowed", "time [s]"),
     )
+    print_lines(*scales)
     print_lines(*(f"{each.name}: {each.in_words()}" for each in verification.margins))
 
 
@@ -268,7 +274,11 @@ def show_progress() -> Iterator[Callable[[str], None]]:
     was loaded.
     """
     verbosity = get_verbosity()
-    console = Console(stderr=True, quiet=verbosity is not Verbosity.NORMAL)
+    is_shown = verbosity is Verbosity.NORMAL
+    # On a terminal a quiet console would swallow what others write beside it.
+    console = Console(
+        stderr=True, quiet=not is_shown, force_terminal=None if is_shown else False
+    )
     with console.status("working") as status:
 
         def show(text: str) -> None:

@@ -91,7 +91,7 @@ def plan(
         drawings["fit.png"] = lambda: plots.plot_fit(trajectory)
     code = finish(
         data,
-        {"result.npz": trajectory.save},
+        {"result.npz": result.save},
         drawings if figures else {},
         out=out,
         names=_PLANNED,

@@ -129,7 +129,7 @@ def compare(
     drawings: dict[str, Drawing] = {"comparison.png": lambda: plot_both_motions(found)}
     code = finish(
         found.to_dict(),
-        {"today.npz": found.recorded.save, "result.npz": found.result.trajectory.save},
+        {"today.npz": found.recorded.save, "result.npz": found.result.save},
         drawings if figures else {},
         out=out,
         names=_FILES,

@@ -184,6 +184,12 @@ def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
         robot = None
     settings = None if task is None else load_task(task)
     robot_settings = settings.robot if settings else RobotSettings()
+    if robot is None and robot_settings.urdf is None:
+        raise InputError(
+            "the robot is missing",
+            where="robot",
+            allowed="a URDF file, the name of a robot (brachis.robots), a Robot, or a task file",
+        )
     with name_task_file(None if robot is not None else task):
         return robot_for(locate(robot), robot_settings), settings  # type: ignore[arg-type]
 

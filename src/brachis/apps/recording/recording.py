@@ -294,8 +294,9 @@ def _moving_rows(
     first = _first_row(t, q, rounding)
     end = len(t) - _first_row(-t[::-1], q[::-1], rounding)
     if end - first < FEWEST_ROWS:
+        moves = f"moves in fewer than {FEWEST_ROWS} rows"
         raise TaskError(
-            f"the robot moves in fewer than {FEWEST_ROWS} rows",
+            f"the robot {'does not move' if first == len(t) else moves}",
             found=write_count(len(t), "row"),
             allowed=f"{FEWEST_ROWS} or more rows in which a joint moves",
             where=str(source),
