@@ -3,11 +3,12 @@
 from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.from_curve import bspline_segment, with_feed_rates
 from brachis.path.legs import Leg, legs_of, with_held_speeds
-from brachis.path.protocol import PathSample
+from brachis.path.protocol import Curve, PathSample
 from brachis.path.sequence import Path, check_closed, path_speed
 from brachis.path.time_law import TimeLaw, time_law_of
 
 __all__ = [
+    "Curve",
     "Leg",
     "Path",
     "PathSample",
