@@ -104,6 +104,7 @@ def improve(
     go_on_above: float | None = -np.inf,
     judge: Callable[[SolvedProgram], float] | None = None,
     deadline: Deadline = NEVER,
+    if_lost: str = "",
 ) -> SolvedProgram:
     """Try changes of a solved program in turn, and keep the better motion each time.
 
@@ -125,6 +126,8 @@ def improve(
         of a solve that ended well.
     deadline : Deadline, optional
         No change is tried after it.
+    if_lost : str, optional
+        What is left undone, in words, if the last change gave no motion.
 
     Returns
     -------
@@ -153,6 +156,7 @@ def improve(
         else:
             incumbent = replace(incumbent, reports=with_last(incumbent.report, reports))
         if was_usable and go_on_above is not None and not gain > go_on_above:
+            not_completed = "" if tried.usable else if_lost
             break
     return replace(incumbent, not_completed=not_completed)
 
@@ -179,6 +183,19 @@ def attempt_once(
     if accept_early_end:
         report = judge_early_end(report, program.end_time(x))
     return SolvedProgram(program, (report,))
+
+
+def attempt_in_turn(
+    solves: Sequence[Solve], program: Program, x: np.ndarray
+) -> SolvedProgram:
+    """Attempt one solve after the other from x, (v,), until one gives a faster motion; see `attempt_once`."""
+    reports: tuple[SolverReport, ...] = ()
+    for solve in solves:
+        tried = attempt_once(solve, program, x, accept_early_end=True)
+        reports = (*reports, *tried.reports)
+        if tried.usable:
+            break
+    return replace(tried, reports=reports)
 
 
 _EARLY = (
@@ -365,3 +382,10 @@ class SolverSession:
         if report.status.usable or report.violation > self.acceptable:
             return report
         return replace(report, status=SolveStatus.ACCEPTABLE)
+
+
+def solves_in_turn(solve: Solve) -> list[Solve]:
+    """List a solve, and of a session the same with its solver for large programs, where it has another."""
+    if not isinstance(solve, SolverSession) or solve.for_large in (None, solve.backend):
+        return [solve]
+    return [solve, replace(solve, backend=solve.for_large)]

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import cast
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -28,10 +27,11 @@ from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import (
     Solve,
     SolvedProgram,
-    SolverSession,
+    attempt_in_turn,
     attempt_once,
     improve,
     judge_early_end,
+    solves_in_turn,
     with_last,
 )
 from brachis.optimise.phase import Phase
@@ -39,7 +39,7 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
-FEW_INTERVALS = 12
+_FEW_INTERVALS = 12
 """Least number of intervals of a phase over which a solve begins."""
 _SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
@@ -104,7 +104,7 @@ def _transfer(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    counts = [phase.intervals / FEW_INTERVALS for phase in program.phases]
+    counts = [phase.intervals / _FEW_INTERVALS for phase in program.phases]
     halvings = [int(np.log2(max(count, 1.0))) for count in counts]
     for k in range(max(halvings), 0, -1):
         pairs = zip(program.phases, halvings, strict=True)
@@ -128,7 +128,7 @@ COARSE_INTERVALS = 10
 """Intervals with which a mesh begins."""
 _FEW_VARIABLES = 150
 """Up to so many it is cheap to halve every interval, in case the wrong ones were thought to lose most."""
-_MOST_VARIABLES = 2 * _FEW_VARIABLES
+_MOST_VARIABLES = 300
 """Solves with more take seconds each, and gain some 0.1 %."""
 _COARSER = "the mesh is coarser than spline.tolerance asks for"
 
@@ -181,23 +181,8 @@ def refine_mesh(
             return _COARSER
         return None if finer.variables == program.variables else (finer, x)
 
-    is_lost = False
-
-    def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
-        """Solve with one solver, and if that gives no motion, with the one for large programs."""
-        nonlocal is_lost
-        tried = attempt_once(solve, program, x, accept_early_end=True)
-        is_lost = not tried.usable
-        other = solve.for_large if isinstance(solve, SolverSession) else None
-        if not is_lost or deadline.passed or other is None:
-            return tried
-        session = replace(cast(SolverSession, solve), backend=other)
-        again = attempt_once(session, program, x, accept_early_end=True)
-        is_lost = not again.usable
-        return replace(again, reports=(*tried.reports, *again.reports))
-
-    finest = improve(solved, [halve] * 20, attempt)
-    return replace(finest, not_completed=_COARSER) if is_lost else finest
+    attempt = partial(attempt_in_turn, solves_in_turn(solve))
+    return improve(solved, [halve] * 20, attempt, if_lost=_COARSER)
 
 
 def _choose_intervals(

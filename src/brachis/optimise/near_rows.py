@@ -34,9 +34,10 @@ _LEAST_KEPT = 0.2
 """Part of the rows, the nearest ones, that is kept whatever their distance: too few let the end time collapse."""
 _MOST_KEPT = 0.6
 """Part of the rows: if more are near, leaving out the others gains nothing."""
-_LARGEST_VIOLATION = 0.5
-"""Violation of a first point, or of the rows left out at an answer, above which all rows are needed: it is no fast
-motion, or another one."""
+_FIRST_VIOLATION = 0.5
+"""Largest violation of a first point that counts as a fast motion."""
+_LAST_VIOLATION = 0.5
+"""Violation of other rows above which an answer is another motion: then all rows are needed."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
 _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
@@ -115,7 +116,7 @@ def solve_near_rows(
         Of the program with all its rows.
     """
     slack = row_slack(program, x)
-    if slack.min() < -_LARGEST_VIOLATION:
+    if slack.min() < -_FIRST_VIOLATION:
         return solve(program, x)
     is_curved = program.curvature(x) is not None
     needed = _ROWS_IF_CURVED if is_curved else _ROWS_A_VARIABLE
@@ -133,7 +134,7 @@ def solve_near_rows(
         is_over = report.status in _FINAL
         if is_over or (report.status.usable and not len(missing)):
             return _complete(program, numbers, reports)
-        if not report.status.usable or slack.min() < -_LARGEST_VIOLATION:
+        if not report.status.usable or slack.min() < -_LAST_VIOLATION:
             break
         numbers = np.union1d(numbers, np.flatnonzero(slack < _NEAR))
         x = report.x

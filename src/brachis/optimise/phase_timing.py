@@ -19,7 +19,7 @@ PLACES = 4000
 """Places at which a joint path is timed, no fewer: with half of them splines were up to 0.4 % slower."""
 _PLACES_A_PIECE = 24
 """Places in every piece of a path, unless there are very many of these."""
-_MOST_PLACES = 10 * PLACES
+_MOST_PLACES = 40_000
 """Places in all pieces together, about."""
 _ROUGH_AGREEMENT = 1e-3
 """Change of the time, as a part of it, with which a rough timing ends."""

@@ -278,8 +278,9 @@ def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
 
 
 _LONGEST = 0.01
-"""Fraction by which a motion may get slower where nothing else makes the limits hold. A shorter time is not looked for
-within this fraction of one that is too short."""
+"""Fraction by which a motion may get slower where nothing else makes the limits hold."""
+_CLOSE = 1.01
+"""Ratio of a time that is long enough to one that is too short, at which no shorter one is looked for."""
 _LONGEST_IF_LATE = 1.0
 """The same where the time is up: a slower motion within the limits is better than none."""
 _RELIEF = 4.0
@@ -408,7 +409,7 @@ def _lengthen(
         if violation > 0.99 * before:
             break
     # Jerks fall with the third power of the time: less may be enough.
-    while best[1] <= goal and best[0] > (1.0 + _LONGEST) * too_short:
+    while best[1] <= goal and best[0] > _CLOSE * too_short:
         factor = np.sqrt(best[0] * too_short)
         violation, _ = violations(dense, dense.scale_time(x, factor), goal)
         if violation <= goal:

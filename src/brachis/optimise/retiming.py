@@ -15,7 +15,6 @@ from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.mesh import FEW_INTERVALS
 from brachis.optimise.path_program import (
     PathPhase,
     PathProgram,
@@ -39,6 +38,8 @@ _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
 ROUGH_MARGIN = 0.02
 """Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
+_FEWEST = 12
+"""Intervals of a phase over which a search over time begins, no fewer if its timing needs as many."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,7 @@ def begin_with_timing(
     for phase, phase_timing in zip(program.phases, timings, strict=True):
         if phase_timing is None or phase_timing.timing is None:
             return None
-        share = max(FEW_INTERVALS, int(intervals * phase_timing.t_end / total))
+        share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
         begun, x_of_phase = begin(
             phase, phase_timing, phase_timing.timing, lost, share, points
         )

@@ -17,10 +17,13 @@ from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.boundary import Boundary, EndCondition
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
-from brachis.optimise.mesh import COARSE_INTERVALS, FEW_INTERVALS
+from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.problem.problem import Problem
+
+_FOR_SPEEDS = 12
+"""Intervals of the first mesh of every phase, where a speed is given; with 20 plans took two to three times as long."""
 
 
 def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:
@@ -153,7 +156,6 @@ def breaks_of(problem: Problem) -> np.ndarray:
     """Return the ends of a phase's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
     count = problem.task.spline.intervals
     if count == "auto":
-        # The way to a given speed may be short: over fewer intervals no motion reaches it. With 20 plans took two to
-        # three times as long.
-        count = FEW_INTERVALS if any(problem.time_laws) else COARSE_INTERVALS
+        # The way to a given speed may be short: over few intervals no motion reaches it.
+        count = _FOR_SPEEDS if any(problem.time_laws) else COARSE_INTERVALS
     return np.linspace(0.0, 1.0, count + 1)
