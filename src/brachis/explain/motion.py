@@ -43,16 +43,17 @@ def explain_motion(
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    task_savings = [*_list_dwells(problem), *stop_savings(problem, motion)]
-    task_savings.sort(key=lambda saving: -saving.saved)
+    savings = [*_list_dwells(problem), *stop_savings(problem, motion)]
+    savings.sort(key=lambda saving: -saving.saved)
+    of_task = tuple(savings)
     program = optimum.program
     report = optimum.report
     is_timed = motion.report.solver == SOLVER
     if report.solver == SOLVER:
-        return replace(sensitivities_of_timing(motion), task=tuple(task_savings))
+        return replace(sensitivities_of_timing(motion), task=of_task)
     multipliers = multipliers_of(program, report.x, report.multipliers)
     if is_timed and multipliers.residual > _BALANCED:
-        return replace(sensitivities_of_timing(motion), task=tuple(task_savings))
+        return replace(sensitivities_of_timing(motion), task=of_task)
     costs = sensitivities_at(program, multipliers)
     lagrangian = Lagrangian(program, report.x, multipliers)
     speeds = speed_sensitivities(problem, lagrangian)
@@ -61,9 +62,7 @@ def explain_motion(
         replace(entry, derivative=time_ratio * entry.derivative)
         for entry in costs.limits
     )
-    return replace(
-        costs, limits=_merge_speed_costs(scaled_costs, speeds), task=tuple(task_savings)
-    )
+    return replace(costs, limits=_merge_speed_costs(scaled_costs, speeds), task=of_task)
 
 
 def _merge_speed_costs(

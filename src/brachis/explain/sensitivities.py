@@ -35,7 +35,7 @@ _RAISED = 1e-3
 """Part by which limits are raised."""
 _NEAR = 0.02
 """Part of a limit within which a joint path may be held back by it."""
-_COSTS = 1e-9
+_LEAST_COST = 1e-9
 """s; a branch boundary that costs less is not listed."""
 
 
@@ -91,7 +91,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
             rates[program.rows_of(limit)[:, bound.column]] = bound.per_unit
         if is_safeguard(limit):
             cost = -multipliers.change(rates)
-            if cost > _COSTS:
+            if cost > _LEAST_COST:
                 boundaries.append(BranchBoundary(label.subject, bound.figure, cost))
             continue
         rows_side = {None: None, "lower": 1.0, "upper": -1.0}[side]
@@ -151,7 +151,7 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
                 is_relieved = is_near and limit.longer_time == "relieves"
                 bounds[figure] = bound
                 changes[figure] += (
-                    _time_raised(timing, limit, bound) if is_relieved else 0.0
+                    _change_if_raised(timing, limit, bound) if is_relieved else 0.0
                 )
     costs = [
         _sensitivity(label, bound, changes[label, side] / (_RAISED * bound.full_scale))
@@ -160,7 +160,7 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     return Sensitivities(_costliest_first(costs), (), TIMINGS, 0.0, unique=True)
 
 
-def _time_raised(timing: PhaseTiming, limit: Limit, bound: Bound) -> float:
+def _change_if_raised(timing: PhaseTiming, limit: Limit, bound: Bound) -> float:
     """Change of the least time of a joint path, s, if a bound is moved outwards."""
     before = timing.timing
     assert before is not None

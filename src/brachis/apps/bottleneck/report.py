@@ -33,7 +33,7 @@ from brachis.robot.custom_limits import LimitModel
 from brachis.robot.joints import shown_unit
 from brachis.search.given_motion import narrow_motion
 from brachis.timing import TimingGap, find_timing_gap
-from brachis.trajectory import Trajectory, phase_rows
+from brachis.trajectory import Trajectory, motion_of, phase_rows
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -92,6 +92,9 @@ class BottleneckReport:
             lines += _timing(self.timing, self.t_end)
         if self.check is not None:
             lines += _check_lines(self.check)
+            costs = self.sensitivities
+            if costs is not None and len(costs.limits) > len(self.check.entries):
+                lines.append("process speeds are not checked")
         lines += write_active(self.saturations)
         rows = phase_rows([each.phase for each in self.phases])
         if len(rows) > 1:
@@ -178,7 +181,7 @@ def report(
     """
     if isinstance(motion, str | os.PathLike):
         motion = Trajectory.load(motion)
-    trajectory = motion if isinstance(motion, Trajectory) else motion.trajectory
+    trajectory = motion_of(motion, "motion")
     if trajectory.recovered is not None:
         if check or reference:
             raise InputError(
@@ -232,6 +235,8 @@ def report(
 
 _FRACTION = 0.1
 """By which limits are raised in the sentences on what they cost."""
+_FRACTION_OF_RANGE = 0.01
+"""The same of an end of a range: of 10 % of a range a weld gained a seventh of what was said."""
 _NOTHING = 1e-5
 """Fraction of t_E; what saves less has no sentence."""
 
@@ -255,7 +260,7 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
             "motion is not an optimum, and the savings below are rough"
         )
     savings = [
-        (_saved(entry), f"{_more_room(entry, degrees=degrees)} saves")
+        (_predict_saving(entry), f"{_more_room(entry, degrees=degrees)} saves")
         for entry in found.limits
     ]
     for entry in found.task:
@@ -282,10 +287,15 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     return lines
 
 
-def _saved(entry: Sensitivity) -> float:
+def _predict_saving(entry: Sensitivity) -> float:
     """Predict what more room at one limit saves, s; where a speed is given, time goes as its inverse."""
-    saved = -entry.change(_FRACTION)
+    saved = -entry.change(_fraction_of(entry))
     return saved / (1.0 + _FRACTION) if entry.label.cause else saved
+
+
+def _fraction_of(entry: Sensitivity) -> float:
+    """By which part of its full scale a figure is changed in its sentence: other limits soon take over from a range."""
+    return _FRACTION if entry.side is None else _FRACTION_OF_RANGE
 
 
 def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
@@ -293,7 +303,7 @@ def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
     label = entry.label
     end = entry.side
     unit, factor = shown_unit(label.unit, degrees=degrees)
-    amount = f"{factor * _FRACTION * entry.full_scale:.3g} {unit}"
+    amount = f"{factor * _fraction_of(entry) * entry.full_scale:.3g} {unit}"
     if label.cause:
         faster = (1.0 + _FRACTION) * entry.figure
         return f"a {label.cause} of {faster:.4g} {unit} in place of {entry.figure:.4g} {unit}"
