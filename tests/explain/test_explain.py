@@ -67,7 +67,7 @@ def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
     least = seams.t_end - 0.5 - stop.saved
     assert moving.t_end > least - 0.01
     saved = f"saves no more than {100 * stop.saved / seams.t_end:.2g} %"
-    text = f"without the stop at s = 0.6025, along the same joint path, {saved}"
+    text = f"with a blend in place of the stop at s = 0.6025, along the same joint path, {saved}"
     assert text in str(seams.bottleneck())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.optimise.improve import SolvedProgram
@@ -35,9 +36,22 @@ def stop_savings(problem: Problem, motion: SolvedProgram) -> list[TaskSaving]:
         if not leg.stops:
             continue
         saved = _gain(*phases[number], -1) + _gain(*phases[number + 1], 0)
-        change = f"without the stop at s = {leg.end:.4g}, along the same joint path,"
+        way = "with a blend in place of" if _is_corner(problem, number) else "without"
+        change = f"{way} the stop at s = {leg.end:.4g}"
         savings.append(TaskSaving(change, saved, is_bound=True))
     return savings
+
+
+def _is_corner(problem: Problem, number: int) -> bool:
+    """Tell whether the path changes its direction where a leg ends."""
+    s = np.array([problem.legs[number].end])
+    before, after = (
+        path.sample(s).xi[0] for path in problem.leg_paths[number : number + 2]
+    )
+    change = np.linalg.norm(
+        before / np.linalg.norm(before) - after / np.linalg.norm(after)
+    )
+    return bool(change > tolerances.ANGLE)
 
 
 def _gain(phase: Phase, x: np.ndarray, end: int) -> float:

@@ -264,8 +264,9 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
         for entry in found.limits
     ]
     for entry in found.task:
-        words = "saves no more than" if entry.is_bound else "saves"
-        savings.append((entry.saved, f"{entry.change} {words}"))
+        bound = ", along the same joint path, saves no more than"
+        words = bound if entry.is_bound else " saves"
+        savings.append((entry.saved, entry.change + words))
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
     lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
