@@ -1,8 +1,7 @@
-"""What process speeds cost: they are no limits but give s(t), so that no row of a program has their multiplier.
+"""What process speeds cost. They give s(t) and bound nothing: no row of a program has their multiplier.
 
-With the Lagrangian L = t_E - sum w_i p_i of an optimum, and a figure that changes what x means, dt_E is the change of L
-where the variables stay: those that are given change with the figure, and the others change t_E by nothing to first
-order.
+At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is the
+change of L when the speed changes and the free variables stay; durations that follow from the speed change with it.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class TaskSaving:
-    """What a change of the task saves that is no limit: without a dwell, or a stop.
+    """What the motion would gain without a dwell, or without a stop.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Sensitivities(Summary):
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str
-        Origin of the multipliers: ``"solver"`` or ``"least squares"``; or ``"timings"`` where there are none.
+        Origin of the multipliers: ``"solver"`` or ``"least squares"``; or ``"timings"`` in place of multipliers.
     residual : float
         Part of the gradient of t_E that they do not balance; an optimum has 0.
     unique : bool
