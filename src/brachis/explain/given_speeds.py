@@ -1,7 +1,7 @@
 """What process speeds cost. They give s(t) and bound nothing: no row of a program has their multiplier.
 
-At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is the
-change of L when the speed changes and the free variables stay; durations that follow from the speed change with it.
+At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is
+the change of L when the speed changes and the free variables stay; durations that follow from the speed change with it.
 """
 
 from __future__ import annotations
