@@ -28,7 +28,7 @@ from brachis.optimise.backends import (
     residual,
     solver_for_large,
 )
-from brachis.optimise.near_rows import NearRows, solve_near_rows
+from brachis.optimise.near_rows import NearRows, solve_near_rows, solve_near_values
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
 from brachis.task import SolverSettings
@@ -367,9 +367,10 @@ class SolverSession:
             self._last[:] = [report]
             return replace(report, learnt=None)  # results stay small
 
-        is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM
-        if is_large and self.for_large not in (None, self.backend):
-            report = self._accept(solve_with(self.for_large, program, x))
+        is_large = len(x) > _LARGE_PROGRAM and self.for_large is not self.backend
+        if isinstance(program, PathProgram) and is_large and self.for_large:
+            solve = partial(solve_with, self.for_large)
+            report = self._accept(solve_near_values(program, x, solve))
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)

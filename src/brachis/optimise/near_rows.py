@@ -3,12 +3,16 @@
 From a motion that is nearly as fast as possible most limits stay far away: at a time one or two of them hold the motion
 back. A solver's effort grows with all rows that it is given. So it is given those near their bounds, and all are
 checked at its answer; those that are violated then are added, and it goes on from there.
+
+An interior-point method leaves the bounds at first. It needs the rows of whole values, such as a joint's torque all
+along the path, where these come near a bound anywhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -38,6 +42,9 @@ _FIRST_VIOLATION = 0.5
 """Largest violation of a first point that counts as a fast motion."""
 _LAST_VIOLATION = 0.5
 """Violation of other rows above which an answer is another motion: then all rows are needed."""
+_NEAR_ANYWHERE = 0.3
+"""Distance from its bound up to which a value is near, if it is anywhere: of 13 solves over the path all but one ended
+with no other value violated, in 0.4 of the time; with 0.5, and with rows near their bounds, in 0.9 of it."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
 _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
@@ -139,6 +146,49 @@ def solve_near_rows(
         numbers = np.union1d(numbers, np.flatnonzero(slack < _NEAR))
         x = report.x
     return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
+
+
+class HasValues(Problem, Protocol):
+    """A problem whose rows are values of limits at places, one place after the other."""
+
+    value_numbers: np.ndarray
+
+
+def solve_near_values(
+    program: HasValues,
+    x: np.ndarray,
+    solve: Callable[[Problem, np.ndarray], SolverReport],
+) -> SolverReport:
+    """Solve a program from a point, with the values that come near their bounds anywhere.
+
+    Parameters
+    ----------
+    program : HasValues
+        Its ``value_numbers``, (c,), tell of which value each row is.
+    x : (v,) ndarray
+    solve : callable
+        ``solve(problem, x)`` returns a `SolverReport`.
+
+    Returns
+    -------
+    SolverReport
+        Of the program with all its rows; some may be violated after many rounds.
+    """
+    values = program.value_numbers
+    is_near = np.zeros(1 + values.max(), dtype=bool)
+    is_near[values[row_slack(program, x) <= _NEAR_ANYWHERE]] = True
+    reports: list[SolverReport] = []
+    for _ in range(_ROUNDS):
+        numbers = np.flatnonzero(is_near[values])
+        report = solve(NearRows(program, numbers), x)
+        reports.append(report)
+        x = report.x
+        slack = row_slack(program, x)
+        is_missing = (slack < -FEASIBLE) & ~is_near[values]
+        if not report.status.usable or not is_missing.any():
+            break
+        is_near[values[slack <= _NEAR_ANYWHERE]] = True
+    return _complete(program, numbers, reports)
 
 
 def _complete(

@@ -295,6 +295,12 @@ class PathPhase:
         """Upper bounds, (c,)."""
         return self._bounds[1].ravel()
 
+    @property
+    def value_numbers(self) -> np.ndarray:
+        """Number of the limits' value that each row holds at a place, (c,)."""
+        places, values = self._bounds.shape[1:]
+        return np.tile(np.arange(values), places)
+
     def time(self, x: np.ndarray) -> float:
         """Time, s."""
         rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
@@ -382,8 +388,18 @@ class PathProgram(PhaseSequence[PathPhase]):
             columns.append(phase.jacobian_columns + column)
             row += len(phase.lower)
         numbers = row + np.arange(len(self._pairs))
+        self.value_numbers = self._number_values()
         self.jacobian_rows = np.concatenate([*rows, np.repeat(numbers, 2)])
         self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
+
+    def _number_values(self) -> np.ndarray:
+        """Give each value of a phase, and each join, a number, and tell that of every row, (c,)."""
+        numbers = []
+        first = 0
+        for phase in self.phases:
+            numbers.append(first + phase.value_numbers)
+            first = 1 + int(numbers[-1].max(initial=first - 1))
+        return np.concatenate([*numbers, first + np.arange(len(self._pairs))])
 
     @property
     def lower(self) -> np.ndarray:
