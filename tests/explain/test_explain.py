@@ -56,6 +56,21 @@ def test_waits_and_speeds_have_their_rows(seams):
     assert lines[1].startswith("a process speed of 0.22 m/s in place of 0.2 m/s saves")
 
 
+def test_phases_and_motion_have_the_share_of_their_process_speed(seams):
+    found = seams.bottleneck()
+    given = [each for each in found.phases if each.phase.speed]
+    assert [each.phase.speed for each in given] == [0.2, 0.1]
+    for each in given:
+        (label, share) = each.shares[0]
+        assert str(label) == f"tool process speed of {each.phase.speed} m/s"
+        assert share == pytest.approx(1.0)
+    part = 100.0 * given[0].phase.duration / seams.t_end
+    text = "the tool is held at its process speed of 0.2 m/s"
+    assert f"{text} for {part:.1f} % of the time, once" in str(found)
+    shares = {each["kind"]: each["share"] for each in found.to_dict()["saturations"]}
+    assert shares["process speed of 0.2 m/s"] == pytest.approx(part / 100.0, rel=1e-3)
+
+
 def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
     _, stop = seams.sensitivities.task
     assert stop.is_bound
@@ -75,7 +90,7 @@ def test_a_cause_has_one_row(seams):
     entries = seams.sensitivities.limits
     rows = [(entry.label, entry.side) for entry in entries]
     assert len(set(rows)) == len(rows)
-    assert not [entry for entry in entries if "lead" in entry.label.kind]
+    assert not [entry for entry in entries if "next to" in entry.label.kind]
 
 
 def test_a_check_leaves_process_speeds_out(seams):
