@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from brachis.explain.multipliers import Multipliers, multipliers_of
+from brachis.explain.savings import task_savings
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
-from brachis.explain.stops import stop_savings
 from brachis.explain.task_figures import OptimalMotion, figure_sensitivities
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
 from brachis.problem.problem import Problem
-from brachis.trajectory.sensitivities import Sensitivities, Sensitivity, TaskSaving
+from brachis.trajectory.sensitivities import Sensitivities, Sensitivity
 
 _BALANCED = 0.02
 """Part of the gradient that multipliers may leave unbalanced before the timings of the motion say more than they."""
@@ -21,7 +21,7 @@ _BALANCED = 0.02
 def explain_motion(
     problem: Problem, motion: SolvedProgram, optimum: SolvedProgram
 ) -> Sensitivities:
-    """Derive what limits, process speeds, dwells and stops cost.
+    """Derive what limits and figures of the task cost, and what other demands of the task would save.
 
     Parameters
     ----------
@@ -57,9 +57,8 @@ def explain_motion(
     limits = tuple(
         replace(entry, derivative=time_ratio * entry.derivative) for entry in limits
     )
-    savings = [*_list_dwells(problem), *stop_savings(problem, motion)]
-    savings.sort(key=lambda saving: -saving.saved)
-    return replace(costs, limits=limits, task=tuple(savings))
+    savings = task_savings(problem, motion, answer)
+    return replace(costs, limits=limits, task=savings)
 
 
 def _find_multipliers(
@@ -77,21 +76,12 @@ def _find_multipliers(
 def _merge_figures(
     limit_costs: Iterable[Sensitivity], figure_costs: Iterable[Sensitivity]
 ) -> tuple[Sensitivity, ...]:
-    """Join what limits cost with what figures of the task cost: some limits next to process speeds follow from these."""
-    joined = {(entry.label, entry.side): entry for entry in figure_costs}
+    """Join what limits and figures of the task cost: some limits follow from process speeds."""
+    joined = {(str(entry.label), entry.side): entry for entry in figure_costs}
     for entry in limit_costs:
-        figure = entry.label, entry.side
+        name = str(entry.label), entry.side
         derivative = entry.derivative
-        if figure in joined:
-            derivative += joined[figure].derivative
-        joined[figure] = replace(entry, derivative=derivative)
+        if name in joined:
+            derivative += joined[name].derivative
+        joined[name] = replace(joined.get(name, entry), derivative=derivative)
     return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))
-
-
-def _list_dwells(problem: Problem) -> list[TaskSaving]:
-    """List what the task's waits take."""
-    return [
-        TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
-        for leg in problem.legs
-        if leg.dwell
-    ]

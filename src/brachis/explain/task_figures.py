@@ -7,8 +7,11 @@ If only the timing is optimal, of a joint path that follows from the path of the
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,10 +20,11 @@ from brachis.errors import InputError, UnreachableError
 from brachis.explain.multipliers import Multipliers
 from brachis.explain.sensitivities import label_of_speed
 from brachis.limits.tool import PROCESS_SPEED
+from brachis.optimise.boundary import Boundary, EndCondition
 from brachis.optimise.phase import Phase
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.retiming import least_time
-from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.transcription import boundary_of
 from brachis.path import (
     legs_of,
@@ -31,6 +35,7 @@ from brachis.path import (
 )
 from brachis.problem.problem import Problem
 from brachis.task import Task
+from brachis.task.segments import BSplineSegment
 from brachis.trajectory.sensitivities import Sensitivity
 
 Value = Callable[[Program, np.ndarray], float]
@@ -39,6 +44,8 @@ _STEP = 1e-4
 """Part by which a figure is changed in the Lagrangian."""
 _STEP_OF_TIMING = 1e-2
 """The same in timings, whose stations make an error of about 1e-6 of the time."""
+PROCESS_SPEED_KEY = "tool_limits.process_speed"
+"""Key of the task that lists process speeds which are not those of segments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +74,29 @@ class OptimalMotion:
     def with_multipliers(
         cls, problem: Problem, program: Program, x: np.ndarray, multipliers: Multipliers
     ) -> OptimalMotion:
-        """Take the Lagrangian; programs with the same rows have the same active ones."""
+        """Take the Lagrangian; limits without active rows are left out."""
         active = multipliers.active_set
-        count = len(active.rows)
+        weights = np.zeros(len(program.lower))
+        np.add.at(
+            weights, active.rows, active.signs * multipliers.weights[: len(active.rows)]
+        )
+        by_limit = [
+            (limit, weights[program.rows_of(limit)]) for limit in program.limits
+        ]
+        held = [(limit, of_limit) for limit, of_limit in by_limit if of_limit.any()]
+        of_links = weights[len(weights) - sum(link.size for link in program.links) :]
+        kept = {limit for limit, _ in held}
+        program = program.with_phases(
+            phase.with_limits([limit for limit in phase.limits if limit in kept])
+            for phase in program.phases
+        )
 
         def value(program: Program, x: np.ndarray) -> float:
-            slack = active.signs * program.rows(x)[active.rows]
-            return program.end_time(x) - float(multipliers.weights[:count] @ slack)
+            rows = program.rows(x)
+            total = of_links @ rows[len(rows) - len(of_links) :]
+            for limit, of_limit in held:
+                total += np.sum(of_limit * rows[program.rows_of(limit)])
+            return program.end_time(x) - float(total)
 
         return cls(problem, program, x, value, _STEP)
 
@@ -92,26 +115,44 @@ class OptimalMotion:
         return cls(problem, program, x, value, _STEP_OF_TIMING)
 
     def change(self, changed: Problem) -> float:
-        """Change of t_E, s, to first order, for another problem with as many legs.
-
-        Raises
-        ------
-        UnreachableError
-            A collocation point is out of the branch's reach.
-        """
+        """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
         phases = []
         parts = []
         for number, (phase, x_of_phase) in enumerate(self.program.split(self.x)):
             path = changed.leg_paths[number]
             joint_map = phase.joint_map.along(path, phase.joint_map.start)
-            boundary = boundary_of(changed, joint_map, number)
+            boundary = _with_conditions_of(
+                phase.boundary, boundary_of(changed, joint_map, number)
+            )
             arguments = (joint_map, phase.limits, phase.grid, boundary)
             other = Phase(*arguments, margin=None, pause=phase.pause)
             phases.append(other)
             parts.append(_carry_over(phase, x_of_phase, other))
         program = self.program.with_phases(phases)
-        before = self.value(self.program, self.x)
-        return self.value(program, np.concatenate(parts)) - before
+        try:
+            after = self.value(program, np.concatenate(parts))
+        except UnreachableError:
+            return 0.0
+        change = after - self.value(self.program, self.x)
+        return change if np.isfinite(change) else 0.0
+
+
+def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
+    """Give as many derivatives as before: from rest, those of redundant joints stay zero if the tool begins to move."""
+
+    def join(
+        old: tuple[EndCondition, ...], new: tuple[EndCondition, ...]
+    ) -> tuple[EndCondition, ...]:
+        return tuple(
+            replace(one, derivatives=other.derivatives)
+            if len(one.derivatives) < len(other.derivatives)
+            else one
+            for other, one in zip(old, new, strict=True)
+        )
+
+    start = join(before.start, after.start)
+    end = join(before.end, after.end)
+    return replace(after, start=start, end=end)
 
 
 def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
@@ -127,86 +168,121 @@ def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
     return carried
 
 
-def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
-    """Derive what the task's figures cost.
+@dataclass(frozen=True)
+class _Figure:
+    """A figure of a task: its name, its value, the parts of the path where it counts, and the problem with another."""
 
-    Raises
-    ------
-    UnreachableError
-        A collocation point is out of the branch's reach.
-    """
+    label: Label
+    value: float
+    s: tuple[tuple[float, float], ...]
+    change: Callable[[float], Problem]
+
+
+def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
+    """Derive what the task's figures cost; figures that cannot be larger are left out."""
     costs = []
-    figures = [*_speeds(motion.problem), *_blends(motion.problem), *_ends(motion.problem)]
-    for label, figure, change_task in figures:
-        step = motion.step * figure
-        try:
-            changed = change_task(figure + step)
-        except InputError:  # there is no larger one
-            continue
-        derivative = motion.change(changed) / step
-        costs.append(Sensitivity(label, None, figure, figure, derivative))
+    for list_figures in (_speeds, _blends, _ends):
+        for figure in list_figures(motion.problem):
+            value = figure.value
+            step = motion.step * value
+            try:
+                changed = figure.change(value + step)
+            except InputError:
+                continue
+            derivative = motion.change(changed) / step
+            cost = Sensitivity(figure.label, None, value, value, derivative, figure.s)
+            costs.append(cost)
     return tuple(costs)
 
 
-_Figure = tuple[Label, float, Callable[[float], Problem]]
-"""What a figure is called, its value, and the problem with another value."""
-
-
 def _speeds(problem: Problem) -> Iterator[_Figure]:
-    """List process speeds; parts of the path with the same speed are one figure."""
+    """List process speeds; parts of the path with the same speed have one figure."""
     limits = problem.task.tool_limits
+
+    def change(before: float, after: float) -> Problem:
+        parts = tuple(
+            part.model_copy(update={"speed": after}) if part.speed == before else part
+            for part in limits.process_speed
+        )
+        changed = limits.model_copy(update={"process_speed": parts})
+        task = problem.task.model_copy(update={"tool_limits": changed})
+        return _with_legs(replace(problem, task=task))
+
     for speed in sorted({part.speed for part in limits.process_speed}):
-
-        def change(other: float, speed: float = speed) -> Problem:
-            parts = tuple(
-                part.model_copy(update={"speed": other}) if part.speed == speed else part
-                for part in limits.process_speed
-            )
-            changed = limits.model_copy(update={"process_speed": parts})
-            task = problem.task.model_copy(update={"tool_limits": changed})
-            return _with_legs(replace(problem, task=task))
-
-        label = label_of_speed(PROCESS_SPEED, speed, "tool_limits.process_speed")
-        yield label, speed, change
+        parts = [part for part in limits.process_speed if part.speed == speed]
+        keys = dict.fromkeys(
+            PROCESS_SPEED_KEY if part.segment is None else f"path[{part.segment}].speed"
+            for part in parts
+        )
+        label = label_of_speed(PROCESS_SPEED, speed, ", ".join(keys))
+        places = tuple(part.s for part in parts)
+        yield _Figure(label, speed, places, partial(change, speed))
 
 
 def _blends(problem: Problem) -> Iterator[_Figure]:
-    """List blends; those of the same size are one figure."""
+    """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
+    path = problem.path
     segments = problem.task.path
-    for size in sorted({segment.blend for segment in segments} - {None, 0.0}):
+    places = {
+        before.segment: (float(begin), float(end))
+        for before, blend, (begin, end) in zip(
+            path.pieces, path.pieces[1:], pairwise(path.breaks[1:]), strict=False
+        )
+        if blend.segment is None and before.segment is not None
+    }
+    groups: defaultdict[tuple[str, float], list[int]] = defaultdict(list)
+    source = ""
+    for number, (segment, after) in enumerate(pairwise(segments)):
+        if isinstance(segment, BSplineSegment) and segment.bspline.fit:
+            source = segment.bspline.fit.source
+        if number in places:
+            is_of_file = isinstance(after, BSplineSegment) and not after.bspline.fit
+            size = 0.0 if is_of_file else segment.blend or 0.0
+            groups[source if is_of_file else "", size].append(number)
 
-        def change(other: float, size: float = size) -> Problem:
-            path = tuple(
-                segment.model_copy(update={"blend": other})
-                if segment.blend == size
-                else segment
-                for segment in segments
-            )
-            return _with_task(problem, problem.task.model_copy(update={"path": path}))
+    def change(numbers: list[int], before: float, after: float) -> Problem:
+        path = list(segments)
+        for number in numbers:
+            size = (path[number].blend or 0.0) * after / before
+            path[number] = path[number].model_copy(update={"blend": size})
+        task = problem.task.model_copy(update={"path": tuple(path)})
+        return _with_task(problem, task)
 
-        yield Label("path", "blend", "m", "path.blend", cause="blend"), size, change
+    for (source, _), numbers in groups.items():
+        largest = max(segments[number].blend or 0.0 for number in numbers)
+        cause = f"blend at the corners of {source}" if source else "blend"
+        key = "csv.tolerance.corner" if source else "path.blend"
+        label = Label("path", f"{cause}, {largest:.10g} m", "m", key, cause=cause)
+        s = tuple(places[number] for number in numbers)
+        yield _Figure(label, largest, s, partial(change, numbers, largest))
 
 
 def _ends(problem: Problem) -> Iterator[_Figure]:
     """List given speeds at both ends of the path."""
     boundary = problem.task.boundary
-    for end in ("start", "end"):
-        key = f"{end}_speed"
+
+    def change(key: str, speed: float) -> Problem:
+        changed = boundary.model_copy(update={key: speed})
+        task = problem.task.model_copy(update={"boundary": changed})
+        return replace(problem, task=task)
+
+    for place, name in ((0.0, "start"), (1.0, "end")):
+        key = f"{name}_speed"
         speed = getattr(boundary, key)
-        if not speed:
-            continue
-
-        def change(other: float, key: str = key) -> Problem:
-            changed = boundary.model_copy(update={key: other})
-            task = problem.task.model_copy(update={"boundary": changed})
-            return replace(problem, task=task)
-
-        kind = f"speed at the path's {end}"
-        yield Label("path", kind, "m/s", f"boundary.{key}", cause=kind), speed, change
+        if speed:
+            kind = f"speed at the path's {name}"
+            label = Label("path", kind, "m/s", f"boundary.{key}", cause=kind)
+            yield _Figure(label, speed, ((place, place),), partial(change, key))
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:
-    """Return the problem with another path, and the process speeds and feed rates on it."""
+    """Return the problem with another path, and the process speeds and feed rates on it.
+
+    Raises
+    ------
+    PathError
+        The path is not possible.
+    """
     task_map = problem.task_map
     path = path_of(task_map, task)
     task = with_held_speeds(with_feed_rates(task, path), task_map, path)

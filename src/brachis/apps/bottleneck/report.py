@@ -237,6 +237,13 @@ _FRACTION = 0.1
 """By which limits are raised in the sentences on what they cost."""
 _FRACTION_OF_RANGE = 0.01
 """The same of an end of a range: of 10 % of a range a weld gained a seventh of what was said."""
+_VERBS = {
+    "exact": "saves",
+    "estimate": "saves about",
+    "least": "saves at least about",
+    "bound": "saves, along the same joint path, no more than",
+}
+"""How much a change of the task saves, by its accuracy."""
 _NOTHING = 1e-5
 """Fraction of t_E; what saves less has no sentence."""
 
@@ -263,10 +270,10 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
         (_predict_saving(entry), f"{_more_room(entry, degrees=degrees)} saves")
         for entry in found.limits
     ]
-    for entry in found.task:
-        bound = ", along the same joint path, saves no more than"
-        words = bound if entry.is_bound else " saves"
-        savings.append((entry.saved, entry.change + words))
+    savings += [
+        (entry.saved, f"{entry.change} {_VERBS[entry.accuracy]}")
+        for entry in found.task
+    ]
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
     lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
@@ -291,7 +298,8 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
 def _predict_saving(entry: Sensitivity) -> float:
     """Predict what more room at one limit saves, s; where a speed is given, time goes as its inverse."""
     saved = -entry.change(_fraction_of(entry))
-    return saved / (1.0 + _FRACTION) if entry.label.cause else saved
+    is_speed = bool(entry.label.cause) and entry.label.unit == "m/s"
+    return saved / (1.0 + _FRACTION) if is_speed else saved
 
 
 def _fraction_of(entry: Sensitivity) -> float:

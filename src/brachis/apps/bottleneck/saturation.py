@@ -12,6 +12,7 @@ from brachis.common import tolerances
 from brachis.common.arrays import freeze, spread
 from brachis.common.summary import Summary
 from brachis.explain.sensitivities import label_of_speed
+from brachis.explain.task_figures import PROCESS_SPEED_KEY
 from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.program import Program, is_safeguard
@@ -115,7 +116,7 @@ def limit_ratios(
 
 def _label_of_held_speed(speed: float) -> Label:
     """Name a process speed, m/s, as what holds the tool back."""
-    label = label_of_speed(PROCESS_SPEED, speed, "tool_limits.process_speed")
+    label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
     text = f"the tool is held at its {label.kind}"
     return replace(label, active_text=text, share="tool speed / limit")
 
