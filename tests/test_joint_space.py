@@ -219,7 +219,7 @@ def test_an_end_beside_the_path_is_refused():
 
 
 def test_sensitivities_are_those_of_solving_again(planned):
-    found = check_sensitivities(planned.candidate.refined)
+    found = check_sensitivities(planned.candidate.refined, planned.sensitivities)
     assert found.larger()
     assert found.worst_deviation() < 0.05
 

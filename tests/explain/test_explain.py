@@ -101,7 +101,9 @@ def test_a_cause_has_one_row(seams):
 
 
 def test_a_check_leaves_process_speeds_out(seams):
-    checked = brachis.bottleneck.check_sensitivities(seams.candidate.optimum)
+    checked = brachis.bottleneck.check_sensitivities(
+        seams.candidate.optimum, seams.sensitivities
+    )
     kinds = {entry.sensitivity.label.kind for entry in checked.entries}
     assert kinds
     assert not [kind for kind in kinds if "process speed" in kind]

@@ -33,7 +33,6 @@ from brachis.explain import (
     Sensitivity,
     TaskSaving,
     explain_motion,
-    sensitivities,
 )
 
 __all__ = [
@@ -58,7 +57,6 @@ __all__ = [
     "limits_by_phase",
     "report",
     "saturations",
-    "sensitivities",
     "solve_again",
 ]
 __dir__ = __all__.copy  # what completion shows

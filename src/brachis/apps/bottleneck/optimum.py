@@ -2,12 +2,13 @@
 
 Task, URDF, redundant joints and branch (or the chart), knots and control points are saved. The problem is built over
 these knots, with the branch margin that the motion keeps, solved from the saved control points and refined as in a
-plan. The start is an optimum already, so this takes a few iterations and ends at the same one. A timing of the phase
-plane has too many knots for that: its problem begins over a few, which are refined.
+plan. The start is an optimum already, so this takes a few iterations and ends at the same one. Splines along the timing
+of a joint path have too many knots for that: as in a plan, the problem over fewer of them has the multipliers.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -25,20 +26,25 @@ from brachis.errors import (
 from brachis.ik import Family
 from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
-from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.improve import SolvedProgram, SolverSession
-from brachis.optimise.mesh import adapt_mesh
 from brachis.optimise.motion import Motion
+from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.optimise.retiming import is_timing_all, keep
+from brachis.optimise.retiming import begin_with_timing, is_timing_all, keep
 from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Decomposition, Problem, decompositions_of
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JOINTS
 from brachis.trajectory import Trajectory
+
+_INTERVALS = 60
+"""Intervals, about, over which the timing of a joint path that is free is solved again: then it was 1 % slower."""
+_EVALUATIONS = 110
+"""A solve takes as long as so many evaluations of rows and slopes: the median of 30 motions, where it was 20 to 420."""
+_SLOWER_BY_INTERVALS = 0.03
+"""Part of the time by which these may make a motion slower."""
 
 
 def solve_again(
@@ -55,7 +61,7 @@ def solve_again(
     trajectory : Trajectory
         As `brachis.plan` made it, or loaded.
     listener : callable, optional
-        Is told of every iteration.
+        Is told how long it will take, then of every iteration.
     families, own_limits : sequence, optional
         Those with which the motion was planned, as of `brachis.plan`: they are not saved with it.
 
@@ -84,8 +90,16 @@ def solve_again(
         if is_timed:
             if not first.r:
                 return SolvedProgram(program, (keep(program, x),))
-            program, x = _over_few_knots(program, x, task.spline.points_per_interval)
-            longest = 0.01  # a timing may be faster than splines over few knots
+            begun = begin_with_timing(
+                program,
+                time_phases(program, x),
+                task.spline.tolerance,
+                _INTERVALS,
+                task.spline.points_per_interval,
+            )
+            program, x = begun or (program, x)
+            longest = _SLOWER_BY_INTERVALS
+        listener(_announce(program, x, task.search.time_limit))
         has_law = any(phase.time_law is not None for phase in program.phases)
         for backend in solvers_for(task.solver.name):
             if deadline.passed:
@@ -99,10 +113,7 @@ def solve_again(
                 has_time_law=has_law,
             )
             try:
-                solved = SolvedProgram(program, (solve(program, x),))
-                if is_timed:
-                    solved = adapt_mesh(solved, solve, task.spline, options)
-                refined = refine(solved.program, solved.report, solve, options)
+                refined = refine(program, solve(program, x), solve, options)
             except UnreachableError:
                 continue
             if not refined.converged:
@@ -129,22 +140,16 @@ def solve_again(
     )
 
 
-def _over_few_knots(
-    program: Program, x: np.ndarray, points: int
-) -> tuple[Program, np.ndarray]:
-    """Write a motion, x, over a few even knots: a timing has too many for a solver."""
-    breaks = np.linspace(0.0, 1.0, 17)
-    phases = []
-    parts = []
-    for phase, motion in zip(program.phases, program.motions(x), strict=True):
-        knots = clamped_knots(phase.degree, breaks)
-        few = phase.with_knots(knots, spread(breaks, points))
-        t_norm = spread(breaks, 8)
-        curves = motion.at(t_norm * motion.t_end)[0]
-        phases.append(few)
-        parts.append(fit_curves(few, motion.t_end, t_norm, curves))
-    first = program.with_phases(phases)
-    return first, shortest_time(first, np.concatenate(parts))
+def _announce(program: Program, x: np.ndarray, longest: float) -> str:
+    """Say how long a solve from x, (v,), will take, s, from the time that its functions take there."""
+    began = time.perf_counter()
+    program.rows(x)
+    program.jacobian(x)
+    seconds = _EVALUATIONS * (time.perf_counter() - began)
+    return (
+        f"solving the problem of the motion again takes about {seconds:.1g} s, no more than {longest:g} s "
+        "(search.time_limit)"
+    )
 
 
 def _problem(
@@ -185,7 +190,12 @@ def _problem(
         points = spline.control_points[0 if law is None else 1 :]
         motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
     program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
-    return program, program.variables_from(motions)
+    # Limits that are far from their bounds all along the motion are left out.
+    near = program.with_phases(
+        phase.restrict_to(motion.at(phase.t_norm * motion.t_end)[0])
+        for phase, motion in zip(program.phases, motions, strict=True)
+    )
+    return near, near.variables_from(motions)
 
 
 def _find_decomposition(problem: Problem, families: Sequence[Family]) -> Decomposition:

@@ -48,7 +48,7 @@ class BottleneckReport:
     t_end : float
         Of the motion, s.
     sensitivities : Sensitivities or None
-        What every limit costs; None for a motion that was not planned.
+        What every limit costs; None if that is unknown.
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
     phases : tuple of PhaseLimits
@@ -85,7 +85,9 @@ class BottleneckReport:
 
     def text(self, *, degrees: bool = False) -> str:
         """Say all in plain words, angles in degrees if requested."""
-        lines = ["the motion was not planned, so the cost of its limits is unknown"]
+        lines = [
+            "what limits cost is unknown: the motion was not planned, or that is not stored with it"
+        ]
         if self.sensitivities is not None:
             lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
         if self.timing is not None:
@@ -140,6 +142,7 @@ def report(
     *,
     check: bool = False,
     reference: bool = False,
+    solve: bool = True,
     families: Sequence[Family] = (),
     own_limits: Sequence[LimitModel] = (),
     listener: Listener = ignore,
@@ -155,6 +158,8 @@ def report(
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
         Plan again with discontinuous torque allowed on a fine mesh: the best value known, not a proven bound.
+    solve : bool, optional
+        Whether the problem of a motion whose file does not say what limits cost is solved again.
     families, own_limits : sequence, optional
         Those with which the motion was planned, as of `brachis.plan`; they are not saved with it.
     listener : callable, optional
@@ -200,8 +205,9 @@ def report(
         limits: Sequence[Limit] = limits_of(
             trajectory.robot, trajectory.task, own_limits
         )
-        if costs is None or check or reference:
-            listener("solving the problem of the motion again")
+        if costs is None:
+            listener("what limits cost is not stored with the motion")
+        if (costs is None and solve) or check or reference:
             optimum = solve_again(
                 trajectory, listener, families=families, own_limits=own_limits
             )
@@ -216,6 +222,7 @@ def report(
     active = saturations(trajectory, limits)
     if check:
         listener("solving again with every limit raised")
+        assert costs is not None
         checked = check_sensitivities(optimum, costs)
     if reference:
         listener("planning again with discontinuous torque")
@@ -284,6 +291,10 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     else:
         how = f"multipliers by the {found.source}, residual {found.residual:.0e}"
     lines.append(f"(to first order, from {how})")
+    if not found.unique:
+        lines.append(
+            "(each saving is for one limit that is raised alone; lowered as much, it may cost more time than that)"
+        )
     for boundary in found.boundaries:
         saved = boundary.derivative * boundary.margin
         if saved > _NOTHING * t_end:
