@@ -63,7 +63,7 @@ def test_what_holds_the_motion_back_is_shown_without_a_solve(line_result, monkey
         raise AssertionError("solved again")
 
     module = sys.modules["brachis.apps.bottleneck.report"]
-    monkeypatch.setattr(module, "solve_again", refuse)
+    monkeypatch.setattr(module, "plan_again", refuse)
     unknown = "what limits cost is unknown"
     known = "more torque at j1"
     for motion, text in (

@@ -14,7 +14,7 @@ from brachis.apps.bottleneck.check import (
     SensitivityCheck,
     check_sensitivities,
 )
-from brachis.apps.bottleneck.optimum import solve_again
+from brachis.apps.bottleneck.optimum import plan_again
 from brachis.apps.bottleneck.reference import Reference, find_reference
 from brachis.apps.bottleneck.report import BottleneckReport, report
 from brachis.apps.bottleneck.saturation import (
@@ -56,8 +56,8 @@ __all__ = [
     "find_reference",
     "limit_ratios",
     "limits_by_phase",
+    "plan_again",
     "report",
     "saturations",
-    "solve_again",
 ]
 __dir__ = __all__.copy  # what completion shows

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.bottleneck import report
+from brachis.apps import bottleneck
 from brachis.apps.view import tables
 from brachis.apps.view.panel import (
     RATES,
@@ -265,7 +265,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
             self._lines = [add_plot(self._gui, each) for each in shown]
         with panel.add_tab("bottlenecks"):
-            found = report(self._trajectory, solve=False)
+            found = bottleneck.report(self._trajectory, solve=False)
             lines = found.text(degrees=self._degrees).splitlines()
             self._gui.add_html(tables.paragraphs(lines))
         count = f" ({len(candidates)})" if candidates else ""
