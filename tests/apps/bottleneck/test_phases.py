@@ -65,10 +65,10 @@ def test_a_saved_motion_is_solved_again_by_phase(stopping):
     again = brachis.bottleneck.report(
         stopping.trajectory, reference=True, listener=lines.append
     )
-    words = r"planning the motion again from itself, which takes about (\S+) s, and no"
-    assert 0.01 < float(re.match(words, lines[1])[1]) < 10.0
+    words = r"planning the motion again from itself: about (\S+) s, no more than 60 s"
+    assert 0.0 < float(re.match(words, lines[1])[1]) < 10.0
     assert any("iteration 1," in line for line in lines)
-    assert lines[-1] == "planning again with discontinuous torque"
+    assert "planning again with discontinuous torque" in lines
     now = brachis.bottleneck.report(stopping)
     for entry in now.sensitivities.limits:
         other = again.sensitivities.of(entry.label.subject, entry.label.kind)

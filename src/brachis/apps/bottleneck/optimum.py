@@ -60,22 +60,17 @@ def plan_again(
         names = tuple(name for name in trajectory.redundant_joints if name in joints)
         changes |= {"redundant_joints": names, "branch": trajectory.branch}
     task = task.model_copy(update=changes)
-    with use_one_thread():
-        problem = Problem.of(trajectory.robot, task, own_limits)
-        deadline = Deadline.after(task.search.time_limit)
-        choices = Decompositions(problem, families)
-        search = Search(problem, choices, deadline, listener)
-        try:
-            with search.end_early():
-                search.run(trajectory, None)
-        except (DecompositionError, UnknownNameError) as error:
-            raise DecompositionError(
-                "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
-                "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
-                redundant_joints=task.redundant_joints,
-                found=f"{error}",
-            ) from error
-    planned = search.outcome().best
+    problem = Problem.of(trajectory.robot, task, own_limits)
+    deadline = Deadline.after(task.search.time_limit)
+    try:
+        planned = search_from(trajectory, problem, families, deadline, listener)
+    except (DecompositionError, UnknownNameError) as error:
+        raise DecompositionError(
+            "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
+            "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
+            redundant_joints=task.redundant_joints,
+            found=f"{error}",
+        ) from error
     slower = trajectory.t_end / planned.t_end - 1.0
     if -_SAME <= slower <= task.search.slower + _SAME:
         return planned
@@ -87,3 +82,17 @@ def plan_again(
         "brachis.bottleneck.report(motion, own_limits=[...]). Otherwise run brachis bottleneck on the task file: it "
         "plans again",
     )
+
+
+def search_from(
+    motion: Trajectory,
+    problem: Problem,
+    families: Sequence[Family],
+    deadline: Deadline,
+    listener: Listener,
+) -> FinishedCandidate:
+    """Search for the fastest motion of a problem from one of a similar problem; raise PlanningError without any."""
+    search = Search(problem, Decompositions(problem, families), deadline, listener)
+    with use_one_thread(), search.end_early():
+        search.run(motion)
+    return search.outcome().best
