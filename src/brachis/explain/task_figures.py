@@ -1,4 +1,4 @@
-"""What figures of the task cost that no row of a program has for a bound: process speeds, blends, speeds at the ends.
+"""What figures of the task cost that no row of a program has for a bound: process speeds and blends.
 
 At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is
 the change of L if such a figure changes and the free variables stay; durations that follow from a speed change with it.
@@ -144,10 +144,8 @@ def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
         old: tuple[EndCondition, ...], new: tuple[EndCondition, ...]
     ) -> tuple[EndCondition, ...]:
         return tuple(
-            replace(one, derivatives=other.derivatives)
-            if len(one.derivatives) < len(other.derivatives)
-            else one
-            for other, one in zip(old, new, strict=True)
+            EndCondition(one.value, max(one.derivatives, other.derivatives, key=len))
+            for one, other in zip(new, old, strict=True)
         )
 
     start = join(before.start, after.start)
@@ -181,17 +179,16 @@ class _Figure:
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
     """Derive what the task's figures cost; figures that cannot be larger are left out."""
     costs = []
-    for list_figures in (_speeds, _blends, _ends):
-        for figure in list_figures(motion.problem):
-            value = figure.value
-            step = motion.step * value
-            try:
-                changed = figure.change(value + step)
-            except InputError:
-                continue
-            derivative = motion.change(changed) / step
-            cost = Sensitivity(figure.label, None, value, value, derivative, figure.s)
-            costs.append(cost)
+    for figure in (*_speeds(motion.problem), *_blends(motion.problem)):
+        value = figure.value
+        step = motion.step * value
+        try:
+            changed = figure.change(value + step)
+        except InputError:
+            continue
+        derivative = motion.change(changed) / step
+        cost = Sensitivity(figure.label, None, value, value, derivative, figure.s)
+        costs.append(cost)
     return tuple(costs)
 
 
@@ -255,24 +252,6 @@ def _blends(problem: Problem) -> Iterator[_Figure]:
         label = Label("path", f"{cause}, {largest:.10g} m", "m", key, cause=cause)
         s = tuple(places[number] for number in numbers)
         yield _Figure(label, largest, s, partial(change, numbers, largest))
-
-
-def _ends(problem: Problem) -> Iterator[_Figure]:
-    """List given speeds at both ends of the path."""
-    boundary = problem.task.boundary
-
-    def change(key: str, speed: float) -> Problem:
-        changed = boundary.model_copy(update={key: speed})
-        task = problem.task.model_copy(update={"boundary": changed})
-        return replace(problem, task=task)
-
-    for place, name in ((0.0, "start"), (1.0, "end")):
-        key = f"{name}_speed"
-        speed = getattr(boundary, key)
-        if speed:
-            kind = f"speed at the path's {name}"
-            label = Label("path", kind, "m/s", f"boundary.{key}", cause=kind)
-            yield _Figure(label, speed, ((place, place),), partial(change, key))
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:

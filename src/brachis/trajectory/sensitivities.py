@@ -122,7 +122,7 @@ class Sensitivities(Summary):
     Attributes
     ----------
     limits : tuple of Sensitivity
-        All figures of all limits but safeguards, process speeds, blends and speeds at the ends, the costliest first.
+        All figures of all limits but safeguards, process speeds and blends, the costliest first.
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str
