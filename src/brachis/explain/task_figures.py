@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -133,8 +133,13 @@ class OptimalMotion:
             after = self.value(program, np.concatenate(parts))
         except UnreachableError:
             return 0.0
-        change = after - self.value(self.program, self.x)
+        change = after - self._unchanged
         return change if np.isfinite(change) else 0.0
+
+    @cached_property
+    def _unchanged(self) -> float:
+        """Value of the answer itself."""
+        return self.value(self.program, self.x)
 
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.common.arrays import clear_rounding
 from brachis.common.summary import Summary
+from brachis.common.threads import use_one_thread
 from brachis.explain import Sensitivities, explain_motion
 from brachis.optimise.backends import SolverReport
 from brachis.robot.from_task import in_use
@@ -75,7 +76,10 @@ class PlannedMotion(Summary):
     def sensitivities(self) -> Sensitivities:
         """What limits and other demands of the task cost, from the multipliers of the plan."""
         candidate = self.candidate
-        return explain_motion(candidate.problem, candidate.refined, candidate.optimum)
+        with use_one_thread():
+            return explain_motion(
+                candidate.problem, candidate.refined, candidate.optimum
+            )
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds."""
