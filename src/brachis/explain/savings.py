@@ -138,22 +138,23 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
     widths = np.where(np.isfinite(widths), widths, 2.0 * np.pi)
     for name, posture in problem.given_postures.items():
         null = Newton(problem.task_map).self_motions(posture[None])[0]
-        slopes = [
-            answer.change(replace(problem, **{name: posture + _SELF_MOTION_STEP * way}))
-            for way in null.T
+        moved_postures = posture + _SELF_MOTION_STEP * null.T
+        changes = [
+            answer.change(replace(problem, **{name: moved})) for moved in moved_postures
         ]
-        direction = -null @ np.array(slopes) / _SELF_MOTION_STEP
-        shares = np.abs(direction) / widths
+        slopes = np.array(changes) / _SELF_MOTION_STEP
+        shares = np.abs(null @ slopes) / widths
         if not shares.any():
             continue
         most = int(np.argmax(shares))
-        step = direction * _RANGE_SHARE / shares[most]
+        length = _RANGE_SHARE / shares[most]
+        step = -length * null @ slopes
         moved = posture + step
         if (moved < limits.position_lower).any() or (
             moved > limits.position_upper
         ).any():
             continue
-        saved = float(np.linalg.norm(direction) * np.linalg.norm(step))
+        saved = float(length * (slopes @ slopes))
         amount = f"{abs(step[most]):.3g} {robot.position_units[most]}"
         if robot.position_units[most] == "rad":
             amount += f" ({np.degrees(abs(step[most])):.3g} deg)"
