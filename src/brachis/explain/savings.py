@@ -30,8 +30,8 @@ _HALVINGS = 12
 _RATE_RANGE = 64.0
 """Factor on the largest rate of the motion, and its inverse, between which it is looked for."""
 _RAMP_INTERVALS = (2, 1)
-"""Intervals beside rest within which an acceleration that is zero there costs time. With 2, estimates were 40 to 129 % of
-what planning again saved on 15 motions, in the median 95 %; with 1 they were lower. Over 2 some joint paths have no
+"""Intervals beside rest within which an acceleration that is zero there costs time. With 2, estimates were 40 to 129 %
+of what planning again saved on 15 motions, in the median 95 %; with 1 they were lower. Over 2 some joint paths have no
 timing."""
 _RANGE_SHARE = 1e-3
 """Part of the range of a joint by which a posture is changed: what it saves was up to 12 % off on 20 tasks, 2 % in the
