@@ -18,7 +18,6 @@ import numpy as np
 
 from brachis import LimitSpec, Result, Robot, Trajectory, load_task, plan
 from brachis.apps.bottleneck import CheckedSensitivity, check_sensitivities
-from brachis.explain import sensitivities
 from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
@@ -213,9 +212,8 @@ class Compared:
 
 def compared(name: str, result: Result) -> list[Compared]:
     """Print a line for every limit that costs time."""
-    refined = result.candidate.refined
-    assert refined is not None
-    found = sensitivities(refined)
+    refined = result.candidate.optimum
+    found = result.sensitivities
     checks = [
         check_sensitivities(refined, found, step=step)
         for step in (STEP, SMALLER_STEP, SMALL_STEP, -SMALL_STEP)

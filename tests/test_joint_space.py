@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.apps.bottleneck import check_sensitivities, solve_again
+from brachis.apps.bottleneck import check_sensitivities, plan_again
 from brachis.errors import InputError, PathError, StartError
 from brachis.robot import dynamics
 from brachis.task import LimitSpec, task_with
@@ -219,14 +219,14 @@ def test_an_end_beside_the_path_is_refused():
 
 
 def test_sensitivities_are_those_of_solving_again(planned):
-    found = check_sensitivities(planned.candidate.refined)
+    found = check_sensitivities(planned.candidate.refined, planned.sensitivities)
     assert found.larger()
     assert found.worst_deviation() < 0.05
 
 
 def test_bottlenecks_of_the_saved_motion_are_those_of_the_plan(planned, tmp_path):
     planned.trajectory.save(tmp_path / "motion.npz")
-    again = solve_again(brachis.Trajectory.load(tmp_path / "motion.npz"))
+    again = plan_again(brachis.Trajectory.load(tmp_path / "motion.npz"))
     assert again.t_end == pytest.approx(planned.t_end, rel=1e-4)
 
 

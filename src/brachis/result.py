@@ -130,7 +130,7 @@ class Result(PlannedMotion):
 
         candidates = [candidate.to_dict() for candidate in self.candidates]
         return view(
-            self.trajectory,
+            self.explained_trajectory,
             candidates,
             verified=self.verified,
             degrees=degrees,

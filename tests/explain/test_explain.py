@@ -49,16 +49,31 @@ def test_a_higher_process_speed_saves_what_is_said(seams, speed):
 
 
 def test_waits_and_speeds_have_their_rows(seams):
-    wait, _ = seams.sensitivities.task
+    wait = seams.sensitivities.task[0]
     assert wait.saved == 0.5
     lines = str(seams.bottleneck()).splitlines()
     assert lines[0] == "without the dwell at s = 0.6025 saves 13 % (500 ms)"
     assert lines[1].startswith("a process speed of 0.22 m/s in place of 0.2 m/s saves")
 
 
+def test_phases_and_motion_have_the_share_of_their_process_speed(seams):
+    found = seams.bottleneck()
+    given = [each for each in found.phases if each.phase.speed]
+    assert [each.phase.speed for each in given] == [0.2, 0.1]
+    for each in given:
+        (label, share) = each.shares[0]
+        assert str(label) == f"tool process speed of {each.phase.speed} m/s"
+        assert share == pytest.approx(1.0)
+    part = 100.0 * given[0].phase.duration / seams.t_end
+    text = "the tool is held at its process speed of 0.2 m/s"
+    assert f"{text} for {part:.1f} % of the time, once" in str(found)
+    shares = {each["kind"]: each["share"] for each in found.to_dict()["saturations"]}
+    assert shares["process speed of 0.2 m/s"] == pytest.approx(part / 100.0, rel=1e-3)
+
+
 def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
-    _, stop = seams.sensitivities.task
-    assert stop.is_bound
+    (stop,) = [row for row in seams.sensitivities.task if "stop" in row.change]
+    assert stop.accuracy == "bound"
     task = seams.task.to_dict()
     first, second = task["path"]
     # The corner is passed on an arc, as far as the leads to the seams are long.
@@ -66,20 +81,29 @@ def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
     moving = brachis.plan({**task, "path": path})
     least = seams.t_end - 0.5 - stop.saved
     assert moving.t_end > least - 0.01
-    saved = f"saves no more than {100 * stop.saved / seams.t_end:.2g} %"
-    text = f"with a blend in place of the stop at s = 0.6025, along the same joint path, {saved}"
-    assert text in str(seams.bottleneck())
+    saved = f"no more than {100 * stop.saved / seams.t_end:.2g} %"
+    text = "with a blend in place of the stop at s = 0.6025 saves, along the same joint path,"
+    assert f"{text} {saved}" in str(seams.bottleneck())
+
+
+def test_json_names_key_and_place_of_a_process_speed(seams):
+    rows = seams.sensitivities.to_dict()["limits"]
+    (row,) = [row for row in rows if row["kind"] == "process speed of 0.2 m/s"]
+    assert row["key"] == "tool_limits.process_speed"
+    assert row["s"] == [[0.1, 0.5]]
 
 
 def test_a_cause_has_one_row(seams):
     entries = seams.sensitivities.limits
     rows = [(entry.label, entry.side) for entry in entries]
     assert len(set(rows)) == len(rows)
-    assert not [entry for entry in entries if "lead" in entry.label.kind]
+    assert not [entry for entry in entries if "next to" in entry.label.kind]
 
 
 def test_a_check_leaves_process_speeds_out(seams):
-    checked = brachis.bottleneck.check_sensitivities(seams.candidate.optimum)
+    checked = brachis.bottleneck.check_sensitivities(
+        seams.candidate.optimum, seams.sensitivities
+    )
     kinds = {entry.sensitivity.label.kind for entry in checked.entries}
     assert kinds
     assert not [kind for kind in kinds if "process speed" in kind]

@@ -10,7 +10,6 @@ from brachis.explain.multipliers import (
 from brachis.explain.sensitivities import (
     LimitBound,
     figures_of,
-    sensitivities,
     sensitivities_at,
 )
 from brachis.trajectory.sensitivities import (
@@ -34,6 +33,5 @@ __all__ = [
     "figures_of",
     "jacobian_matrix",
     "multipliers_of",
-    "sensitivities",
     "sensitivities_at",
 ]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from brachis.explain.given_speeds import Lagrangian, speed_sensitivities
-from brachis.explain.multipliers import multipliers_of
+from brachis.explain.multipliers import Multipliers, multipliers_of
+from brachis.explain.savings import task_savings
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
-from brachis.explain.stops import stop_savings
+from brachis.explain.task_figures import OptimalMotion, figure_sensitivities
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
 from brachis.problem.problem import Problem
-from brachis.trajectory.sensitivities import Sensitivities, Sensitivity, TaskSaving
+from brachis.trajectory.sensitivities import Sensitivities, Sensitivity
 
 _BALANCED = 0.02
 """Part of the gradient that multipliers may leave unbalanced before the timings of the motion say more than they."""
@@ -21,7 +21,7 @@ _BALANCED = 0.02
 def explain_motion(
     problem: Problem, motion: SolvedProgram, optimum: SolvedProgram
 ) -> Sensitivities:
-    """Derive what limits, process speeds, dwells and stops cost.
+    """Derive what limits and figures of the task cost, and what other demands of the task would save.
 
     Parameters
     ----------
@@ -43,46 +43,45 @@ def explain_motion(
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    savings = [*_list_dwells(problem), *stop_savings(problem, motion)]
-    savings.sort(key=lambda saving: -saving.saved)
-    of_task = tuple(savings)
     program = optimum.program
-    report = optimum.report
-    is_timed = motion.report.solver == SOLVER
-    if report.solver == SOLVER:
-        return replace(sensitivities_of_timing(motion), task=of_task)
-    multipliers = multipliers_of(program, report.x, report.multipliers)
-    if is_timed and multipliers.residual > _BALANCED:
-        return replace(sensitivities_of_timing(motion), task=of_task)
-    costs = sensitivities_at(program, multipliers)
-    lagrangian = Lagrangian(program, report.x, multipliers)
-    speeds = speed_sensitivities(problem, lagrangian)
-    time_ratio = motion.t_end / optimum.t_end
-    scaled_costs = (
-        replace(entry, derivative=time_ratio * entry.derivative)
-        for entry in costs.limits
+    x = optimum.report.x
+    multipliers = _find_multipliers(motion, optimum)
+    if multipliers is None:
+        costs = sensitivities_of_timing(motion)
+        answer = OptimalMotion.with_timings(problem, motion.program, motion.x)
+    else:
+        costs = sensitivities_at(program, multipliers)
+        answer = OptimalMotion.with_multipliers(problem, program, x, multipliers)
+    time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
+    limits = _merge_figures(costs.limits, figure_sensitivities(answer))
+    limits = tuple(
+        replace(entry, derivative=time_ratio * entry.derivative) for entry in limits
     )
-    return replace(costs, limits=_merge_speed_costs(scaled_costs, speeds), task=of_task)
+    savings = task_savings(problem, motion, answer)
+    return replace(costs, limits=limits, task=savings)
 
 
-def _merge_speed_costs(
-    limit_costs: Iterable[Sensitivity], speed_costs: Iterable[Sensitivity]
+def _find_multipliers(
+    motion: SolvedProgram, optimum: SolvedProgram
+) -> Multipliers | None:
+    """Find the multipliers of the optimum; None if timings of the motion say more."""
+    report = optimum.report
+    if report.solver == SOLVER:
+        return None
+    multipliers = multipliers_of(optimum.program, report.x, report.multipliers)
+    is_timed = motion.report.solver == SOLVER
+    return None if is_timed and multipliers.residual > _BALANCED else multipliers
+
+
+def _merge_figures(
+    limit_costs: Iterable[Sensitivity], figure_costs: Iterable[Sensitivity]
 ) -> tuple[Sensitivity, ...]:
-    """Join what the limits in the leads of process speeds cost with what these speeds cost themselves."""
-    joined = {(entry.label, entry.side): entry for entry in speed_costs}
+    """Join what limits and figures of the task cost: some limits follow from process speeds."""
+    joined = {(str(entry.label), entry.side): entry for entry in figure_costs}
     for entry in limit_costs:
-        figure = entry.label, entry.side
+        name = str(entry.label), entry.side
         derivative = entry.derivative
-        if figure in joined:
-            derivative += joined[figure].derivative
-        joined[figure] = replace(entry, derivative=derivative)
+        if name in joined:
+            derivative += joined[name].derivative
+        joined[name] = replace(joined.get(name, entry), derivative=derivative)
     return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))
-
-
-def _list_dwells(problem: Problem) -> list[TaskSaving]:
-    """List what the task's waits take."""
-    return [
-        TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
-        for leg in problem.legs
-        if leg.dwell
-    ]

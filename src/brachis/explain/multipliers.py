@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 _INDEPENDENT = 1e-9
-"""Length of what is left of a slope without those before it, below which it depends on them."""
+"""Length of a slope, or of what is left of it without those before it, below which it is rounding."""
 
 
 def jacobian_matrix(program: Program, x: np.ndarray) -> sparse.csr_array:
@@ -84,7 +84,7 @@ class ActiveSet:
         rows = np.concatenate([low, high])
         signs = np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
-        is_movable = slopes.any(axis=1)
+        is_movable = np.abs(slopes).max(axis=1, initial=0.0) > _INDEPENDENT
         unit = np.eye(len(x))
         at_lower = x <= program.x_lower + near
         at_upper = x >= program.x_upper - near

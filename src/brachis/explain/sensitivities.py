@@ -15,12 +15,11 @@ from collections import defaultdict
 
 import numpy as np
 
-from brachis.explain.multipliers import Multipliers, multipliers_of
+from brachis.explain.multipliers import Multipliers
 from brachis.limits import Bound, Label, Limit
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program, is_safeguard
-from brachis.optimise.retiming import SOLVER
 from brachis.trajectory.sensitivities import (
     TIMINGS,
     BranchBoundary,
@@ -59,26 +58,6 @@ def _figure(limit: Limit, bound: Bound) -> Figure:
 def label_of_speed(cause: str, speed: float, key: str) -> Label:
     """Name a speed, m/s, that holds on several parts of the path."""
     return Label("tool", f"{cause} of {speed:.10g} m/s", "m/s", key, cause=cause)
-
-
-def sensitivities(solved: SolvedProgram) -> Sensitivities:
-    """Derive from an answer what every limit costs.
-
-    Parameters
-    ----------
-    solved : SolvedProgram
-        ``result.candidate.optimum``.
-
-    Returns
-    -------
-    Sensitivities
-        Of the answer before its end time was lengthened to meet the limits between collocation points.
-    """
-    report = solved.report
-    if report.solver == SOLVER:
-        return sensitivities_of_timing(solved)
-    multipliers = multipliers_of(solved.program, report.x, report.multipliers)
-    return sensitivities_at(solved.program, multipliers)
 
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:

@@ -37,7 +37,7 @@ from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
 
 PROCESS_SPEED = "process speed"
-"""What a lead's largest speed follows from."""
+"""Name of what gives the tool's speed, from which the largest speed next to it follows."""
 
 
 class ToolRatios(Limit):
@@ -207,15 +207,32 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
         )
         labels.append(_label("speed", "m/s"))
     leads = [lead for part in limits.process_speed for lead in part.leads]
-    for quantity, key, cause, parts in (
-        ("feed rate", "feed", "feed rate", limits.feed),
-        ("speed of a lead", "process_speed", PROCESS_SPEED, leads),
+    beside = (
+        "before or behind a part with a process speed, the tool is at its largest speed"
+    )
+    for quantity, key, cause, parts, text in (
+        ("feed rate", "feed", "feed rate", limits.feed, ""),
+        (
+            "speed next to a process speed",
+            "process_speed",
+            PROCESS_SPEED,
+            leads,
+            beside,
+        ),
     ):
         for part in parts:
             tables.append(SpeedTable(part.s, part.speed, whole=False))
-            where = f"tool, s = {part.s[0]:.4g} to {part.s[-1]:.4g},"
+            s = f"s = {part.s[0]:.4g} to {part.s[-1]:.4g}"
+            active = text and f"at {s}, {text}"
             labels.append(
-                Label(where, quantity, "m/s", f"tool_limits.{key}", cause=cause)
+                Label(
+                    f"tool, {s},",
+                    quantity,
+                    "m/s",
+                    f"tool_limits.{key}",
+                    active_text=active,
+                    cause=cause,
+                )
             )
     return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 

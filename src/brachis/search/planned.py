@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.common.arrays import clear_rounding
 from brachis.common.summary import Summary
+from brachis.common.threads import use_one_thread
 from brachis.explain import Sensitivities, explain_motion
 from brachis.optimise.backends import SolverReport
 from brachis.robot.from_task import in_use
@@ -64,13 +65,21 @@ class PlannedMotion(Summary):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write trajectory and sensitivities to an npz file, which `Trajectory.load` reads."""
-        replace(self.trajectory, sensitivities=self.sensitivities).save(path)
+        self.explained_trajectory.save(path)
+
+    @property
+    def explained_trajectory(self) -> Trajectory:
+        """The trajectory with what holds it back."""
+        return replace(self.trajectory, sensitivities=self.sensitivities)
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """What limits, process speeds, dwells and stops cost, from the multipliers of the plan."""
+        """What limits and other demands of the task cost, from the multipliers of the plan."""
         candidate = self.candidate
-        return explain_motion(candidate.problem, candidate.refined, candidate.optimum)
+        with use_one_thread():
+            return explain_motion(
+                candidate.problem, candidate.refined, candidate.optimum
+            )
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds."""
@@ -88,7 +97,7 @@ class PlannedMotion(Summary):
             "candidates": f"{len(self.candidates)}, {verified} verified",
             "wall time": f"{self.timing.get('total', 0.0):.2f} s",
             "timing": "" if self.timing_gap is None else str(self.timing_gap),
-            "not_completed": "; ".join(self.not_completed),
+            "not completed": "; ".join(self.not_completed),
             "warnings": "; ".join(remark.message for remark in self.warnings),
         }
         filled = {name: text for name, text in shown.items() if text}

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
 
 from brachis.common.labels import Label
 from brachis.common.summary import Summary
 
 TIMINGS = "timings"
 """Source of sensitivities that come from timings of the joint path, without multipliers."""
+Accuracy = Literal["exact", "estimate", "least", "bound"]
+"""How near a saving is to what the motion would gain; see `TaskSaving`."""
 _STATIONARY = 1e-3
 """Part of the gradient that may be unbalanced at an optimum."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one figure of a limit, or a process speed, costs.
+    """What one figure of a limit, or of the task, costs.
 
     Attributes
     ----------
@@ -31,6 +33,8 @@ class Sensitivity:
         What a change by 100 % means: of most limits the figure itself, of a position the width of its range.
     derivative : float
         Derivative of t_E with respect to the figure, s per unit; <= 0 except at a lower end, which is raised by it.
+    s : tuple of (float, float)
+        Path coordinates between which the figure counts; empty for all of the path.
     """
 
     label: Label
@@ -38,6 +42,7 @@ class Sensitivity:
     figure: float
     full_scale: float
     derivative: float
+    s: tuple[tuple[float, float], ...] = ()
 
     @property
     def outwards(self) -> float:
@@ -53,6 +58,8 @@ class Sensitivity:
         return {
             "subject": self.label.subject,
             "kind": self.label.kind,
+            "key": self.label.key,
+            "s": [list(part) for part in self.s],
             "end": self.side,
             "limit": self.figure,
             "unit": self.label.unit,
@@ -64,7 +71,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class TaskSaving:
-    """What the motion would gain without a dwell, or without a stop.
+    """What the motion would gain if the task asked for something else, such as no dwell or no stop.
 
     Attributes
     ----------
@@ -72,13 +79,13 @@ class TaskSaving:
         In words, for example ``without the dwell at s = 0.3``.
     saved : float
         By how much the motion gets shorter, s.
-    is_bound : bool
-        Whether it saves no more than that along the same joint path; otherwise that is what it saves.
+    accuracy : {"exact", "estimate", "least", "bound"}
+        Whether it saves that; about that; at least about that; or along the same joint path no more than that.
     """
 
     change: str
     saved: float
-    is_bound: bool = False
+    accuracy: Accuracy = "exact"
 
 
 @dataclass(frozen=True)
@@ -115,7 +122,7 @@ class Sensitivities(Summary):
     Attributes
     ----------
     limits : tuple of Sensitivity
-        All figures of all limits but safeguards, and process speeds, the costliest first.
+        All figures of all limits but safeguards, process speeds and blends, the costliest first.
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str

@@ -10,7 +10,7 @@ import pytest
 
 import brachis
 from brachis.apps.bottleneck import check, check_sensitivities
-from brachis.explain import figures_of, sensitivities
+from brachis.explain import figures_of
 from brachis.optimise.backends import solvers_for
 from support.effort import QUICK
 
@@ -19,7 +19,7 @@ LARGE = 1e-4
 
 
 def holds(result, least):
-    found = check_sensitivities(result.candidate.refined)
+    found = check_sensitivities(result.candidate.refined, result.sensitivities)
     large = [entry for entry in found.entries if abs(entry.re_solved) > LARGE]
     assert len(large) >= least
     assert all(entry.optimal for entry in large)
@@ -64,7 +64,7 @@ def test_range_of_a_joint(slide):
 
 def test_a_wrong_prediction_is_found(scara):
     refined = scara("j3").candidate.refined
-    honest = sensitivities(refined)
+    honest = scara("j3").sensitivities
     doubled = tuple(
         dataclasses.replace(entry, derivative=2.0 * entry.derivative)
         for entry in honest.limits
@@ -76,7 +76,7 @@ def test_a_wrong_prediction_is_found(scara):
 def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
     refined = scara("j1").candidate.refined
     program, x = refined.program, refined.x
-    entry = sensitivities(refined).of("j2", "torque")
+    entry = scara("j1").sensitivities.of("j2", "torque")
     ((limit, bound),) = figures_of(program)[entry.label, entry.side]
     other = program.relax(limit, bound, 0.25 * entry.full_scale)
     np.testing.assert_allclose(other.rows(x), program.rows(x), atol=1e-10)
@@ -100,7 +100,9 @@ def test_another_limit_that_takes_over_within_the_step(slide):
     assert result.t_end == pytest.approx(free.t_end, rel=1e-6), (
         "the velocity limit does not hold it back yet"
     )
-    found = check_sensitivities(result.candidate.refined, step=0.05)
+    found = check_sensitivities(
+        result.candidate.refined, result.sensitivities, step=0.05
+    )
     (entry,) = [entry for entry in found.entries if entry.predicted]
     assert entry.predicted == pytest.approx(-0.025 * found.t_end, rel=1e-4)
     assert entry.deviation > 0.1, "the multipliers know nothing of the velocity limit"
@@ -111,15 +113,16 @@ def test_another_limit_that_takes_over_within_the_step(slide):
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
 def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
     for step, rel in ((0.01, 0.05), (1e-5, 1e-3)):
-        for entry in check_sensitivities(
-            scara(joint).candidate.refined, step=step
-        ).entries:
+        refined = scara(joint).candidate.refined
+        predictions = scara(joint).sensitivities
+        for entry in check_sensitivities(refined, predictions, step=step).entries:
             assert entry.predicted * (1.0 + 1e-4) <= entry.linearised <= 0.0
             assert entry.linearised == pytest.approx(entry.predicted, rel=rel, abs=1e-8)
 
 
 def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch):
     refined = scara("j3").candidate.refined
+    predictions = scara("j3").sensitivities
     honest, valley = check._solve_again, 2e-3
 
     def wandering(program, x):
@@ -132,10 +135,10 @@ def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch
 
     expected = {
         entry.sensitivity: entry.re_solved
-        for entry in check_sensitivities(refined).entries
+        for entry in check_sensitivities(refined, predictions).entries
     }
     monkeypatch.setattr(check, "_solve_again", wandering)
-    for entry in check_sensitivities(refined).entries:
+    for entry in check_sensitivities(refined, predictions).entries:
         if entry.predicted:
             assert entry.other_optimum == pytest.approx(-valley, rel=1e-3)
             assert entry.re_solved == pytest.approx(
@@ -156,7 +159,7 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
     monkeypatch.setattr(check, "solvers_for", lambda _name, **_order: (Broken,))
-    answers = check_sensitivities(refined)
+    answers = check_sensitivities(refined, scara("j3").sensitivities)
     found = [entry for entry in answers.entries if entry.predicted]
     assert found
     for entry in found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -64,9 +65,10 @@ def test_a_saved_motion_is_solved_again_by_phase(stopping):
     again = brachis.bottleneck.report(
         stopping.trajectory, reference=True, listener=lines.append
     )
-    assert lines[0] == "solving the problem of the motion again"
+    words = r"planning the motion again from itself: about (\S+) s, no more than 60 s"
+    assert 0.0 < float(re.match(words, lines[1])[1]) < 10.0
     assert any("iteration 1," in line for line in lines)
-    assert lines[-1] == "planning again with discontinuous torque"
+    assert "planning again with discontinuous torque" in lines
     now = brachis.bottleneck.report(stopping)
     for entry in now.sensitivities.limits:
         other = again.sensitivities.of(entry.label.subject, entry.label.kind)

@@ -54,7 +54,7 @@ def test_import(run, recorded, tmp_path):
     outcome = run("bottleneck", out)
     assert outcome.code == 0, outcome.err
     assert (
-        "the motion was not planned, so the cost of its limits is unknown"
+        "what limits cost is unknown: the motion was not planned, or that is not stored with it"
         in outcome.out
     )
     assert run("export", out, "--out", tmp_path / "again.json").code == 0

@@ -102,7 +102,7 @@ def test_bottlenecks_are_when_limits_are_active(imported):
     assert found.to_dict()["sensitivities"] is None
     text = str(found)
     assert text.startswith(
-        "the motion was not planned, so the cost of its limits is unknown\n"
+        "what limits cost is unknown: the motion was not planned, or that is not stored with it\n"
     )
     assert "is at its torque limit for" in text
     with pytest.raises(InputError, match="the cost of its limits cannot be computed"):

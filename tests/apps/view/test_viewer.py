@@ -58,6 +58,31 @@ def test_plots_and_table_follow_the_slider(shown, line_result):
     )
 
 
+def test_what_holds_the_motion_back_is_shown_without_a_solve(line_result, monkeypatch):
+    def refuse(*_given, **_keys):
+        raise AssertionError("solved again")
+
+    module = sys.modules["brachis.apps.bottleneck.report"]
+    monkeypatch.setattr(module, "plan_again", refuse)
+    unknown = "what limits cost is unknown"
+    known = "more torque at j1"
+    for motion, text in (
+        (line_result.explained_trajectory, known),
+        (line_result.trajectory, unknown),
+    ):
+        with Viewer(motion, port=0) as viewer:
+            shown = [handle for handle in contents(viewer) if text in handle]
+            assert len(shown) == 1
+            assert "torque limit for" in shown[0]
+
+
+def contents(viewer):
+    """Return what the viewer's pages say, as HTML."""
+    messages = viewer._server._websock_server._broadcast_buffer.message_from_id
+    parts = [getattr(message, "props", None) for message in messages.values()]
+    return [part.content for part in parts if hasattr(part, "content")]
+
+
 def test_path_and_trace_are_one_curve_and_every_layer_can_be_hidden(shown):
     samples = shown._scene.samples
     path = prescribed_path(shown._trajectory, samples)

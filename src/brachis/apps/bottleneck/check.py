@@ -32,7 +32,6 @@ from brachis.explain import (
     figures_of,
     jacobian_matrix,
     multipliers_of,
-    sensitivities,
 )
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.backends import SolverOptions, residual, solvers_for
@@ -154,7 +153,7 @@ class SensitivityCheck(Summary):
 
 def check_sensitivities(
     refined: SolvedProgram,
-    predictions: Sensitivities | None = None,
+    predictions: Sensitivities,
     *,
     step: float = STEP,
 ) -> SensitivityCheck:
@@ -164,8 +163,8 @@ def check_sensitivities(
     ----------
     refined : SolvedProgram
         ``result.candidate.optimum``.
-    predictions : Sensitivities, optional
-        What is checked; by default the result of `sensitivities`.
+    predictions : Sensitivities
+        What is checked: ``result.sensitivities``.
     step : float, optional
         Fraction by which each limit leaves more room; less if it is negative.
 
@@ -187,7 +186,7 @@ def check_sensitivities(
         if max(residual(program, base), _stationarity(program, base)) > 1e-9:
             base, _ = _solve_again(program, base)
         figures = figures_of(program)
-        for entry in (predictions or sensitivities(refined)).limits:
+        for entry in predictions.limits:
             bounds = figures.get((entry.label, entry.side))
             if bounds is None or entry.label.cause == PROCESS_SPEED:
                 continue  # s(t) follows from the speed: no row of the program stands for it

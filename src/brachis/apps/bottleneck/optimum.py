@@ -1,59 +1,41 @@
-"""The optimisation problem of a saved motion, solved again: for files without sensitivities, and for checks.
+"""A saved motion, planned again from itself: for files that do not say what limits cost, and for checks.
 
-Task, URDF, redundant joints and branch (or the chart), knots and control points are saved. The problem is built over
-these knots, with the branch margin that the motion keeps, solved from the saved control points and refined as in a
-plan. The start is an optimum already, so this takes a few iterations and ends at the same one. A timing of the phase
-plane has too many knots for that: its problem begins over a few, which are refined.
+The start is an optimum already, so that this takes one search without others beside it, and ends at the same optimum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from brachis.common.arrays import spread
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.common.threads import use_one_thread
-from brachis.errors import (
-    DecompositionError,
-    PlanningError,
-    UnknownNameError,
-    UnreachableError,
-)
+from brachis.errors import DecompositionError, PlanningError, UnknownNameError
 from brachis.ik import Family
-from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
-from brachis.optimise.backends import solvers_for
-from brachis.optimise.bspline import clamped_knots
-from brachis.optimise.grid import FixedGrid
-from brachis.optimise.guess import fit_curves, shortest_time
-from brachis.optimise.improve import SolvedProgram, SolverSession
-from brachis.optimise.mesh import adapt_mesh
-from brachis.optimise.motion import Motion
-from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions, refine
-from brachis.optimise.retiming import is_timing_all, keep
-from brachis.optimise.transcription import maps_by_leg, program_over
-from brachis.problem.problem import Decomposition, Problem, decompositions_of
+from brachis.problem.problem import Decompositions, Problem
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JOINTS
+from brachis.search.portfolio import Search
+from brachis.search.stages import FinishedCandidate
 from brachis.trajectory import Trajectory
 
+_SAME = 1e-3
+"""Part of the time by which end times of the same optimum differ, no more."""
 
-def solve_again(
+
+def plan_again(
     trajectory: Trajectory,
     listener: Listener = ignore,
     *,
     families: Sequence[Family] = (),
     own_limits: Sequence[LimitModel] = (),
-) -> SolvedProgram:
-    """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
+) -> FinishedCandidate:
+    """Plan a saved motion again, with its redundant joints and branch, from where it ended.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As `brachis.plan` made it, or loaded.
+        As `brachis.plan` made it, or loaded, without idle joints (`narrow_motion`).
     listener : callable, optional
         Is told of every iteration.
     families, own_limits : sequence, optional
@@ -61,148 +43,56 @@ def solve_again(
 
     Returns
     -------
-    SolvedProgram
-        As ``result.candidate.refined`` of the plan.
+    FinishedCandidate
 
     Raises
     ------
     InputError
         The closed form or the branch is not known here; see `brachis.plan`.
     PlanningError
-        The motion is not an optimum of its problem: no solver of the task came back to it; or the task's time limit
-        was too short for that.
+        The motion is not an optimum of its problem: the plan ended at another one; or the task's time limit was too
+        short for that.
     """
     task = trajectory.task
+    changes: dict[str, object] = {}
+    if task.task_space != JOINTS and not len(trajectory.chart_rows):
+        joints = trajectory.robot.urdf_joints
+        names = tuple(name for name in trajectory.redundant_joints if name in joints)
+        changes |= {"redundant_joints": names, "branch": trajectory.branch}
+    task = task.model_copy(update=changes)
+    problem = Problem.of(trajectory.robot, task, own_limits)
     deadline = Deadline.after(task.search.time_limit)
-    options = RefinementOptions.of(task.refinement, deadline)
-    ends = []
-    with use_one_thread():
-        program, x = _problem(trajectory, families, own_limits)
-        first = program.phases[0].joint_map
-        longest = 1e-3
-        is_timed = task.spline.intervals == "auto" and is_timing_all(program)
-        if is_timed:
-            if not first.r:
-                return SolvedProgram(program, (keep(program, x),))
-            program, x = _over_few_knots(program, x, task.spline.points_per_interval)
-            longest = 0.01  # a timing may be faster than splines over few knots
-        has_law = any(phase.time_law is not None for phase in program.phases)
-        for backend in solvers_for(task.solver.name):
-            if deadline.passed:
-                break
-            solve = SolverSession.for_task(
-                backend,
-                task.solver,
-                first,
-                deadline,
-                listener,
-                has_time_law=has_law,
-            )
-            try:
-                solved = SolvedProgram(program, (solve(program, x),))
-                if is_timed:
-                    solved = adapt_mesh(solved, solve, task.spline, options)
-                refined = refine(solved.program, solved.report, solve, options)
-            except UnreachableError:
-                continue
-            if not refined.converged:
-                continue
-            slower = trajectory.t_end / refined.t_end - 1.0
-            if -longest <= slower <= task.search.slower + 1e-3:
-                return refined
-            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.report.solver}")
-    if deadline.passed:
-        raise PlanningError(
-            f"the time was up before the saved motion (t_E = {trajectory.t_end:.6g} s) was solved again: its "
-            "sensitivities are unknown",
-            where="search.time_limit",
-            found=f"{task.search.time_limit:g} s",
-            hint="Run brachis bottleneck on the task file with a larger search.time_limit: it plans again",
-        )
-    what = "a different optimum" if ends else "no optimum"
+    try:
+        planned = search_from(trajectory, problem, families, deadline, listener)
+    except (DecompositionError, UnknownNameError) as error:
+        raise DecompositionError(
+            "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
+            "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
+            redundant_joints=task.redundant_joints,
+            found=f"{error}",
+        ) from error
+    slower = trajectory.t_end / planned.t_end - 1.0
+    if -_SAME <= slower <= task.search.slower + _SAME:
+        return planned
     raise PlanningError(
-        f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
-        found=", ".join(ends) or None,
+        f"planning the saved motion (t_E = {trajectory.t_end:.6g} s) again found a different optimum: what its limits "
+        "cost is unknown",
+        found=f"t_E = {planned.t_end:.6g} s",
         hint="If the motion was planned with own_limits, pass them here too: they are not saved with it, as in "
         "brachis.bottleneck.report(motion, own_limits=[...]). Otherwise run brachis bottleneck on the task file: it "
         "plans again",
     )
 
 
-def _over_few_knots(
-    program: Program, x: np.ndarray, points: int
-) -> tuple[Program, np.ndarray]:
-    """Write a motion, x, over a few even knots: a timing has too many for a solver."""
-    breaks = np.linspace(0.0, 1.0, 17)
-    phases = []
-    parts = []
-    for phase, motion in zip(program.phases, program.motions(x), strict=True):
-        knots = clamped_knots(phase.degree, breaks)
-        few = phase.with_knots(knots, spread(breaks, points))
-        t_norm = spread(breaks, 8)
-        curves = motion.at(t_norm * motion.t_end)[0]
-        phases.append(few)
-        parts.append(fit_curves(few, motion.t_end, t_norm, curves))
-    first = program.with_phases(phases)
-    return first, shortest_time(first, np.concatenate(parts))
-
-
-def _problem(
-    trajectory: Trajectory,
+def search_from(
+    motion: Trajectory,
+    problem: Problem,
     families: Sequence[Family],
-    own_limits: Sequence[LimitModel],
-) -> tuple[Program, np.ndarray]:
-    """Build the problem over the saved knots; the motion is its point x."""
-    task = trajectory.task
-    robot = trajectory.robot
-    is_on_branch = task.task_space != JOINTS and not len(trajectory.chart_rows)
-    if is_on_branch:
-        names = [
-            name for name in trajectory.redundant_joints if name in robot.urdf_joints
-        ]
-        chosen = {"redundant_joints": tuple(names), "branch": trajectory.branch}
-        task = task.model_copy(update=chosen)
-    problem = Problem.of(robot, task, own_limits)
-    joint_map: JointMap
-    if is_on_branch:
-        decomposition = _find_decomposition(problem, families)
-        joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
-    elif task.task_space == JOINTS:
-        joint_map = JointSpaceMap(problem.robot, problem.path)
-    else:
-        rows = ChartRows(trajectory.chart_rows, trajectory.chart_knots)
-        s = trajectory.path_coordinate(trajectory.times)
-        path = problem.path
-        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
-    parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
-    moving = [(phase, spline) for phase, spline in parts if not phase.is_dwell]
-    starts = trajectory.position([phase.begin for phase, _ in moving])
-    grids = []
-    motions = []
-    for (_, spline), law in zip(moving, problem.time_laws, strict=True):
-        t_norm = spread(np.unique(spline.knots), task.spline.points_per_interval)
-        grids.append(FixedGrid(spline.knots, spline.degree, t_norm))
-        points = spline.control_points[0 if law is None else 1 :]
-        motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
-    program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
-    return program, program.variables_from(motions)
-
-
-def _find_decomposition(problem: Problem, families: Sequence[Family]) -> Decomposition:
-    """Find the closed form and the branch of a saved motion, which its problem names.
-
-    Raises
-    ------
-    DecompositionError
-        No closed form fits: the motion was planned with one that is not known here.
-    """
-    try:
-        (decomposition,) = decompositions_of(problem, families)
-    except (DecompositionError, UnknownNameError) as error:
-        raise DecompositionError(
-            "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
-            "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
-            redundant_joints=problem.task.redundant_joints,
-            found=f"{error}",
-        ) from error
-    return decomposition
+    deadline: Deadline,
+    listener: Listener,
+) -> FinishedCandidate:
+    """Search for the fastest motion of a problem from one of a similar problem; raise PlanningError without any."""
+    search = Search(problem, Decompositions(problem, families), deadline, listener)
+    with use_one_thread(), search.end_early():
+        search.run(motion)
+    return search.outcome().best

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,17 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import freeze, spread
 from brachis.common.summary import Summary
+from brachis.explain.sensitivities import label_of_speed
+from brachis.explain.task_figures import PROCESS_SPEED_KEY
 from brachis.limits import Label, Limit, Moments, limits_of
+from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.program import Program, is_safeguard
 from brachis.trajectory import MotionPhase, Samples, Trajectory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LimitRatios(Summary):
-    """Ratios of the motion to all limits of its task. The arrays are read-only.
+    """Ratios of the motion to all limits of its task, and to its process speeds. The arrays are read-only.
 
     Attributes
     ----------
@@ -28,7 +31,8 @@ class LimitRatios(Summary):
         What every column is.
     values : (K, c) ndarray
         1 at the upper limit, -1 at the lower one. Of a position it is the place in its range: 0 in the middle. Of
-        a range with one end it is 1 minus the distance from it, rad or m, and 0 farther away.
+        a range with one end it is 1 minus the distance from it, rad or m, and 0 farther away. Of a process speed it is
+        1 while the tool has this speed, 0 otherwise.
     """
 
     t: np.ndarray
@@ -102,8 +106,29 @@ def limit_ratios(
     s = trajectory.path_coordinate(t)
     moments = Moments(trajectory.position(t), trajectory.velocity(t), qddot, jerk, s)
     values = [limit.ratios(moments, t) for limit in limits]
-    labels = tuple(label for limit in limits for label in limit.labels)
-    return LimitRatios(t, labels, np.hstack([np.empty((len(t), 0)), *values]))
+    labels = [label for limit in limits for label in limit.labels]
+    for speed in sorted({phase.speed or 0.0 for phase in trajectory.phases} - {0.0}):
+        labels.append(_label_of_held_speed(speed))
+        values.append(_has_speed(trajectory, speed, t)[:, None])
+    together = np.hstack([np.empty((len(t), 0)), *values])
+    return LimitRatios(t, tuple(labels), together)
+
+
+def _label_of_held_speed(speed: float) -> Label:
+    """Name a process speed, m/s, as what holds the tool back."""
+    label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
+    text = f"the tool is held at its {label.kind}"
+    return replace(label, active_text=text, share="tool speed / limit")
+
+
+def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarray:
+    """Return 1 at the times, (K,), at which the tool has a given speed, m/s, and 0 at others."""
+    slack = tolerances.TIME * trajectory.t_end
+    is_held = np.zeros(len(t))
+    for phase in trajectory.phases:
+        if phase.speed == speed:
+            is_held[(t >= phase.begin - slack) & (t <= phase.end + slack)] = 1.0
+    return is_held
 
 
 THRESHOLD = 0.99

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from brachis.apps import bottleneck
-from brachis.apps.bottleneck.report import write_active
 from brachis.apps.bottleneck.saturation import (
     LimitRatios,
     Saturation,
     dense_samples,
     limit_ratios,
     limits_in,
-    saturations,
 )
 from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of
 from brachis.errors import BrachisError
@@ -90,12 +88,13 @@ def reported_motion(
         limits = limits_in(motion.candidate.refined.program)
     limits = limits or limits_of(trajectory.robot, trajectory.task)
     ratios = limit_ratios(trajectory, limits)
-    found = saturations(ratios)
+    unknown = []
     try:
-        held_back = bottleneck.report(motion).text(degrees=degrees).splitlines()
+        found = bottleneck.report(motion)
     except BrachisError as error:
-        unknown = f"What the limits cost is not known: {error}"
-        held_back = [*write_active(found), unknown]
+        found = bottleneck.report(motion, solve=False)
+        unknown = [f"What the limits cost is not known: {error}"]
+    held_back = (*found.text(degrees=degrees).splitlines(), *unknown)
     samples = dense_samples(trajectory)
     rows = joint_rows_of(trajectory)
     return ReportedMotion(
@@ -103,8 +102,8 @@ def reported_motion(
         samples=samples,
         panels=panels_of(trajectory, samples, *rows, degrees=degrees),
         ratios=ratios,
-        saturations=found,
-        held_back=tuple(held_back),
+        saturations=found.saturations,
+        held_back=held_back,
         guarantees=describe_guarantees(limits),
         degrees=degrees,
         **known,

@@ -70,6 +70,11 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
     return _table((*WORDS, *TIMES, STATUS), rows, cell=_WRAPPED) + note
 
 
+def paragraphs(lines: Sequence[str]) -> str:
+    """Write sentences, a paragraph each."""
+    return "".join(_paragraph(line) for line in lines)
+
+
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
     """Colour bar of the tool's speed from 0 to `fastest`, m/s; `stops` are CSS colours."""
     marks = "".join(

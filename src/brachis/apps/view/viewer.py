@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.apps import bottleneck
 from brachis.apps.view import tables
 from brachis.apps.view.panel import (
     RATES,
@@ -257,12 +258,16 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._scene.set_visible(name, visible=event.target.value)
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> None:
-        """Add a panel with the plots and the list of candidates."""
+        """Add a panel with the plots, what holds the motion back, and the list of candidates."""
         panel = self._gui.add_panel()
         with panel.add_tab("limits"):
             samples = self._scene.samples
             shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
             self._lines = [add_plot(self._gui, each) for each in shown]
+        with panel.add_tab("bottlenecks"):
+            found = bottleneck.report(self._trajectory, solve=False)
+            lines = found.text(degrees=self._degrees).splitlines()
+            self._gui.add_html(tables.paragraphs(lines))
         count = f" ({len(candidates)})" if candidates else ""
         with panel.add_tab(f"candidates{count}"):
             self._gui.add_html(tables.candidates_table(candidates))

@@ -1,0 +1,280 @@
+"""What figures of the task cost that no row of a program has for a bound: process speeds and blends.
+
+At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is
+the change of L if such a figure changes and the free variables stay; durations that follow from a speed change with it.
+If only the timing is optimal, of a joint path that follows from the path of the tool, dt_E is the change of its time.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import pairwise
+
+import numpy as np
+
+from brachis.common.labels import Label
+from brachis.errors import InputError, UnreachableError
+from brachis.explain.multipliers import Multipliers
+from brachis.explain.sensitivities import label_of_speed
+from brachis.limits.tool import PROCESS_SPEED
+from brachis.optimise.boundary import Boundary, EndCondition
+from brachis.optimise.phase import Phase
+from brachis.optimise.phase_timing import PhaseTiming
+from brachis.optimise.program import Program
+from brachis.optimise.retiming import least_time
+from brachis.optimise.transcription import boundary_of
+from brachis.path import (
+    legs_of,
+    path_of,
+    time_law_of,
+    with_feed_rates,
+    with_held_speeds,
+)
+from brachis.problem.problem import Problem
+from brachis.task import Task
+from brachis.task.segments import BSplineSegment
+from brachis.trajectory.sensitivities import Sensitivity
+
+Value = Callable[[Program, np.ndarray], float]
+"""A function of a program and a point, (v,), whose change is that of t_E, s, if a figure of the task changes."""
+_STEP = 1e-4
+"""Part by which a figure is changed in the Lagrangian."""
+_STEP_OF_TIMING = 1e-2
+"""The same in timings, whose stations make an error of about 1e-6 of the time."""
+PROCESS_SPEED_KEY = "tool_limits.process_speed"
+"""Key of the task that lists process speeds which are not those of segments."""
+
+
+@dataclass(frozen=True, eq=False)
+class OptimalMotion:
+    """An answer, and how t_E changes with what its program is made of.
+
+    Attributes
+    ----------
+    problem : Problem
+    program : Program
+        Of the problem.
+    x : (v,) ndarray
+        The answer.
+    value : callable
+    step : float
+        Part by which figures are changed.
+    """
+
+    problem: Problem
+    program: Program
+    x: np.ndarray
+    value: Value
+    step: float
+
+    @classmethod
+    def with_multipliers(
+        cls, problem: Problem, program: Program, x: np.ndarray, multipliers: Multipliers
+    ) -> OptimalMotion:
+        """Take the Lagrangian; limits without active rows are left out."""
+        active = multipliers.active_set
+        weights = np.zeros(len(program.lower))
+        np.add.at(
+            weights, active.rows, active.signs * multipliers.weights[: len(active.rows)]
+        )
+        by_limit = [
+            (limit, weights[program.rows_of(limit)]) for limit in program.limits
+        ]
+        held = [(limit, of_limit) for limit, of_limit in by_limit if of_limit.any()]
+        of_links = weights[len(weights) - sum(link.size for link in program.links) :]
+        kept = {limit for limit, _ in held}
+        program = program.with_phases(
+            phase.with_limits([limit for limit in phase.limits if limit in kept])
+            for phase in program.phases
+        )
+
+        def value(program: Program, x: np.ndarray) -> float:
+            rows = program.rows(x)
+            total = of_links @ rows[len(rows) - len(of_links) :]
+            for limit, of_limit in held:
+                total += np.sum(of_limit * rows[program.rows_of(limit)])
+            return program.end_time(x) - float(total)
+
+        return cls(problem, program, x, value, _STEP)
+
+    @classmethod
+    def with_timings(
+        cls, problem: Problem, program: Program, x: np.ndarray
+    ) -> OptimalMotion:
+        """Take the least time of the joint path."""
+
+        def value(program: Program, x: np.ndarray) -> float:
+            timings = (
+                PhaseTiming.of(*pair, is_rough=True) for pair in program.split(x)
+            )
+            return least_time(timings)
+
+        return cls(problem, program, x, value, _STEP_OF_TIMING)
+
+    def change(self, changed: Problem) -> float:
+        """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
+        phases = []
+        parts = []
+        for number, (phase, x_of_phase) in enumerate(self.program.split(self.x)):
+            path = changed.leg_paths[number]
+            joint_map = phase.joint_map.along(path, phase.joint_map.start)
+            boundary = _with_conditions_of(
+                phase.boundary, boundary_of(changed, joint_map, number)
+            )
+            arguments = (joint_map, phase.limits, phase.grid, boundary)
+            other = Phase(*arguments, margin=None, pause=phase.pause)
+            phases.append(other)
+            parts.append(_carry_over(phase, x_of_phase, other))
+        program = self.program.with_phases(phases)
+        try:
+            after = self.value(program, np.concatenate(parts))
+        except UnreachableError:
+            return 0.0
+        change = after - self._unchanged
+        return change if np.isfinite(change) else 0.0
+
+    @cached_property
+    def _unchanged(self) -> float:
+        """Value of the answer itself."""
+        return self.value(self.program, self.x)
+
+
+def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
+    """Give as many derivatives as before: from rest, those of redundant joints stay zero if the tool begins to move."""
+
+    def join(
+        old: tuple[EndCondition, ...], new: tuple[EndCondition, ...]
+    ) -> tuple[EndCondition, ...]:
+        return tuple(
+            EndCondition(one.value, max(one.derivatives, other.derivatives, key=len))
+            for one, other in zip(new, old, strict=True)
+        )
+
+    start = join(before.start, after.start)
+    end = join(before.end, after.end)
+    return replace(after, start=start, end=end)
+
+
+def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
+    """Take a motion, (v,), over to a phase that passes the same leg at other path coordinates, or at another speed."""
+    carried = x.copy()
+    if other.time_law is not None:
+        carried[0] = other.time_law.duration
+        return carried
+    of_s = phase.slices[0]
+    begin = phase.boundary.start[0].value
+    ratio = other.boundary.ahead[0] / phase.boundary.ahead[0]
+    carried[of_s] = other.boundary.start[0].value + ratio * (x[of_s] - begin)
+    return carried
+
+
+@dataclass(frozen=True)
+class _Figure:
+    """A figure of a task: its name, its value, the parts of the path where it counts, and the problem with another."""
+
+    label: Label
+    value: float
+    s: tuple[tuple[float, float], ...]
+    change: Callable[[float], Problem]
+
+
+def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
+    """Derive what the task's figures cost; figures that cannot be larger are left out."""
+    costs = []
+    for figure in (*_speeds(motion.problem), *_blends(motion.problem)):
+        value = figure.value
+        step = motion.step * value
+        try:
+            changed = figure.change(value + step)
+        except InputError:
+            continue
+        derivative = motion.change(changed) / step
+        cost = Sensitivity(figure.label, None, value, value, derivative, figure.s)
+        costs.append(cost)
+    return tuple(costs)
+
+
+def _speeds(problem: Problem) -> Iterator[_Figure]:
+    """List process speeds; parts of the path with the same speed have one figure."""
+    limits = problem.task.tool_limits
+
+    def change(before: float, after: float) -> Problem:
+        parts = tuple(
+            part.model_copy(update={"speed": after}) if part.speed == before else part
+            for part in limits.process_speed
+        )
+        changed = limits.model_copy(update={"process_speed": parts})
+        task = problem.task.model_copy(update={"tool_limits": changed})
+        return _with_legs(replace(problem, task=task))
+
+    for speed in sorted({part.speed for part in limits.process_speed}):
+        parts = [part for part in limits.process_speed if part.speed == speed]
+        keys = dict.fromkeys(
+            PROCESS_SPEED_KEY if part.segment is None else f"path[{part.segment}].speed"
+            for part in parts
+        )
+        label = label_of_speed(PROCESS_SPEED, speed, ", ".join(keys))
+        places = tuple(part.s for part in parts)
+        yield _Figure(label, speed, places, partial(change, speed))
+
+
+def _blends(problem: Problem) -> Iterator[_Figure]:
+    """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
+    path = problem.path
+    segments = problem.task.path
+    places = {
+        before.segment: (float(begin), float(end))
+        for before, blend, (begin, end) in zip(
+            path.pieces, path.pieces[1:], pairwise(path.breaks[1:]), strict=False
+        )
+        if blend.segment is None and before.segment is not None
+    }
+    groups: defaultdict[tuple[str, float], list[int]] = defaultdict(list)
+    source = ""
+    for number, (segment, after) in enumerate(pairwise(segments)):
+        if isinstance(segment, BSplineSegment) and segment.bspline.fit:
+            source = segment.bspline.fit.source
+        if number in places:
+            is_of_file = isinstance(after, BSplineSegment) and not after.bspline.fit
+            size = 0.0 if is_of_file else segment.blend or 0.0
+            groups[source if is_of_file else "", size].append(number)
+
+    def change(numbers: list[int], before: float, after: float) -> Problem:
+        path = list(segments)
+        for number in numbers:
+            size = (path[number].blend or 0.0) * after / before
+            path[number] = path[number].model_copy(update={"blend": size})
+        task = problem.task.model_copy(update={"path": tuple(path)})
+        return _with_task(problem, task)
+
+    for (source, _), numbers in groups.items():
+        largest = max(segments[number].blend or 0.0 for number in numbers)
+        cause = f"blend at the corners of {source}" if source else "blend"
+        key = "csv.tolerance.corner" if source else "path.blend"
+        label = Label("path", f"{cause}, {largest:.10g} m", "m", key, cause=cause)
+        s = tuple(places[number] for number in numbers)
+        yield _Figure(label, largest, s, partial(change, numbers, largest))
+
+
+def _with_task(problem: Problem, task: Task) -> Problem:
+    """Return the problem with another path, and the process speeds and feed rates on it.
+
+    Raises
+    ------
+    PathError
+        The path is not possible.
+    """
+    task_map = problem.task_map
+    path = path_of(task_map, task)
+    task = with_held_speeds(with_feed_rates(task, path), task_map, path)
+    return _with_legs(replace(problem, task=task, path=path))
+
+
+def _with_legs(problem: Problem) -> Problem:
+    """Return the problem with the legs and time laws of its task and path."""
+    legs = legs_of(problem.task, problem.task_map, problem.path)
+    laws = tuple(time_law_of(leg, problem.task_map, problem.path) for leg in legs)
+    return replace(problem, legs=legs, time_laws=laws)

@@ -1,0 +1,195 @@
+"""Rows for what a task asks beside its limits: each is compared with a plan of the other task."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.kinematics import Newton
+from support.effort import QUICK
+
+STEP = 0.01
+CORNER = [{"line": {"by": [0.25, 0.0]}, "blend": 0.05}, {"line": {"by": [0.0, 0.25]}}]
+
+
+def task_of(*, locked: bool, **changes: Any) -> dict[str, Any]:
+    """Return a corner for the planar arm; with a locked joint its motion follows from the path alone."""
+    task = copy.deepcopy(brachis.load_task(brachis.examples.scara_line).to_dict())
+    task |= {"path": CORNER, "redundant_joints": ["j1"], "search": QUICK}
+    task["spline"] = {"intervals": "auto"}
+    if locked:
+        *joints, last = task["start"]["joints"]
+        task["robot"]["locked_joints"] = {"j3": last}
+        task |= {"start": {"joints": joints}, "redundant_joints": []}
+    return task | changes
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["redundant", "locked"])
+def corner(request) -> tuple[bool, brachis.Result]:
+    """A corner that is rounded by 5 cm, once with multipliers and once with timings."""
+    return request.param, brachis.plan(task_of(locked=request.param))
+
+
+def least_time(result: brachis.Result) -> float:
+    """Return the least time of its joint path, s: splines are up to 0.1 % slower."""
+    return result.timing_gap.least_time
+
+
+def test_a_larger_blend_saves_what_is_said(corner):
+    locked, result = corner
+    assert (result.sensitivities.source == "timings") is locked
+    entry = result.sensitivities.of("path", "blend, 0.05 m")
+    first, second = CORNER
+    path = [{**first, "blend": (1.0 + STEP) * first["blend"]}, second]
+    larger = brachis.plan(task_of(locked=locked, path=path), start_from=result)
+    change = least_time(larger) - least_time(result)
+    assert entry.change(STEP) == pytest.approx(change, rel=0.05)
+    assert entry.change(STEP) < -1e-3
+    ((begin, end),) = entry.s
+    assert 0.0 < begin < 0.5 < end < 1.0
+    assert "a blend of 0.055 m in place of 0.05 m saves" in str(result.bottleneck())
+
+
+def test_a_blend_that_cannot_be_larger_has_no_row():
+    first, second = CORNER
+    path = [{**first, "blend": 0.125}, second]
+    costs = brachis.plan(task_of(locked=True, path=path)).sensitivities
+    assert not [entry for entry in costs.limits if entry.label.subject == "path"]
+
+
+def named(result: brachis.Result, words: str) -> brachis.bottleneck.TaskSaving:
+    """Return the only row of the task with these words."""
+    (saving,) = [row for row in result.sensitivities.task if words in row.change]
+    return saving
+
+
+@pytest.mark.parametrize("end", ["start", "end"])
+def test_ends_in_motion_save_what_is_said(corner, end):
+    locked, result = corner
+    saving = named(result, f"boundary.{end}_speed")
+    assert saving.accuracy == ("estimate" if locked else "least")
+    if not locked:  # a search for another joint path may find more
+        return
+    speed = 0.1 * float(saving.change.split()[1])
+    moving = brachis.plan(task_of(locked=locked, boundary={f"{end}_speed": speed}))
+    gained = least_time(result) - least_time(moving)
+    assert 0.1 * saving.saved == pytest.approx(gained, rel=0.05)
+
+
+def test_higher_speeds_at_the_ends_save_what_is_said():
+    def moving(speed: float) -> brachis.Result:
+        boundary = {"start_speed": 0.1, "end_speed": speed}
+        return brachis.plan(task_of(locked=True, boundary=boundary))
+
+    result = moving(0.1)
+    saving = named(result, "boundary.end_speed: 0.11 in place of 0.1")
+    gained = least_time(result) - least_time(moving(0.1 + 0.1 * STEP))
+    assert 0.1 * saving.saved == pytest.approx(gained, rel=0.05)
+
+
+@pytest.mark.parametrize("intervals", [10, 40])
+def test_accelerations_that_may_jump_at_rest_save_about_what_is_said(intervals):
+    task = task_of(locked=False, path=[{"line": {"by": [0.3, 0.3]}}])
+
+    def resting(rest: str) -> brachis.Result:
+        return brachis.plan({**task, "spline": {"intervals": intervals, "rest": rest}})
+
+    result = resting("full")
+    gained = result.t_end - resting("velocity").t_end
+    saving = named(result, "spline.rest: velocity in place of full")
+    assert saving.accuracy == "estimate"
+    assert saving.saved == pytest.approx(gained, rel=0.2)
+    assert not [
+        row for row in resting("velocity").sensitivities.task if "rest" in row.change
+    ]
+
+
+def test_another_start_posture_saves_about_what_is_said():
+    line = [{"line": {"length": 1.0, "angle_deg": 0.0}}]
+    task = task_of(locked=False, path=line, spline={"intervals": 40})
+    result = brachis.plan(task)
+    saving = named(result, "start posture")
+    problem = result.candidate.problem
+    words = saving.change.split()
+    joint = problem.robot.joint_names.index(words[3])
+    turn = float(words[4]) * (1.0 if "higher" in words else -1.0)
+    newton = Newton(problem.task_map)
+    null = newton.self_motions(problem.start[None])[0][:, 0]
+    moved = problem.start + turn / null[joint] * null
+    place = problem.path.sample(np.zeros(1)).target
+    (start,) = newton.nearest(place, moved[None])
+    again = brachis.plan({**task, "start": {"joints": start.tolist()}})
+    assert saving.saved == pytest.approx(result.t_end - again.t_end, rel=0.05)
+    assert "deg)" in saving.change
+
+
+def test_corners_of_points_have_one_row():
+    side = np.linspace(0.0, 0.2, 41)
+    flat = np.zeros(41)
+    points = np.concatenate(
+        [
+            np.column_stack([side, flat]),
+            np.column_stack([flat + 0.2, side])[1:],
+            np.column_stack([0.2 - side, flat + 0.2])[1:],
+        ]
+    )
+
+    def fitted(corner: float) -> brachis.Result:
+        tolerance = {"position": 1e-4, "corner": corner}
+        path = brachis.fit_path(points, tolerance=tolerance, relative=True)
+        return brachis.plan(task_of(locked=True, path=path))
+
+    result = fitted(5e-3)
+    (entry,) = [
+        entry for entry in result.sensitivities.limits if entry.label.subject == "path"
+    ]
+    assert len(entry.s) == 2
+    assert entry.label.key == "csv.tolerance.corner"
+    gained = least_time(fitted(5e-3 * (1.0 + STEP))) - least_time(result)
+    assert entry.change(STEP) == pytest.approx(gained, rel=0.05)
+    assert "a blend at the corners of points of" in str(result.bottleneck())
+
+
+def test_a_motion_without_stored_figures_gets_the_same(corner):
+    _, result = corner
+    again = brachis.bottleneck.report(result.trajectory).sensitivities
+    largest = result.sensitivities.limits[0].change(STEP)
+    for entry in result.sensitivities.limits:
+        other = again.of(entry.label.subject, entry.label.kind, entry.side)
+        same = pytest.approx(entry.change(STEP), abs=0.02 * abs(largest))
+        assert other.change(STEP) == same
+
+
+def test_segments_with_speeds_and_a_blend_between_them():
+    seams = brachis.load_task(brachis.examples.weld_seams).to_dict()
+    speeds = (0.3, 0.15)
+
+    def welded(
+        *speeds: float, blend: float = 0.06, known: brachis.Result | None = None
+    ) -> brachis.Result:
+        lines = [{"by": [0.1, 0.45, 0.0]}, {"by": [0.3, 0.0, 0.05]}]
+        path = [
+            {"line": line, "speed": speed}
+            for line, speed in zip(lines, speeds, strict=True)
+        ]
+        path[0]["blend"] = blend
+        task = {**seams, "path": path, "tool_limits": {}}
+        return brachis.plan(task, start_from=known)
+
+    result = welded(*speeds)
+    costs = result.sensitivities
+    assert all(entry.change(STEP) <= 0.0 for entry in costs.limits)
+    for number, speed in enumerate(speeds):
+        faster = [*speeds]
+        faster[number] *= 1.0 + STEP
+        gained = welded(*faster, known=result).t_end - result.t_end
+        entry = costs.of("tool", f"process speed of {speed} m/s")
+        assert entry.change(STEP) == pytest.approx(gained, rel=0.05)
+        assert entry.label.key == f"path[{number}].speed"
+    larger = welded(*speeds, blend=0.06 * (1.0 + STEP), known=result)
+    entry = costs.of("path", "blend, 0.06 m")
+    assert entry.change(STEP) == pytest.approx(larger.t_end - result.t_end, rel=0.05)
