@@ -160,7 +160,7 @@ def test_a_motion_without_stored_figures_gets_the_same(corner):
     largest = result.sensitivities.limits[0].change(STEP)
     for entry in result.sensitivities.limits:
         other = again.of(entry.label.subject, entry.label.kind, entry.side)
-        same = pytest.approx(entry.change(STEP), abs=0.02 * abs(largest))
+        same = pytest.approx(entry.change(STEP), abs=0.05 * abs(largest))
         assert other.change(STEP) == same
 
 
