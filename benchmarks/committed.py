@@ -24,6 +24,12 @@ def processor_time() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
+def peak_memory() -> float:
+    """Return the largest memory, MB, that this process has had, or one of its children that have ended."""
+    both = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return max(resource.getrusage(who).ru_maxrss for who in both) / 1024.0
+
+
 def save(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str = ""
 ) -> None:
