@@ -31,9 +31,13 @@ def peak_memory() -> float:
 
 
 def save(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str = ""
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    about: str = "",
+    name: str | None = None,
 ) -> None:
-    """Write benchmarks/results/NAME.json, named after the script that runs, if the command line has ``--save``.
+    """Write benchmarks/results/NAME.json, if the command line has ``--save``.
 
     Parameters
     ----------
@@ -43,6 +47,8 @@ def save(
         Cells as they are printed, with units.
     about : str, optional
         A sentence or two above the table.
+    name : str, optional
+        The script's name by default.
     """
     script, *arguments = sys.argv
     if "--save" in arguments:
@@ -54,7 +60,7 @@ def save(
             else:
                 told.append(argument)
         write(
-            Path(script).stem,
+            name or Path(script).stem,
             " ".join(
                 [
                     "python",
