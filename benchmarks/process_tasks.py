@@ -1,7 +1,8 @@
 """Tasks as a cell has them: process speeds, stops and dwells beside limits of every kind.
 
 `seeded` takes random tasks of mixed kinds (`mixed_cases`) and adds two of `EXTRAS` to each, so that every pair occurs;
-a task is drawn again if no joint motion is known to do it. Every tenth task is a joint path through waypoints.
+a task is drawn again if no joint motion is known to do it, and process speeds are such that the drives can hold them
+along that joint path. Every tenth task is a joint path through waypoints.
 """
 
 from __future__ import annotations
@@ -18,12 +19,16 @@ import joint_paths
 import mixed_cases
 from brachis import load_task
 from brachis.path import path_of
-from brachis.robot import bind
+from brachis.robot import Robot, bind, dynamics
 from brachis.robot.from_task import robot_for
 from mixed_robots import ROBOTS, ROOT
 
 COUNT = 60
 SEED = 53
+HELD = 0.95
+"""Part of the limits within which the known joint path can be passed at the process speed."""
+SLOWER = 0.8
+"""Factor on a process speed that is too high for that."""
 DOWNWARDS = [0, 1, 0, 0]
 """Quaternion, w first, of a tool that points down."""
 Keys = dict[str, Any]
@@ -101,7 +106,7 @@ def seeded(folder: Path, numbers: range = range(COUNT)) -> Iterator[tuple[str, P
         if number % 10 == 9:
             task = joint_paths.case(SEED + number, "auto").to_dict()
             file.write_text(yaml.safe_dump(task, sort_keys=False), encoding="utf-8")
-            yield f"{number} iiwa14 waypoints", file
+            yield f"process {number}: iiwa14, waypoints", file
             continue
         extras = pairs[number % len(pairs)]
         for attempt in itertools.count():
@@ -115,7 +120,8 @@ def seeded(folder: Path, numbers: range = range(COUNT)) -> Iterator[tuple[str, P
             changed["spline"]["intervals"] = "auto"
         file.write_text(yaml.safe_dump(changed, sort_keys=False), encoding="utf-8")
         names = ", ".join(extra.__name__.replace("_", " ") for extra in extras)
-        yield f"{number} {robot} {made.kind}, {names}", file
+        kind = made.kind.replace(" | ", ", ")
+        yield f"process {number}: {robot}, {kind}, {names}", file
 
 
 def _with_extras(
@@ -130,10 +136,32 @@ def _with_extras(
     for extra in extras:
         extra(rng, task, length)
     robot = robot_for(None, load_task({**task, "path": loaded.to_dict()["path"]}).robot)
-    _, task_map = bind(robot, loaded.task_space)
+    robot, task_map = bind(robot, loaded.task_space)
     case = mixed_cases.Case(file.stem, made.kind, file)
     known = mixed_cases.known_joint_path(task, task_map, made.joint_path, case)
-    return None if known is None else task
+    if known is None:
+        return None
+    held = task.get("tool_limits", {}).get("process_speed")
+    while held and not _can_hold(robot, known, held["speed"] / length):
+        held["speed"] *= SLOWER
+    return task
+
+
+def _can_hold(robot: Robot, joint_path: np.ndarray, rate: float) -> bool:
+    """Tell whether the drives can pass the middle of a joint path, (K, n), at a rate of s, 1/s."""
+    step = 1.0 / (len(joint_path) - 1)
+    by_s = np.gradient(joint_path, step, axis=0)
+    by_s2 = np.gradient(by_s, step, axis=0)
+    middle = slice(int(0.25 / step), int(0.75 / step))
+    q, qdot, qddot = (
+        each[middle] for each in (joint_path, by_s * rate, by_s2 * rate**2)
+    )
+    torque = np.abs(dynamics.torque(robot, q, qdot, qddot)) + robot.friction.coulomb
+    limits = robot.limits
+    return bool(
+        np.all(torque <= HELD * limits.torque)
+        and np.all(np.abs(qdot) <= HELD * limits.velocity)
+    )
 
 
 def weld(folder: Path) -> dict[str, Any]:
