@@ -50,6 +50,8 @@ RAIL_START = {"joints": [0.0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1]}
 PANDA_START = {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]}
 JACO = "kinova_description/robots/kinova.urdf"
 UR10 = "ur_description/urdf/ur10_robot.urdf"
+DETAILED = 5
+"""Tasks of a line, no more, that have rows of their own in the table."""
 COLUMNS = (
     "line",
     "verified",
@@ -165,7 +167,7 @@ def mixed(folder: Path, **keys: Any) -> Tasks:
             made = mixed_cases.case(robot, MIXED_SEED, number, folder)
             task = yaml.safe_load(made.task.read_text(encoding="utf-8"))
             task["spline"].update(keys)
-            yield f"{made.name} {made.kind}", task
+            yield f"{made.name} {made.kind.replace(' | ', ', ')}", task
 
 
 def mixed_auto(folder: Path) -> Tasks:
@@ -306,6 +308,8 @@ def main() -> None:
         works, *others = measure(name, tasks(folder.absolute()), folder, given)
         rows.append(row(name, works))
         print(" | ".join(rows[-1]), flush=True)
+        if 1 < len(works) <= DETAILED:
+            rows += [row(f"{name}: {work.task}", [work]) for work in works]
         for other in others:
             print(" | ".join(row(f"{name}, {given.beside}", other)), flush=True)
             compared.append(ratios(name, works, other))
