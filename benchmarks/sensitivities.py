@@ -35,12 +35,13 @@ import process_tasks
 from brachis import LimitSpec, Result, Robot, Trajectory, load_task, plan
 from brachis.apps.bottleneck import CheckedSensitivity, check_sensitivities
 from brachis.apps.bottleneck.check import _solve_again
-from brachis.apps.bottleneck.optimum import _problem
 from brachis.errors import BrachisError, BrachisWarning, PlanningError
 from brachis.explain import Sensitivity, sensitivities
 from brachis.limits.tool import PROCESS_SPEED
-from brachis.optimise.extraction import extract_trajectory
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import is_safeguard
 from brachis.optimise.retiming import SOLVER
+from brachis.optimise.transcription import boundary_of
 from brachis.problem.problem import Problem
 from brachis.task import Task
 from brachis.task.limit_kinds import LIMIT_KINDS
@@ -385,10 +386,12 @@ class Changes:
         return optimum.t_end / self.result.candidate.refined.t_end
 
     @cached_property
-    def motion(self) -> Trajectory:
-        """The optimum whose multipliers are used."""
-        optimum = self.result.candidate.optimum
-        return extract_trajectory(self.problem.task, optimum.program, optimum.x)
+    def starts(self) -> np.ndarray:
+        """Postures at which the legs begin, (legs, n)."""
+        motion = self.result.trajectory
+        return motion.position(
+            [phase.begin for phase in motion.phases if not phase.is_dwell]
+        )
 
     @cached_property
     def unchanged(self) -> Solved:
@@ -397,18 +400,25 @@ class Changes:
     def solve(
         self, robot: Robot, task: Task, begin: np.ndarray | None = None
     ) -> Solved:
-        """Solve from the motion, or from a point x, with another robot or task."""
-        solved = self.result.candidate.optimum
-        if solved.report.solver == SOLVER:
-            problem = Problem.of(robot, task)
+        """Solve from the optimum, or from a point x, with another robot or task."""
+        optimum = self.result.candidate.optimum
+        problem = Problem.of(robot, task)
+        if optimum.report.solver == SOLVER:
             gap = find_timing_gap(self.result.trajectory, problem.limits)
             return Solved(gap.least_time)
-        program, x = _problem(replace(self.motion, robot=robot, task=task), (), ())
-        program = program.with_phases(
-            phase.with_grid(own.grid, phase.boundary)
-            for phase, own in zip(program.phases, solved.program.phases, strict=True)
-        )
-        answer, optimal = _solve_again(program, x if begin is None else begin)
+        phases = []
+        for number, phase in enumerate(optimum.program.phases):
+            joint_map = phase.joint_map
+            leg, before = problem.legs[number], self.problem.legs[number]
+            if (leg.begin, leg.end) != (before.begin, before.end):
+                path = problem.leg_paths[number]
+                joint_map = joint_map.along(path, self.starts[number])
+            boundary = boundary_of(problem, joint_map, number)
+            limits = (*problem.limits, *filter(is_safeguard, phase.limits))
+            new = (joint_map, limits, phase.grid, boundary)
+            phases.append(Phase(*new, margin=None, pause=leg.dwell))
+        program = optimum.program.with_phases(phases)
+        answer, optimal = _solve_again(program, optimum.x if begin is None else begin)
         return Solved(program.end_time(answer), answer, optimal)
 
     def saving(self, entry: Sensitivity) -> Saving:
