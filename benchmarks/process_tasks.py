@@ -142,26 +142,27 @@ def _with_extras(
     if known is None:
         return None
     held = task.get("tool_limits", {}).get("process_speed")
-    while held and not _can_hold(robot, known, held["speed"] / length):
+    while held and not _can_hold(robot, known, held["speed"]):
         held["speed"] *= SLOWER
     return task
 
 
-def _can_hold(robot: Robot, joint_path: np.ndarray, rate: float) -> bool:
-    """Tell whether the drives can pass the middle of a joint path, (K, n), at a rate of s, 1/s."""
+def _can_hold(robot: Robot, joint_path: np.ndarray, speed: float) -> bool:
+    """Tell whether the drives can pass the middle of a joint path, (K, n), at a speed of the tool, m/s."""
     step = 1.0 / (len(joint_path) - 1)
+    positions, _ = robot.tool_placements(joint_path)
+    slope = np.linalg.norm(np.gradient(positions, step, axis=0), axis=1)
+    rate = (speed / slope)[:, None]
     by_s = np.gradient(joint_path, step, axis=0)
     by_s2 = np.gradient(by_s, step, axis=0)
-    middle = slice(int(0.25 / step), int(0.75 / step))
-    q, qdot, qddot = (
-        each[middle] for each in (joint_path, by_s * rate, by_s2 * rate**2)
+    qdot = by_s * rate
+    qddot = by_s2 * rate**2 + by_s * rate * np.gradient(rate, step, axis=0)
+    torque = np.abs(dynamics.torque(robot, joint_path, qdot, qddot))
+    torque += robot.friction.coulomb
+    is_held = (torque <= HELD * robot.limits.torque) & (
+        np.abs(qdot) <= HELD * robot.limits.velocity
     )
-    torque = np.abs(dynamics.torque(robot, q, qdot, qddot)) + robot.friction.coulomb
-    limits = robot.limits
-    return bool(
-        np.all(torque <= HELD * limits.torque)
-        and np.all(np.abs(qdot) <= HELD * limits.velocity)
-    )
+    return bool(is_held[int(0.25 / step) : int(0.75 / step)].all())
 
 
 def weld(folder: Path) -> dict[str, Any]:
