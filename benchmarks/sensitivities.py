@@ -452,6 +452,8 @@ class Changes:
         saving = Saving(what, -entry.change(STEP), *self._change(entry, STEP))
         if saving.off <= REQUIRED:
             return saving
+        if not saving.optimal:
+            saving = replace(saving, found=np.nan)
         found, optimal = self._change(entry, SMALLER_STEP)
         nearer = (-entry.change(SMALLER_STEP), found)
         return replace(saving, nearer=nearer, optimal=optimal)
