@@ -24,10 +24,20 @@ def processor_time() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
+def peak_memory() -> float:
+    """Return the largest memory, MB, that this process has had, or one of its children that have ended."""
+    both = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return max(resource.getrusage(who).ru_maxrss for who in both) / 1024.0
+
+
 def save(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str = ""
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    about: str = "",
+    name: str | None = None,
 ) -> None:
-    """Write benchmarks/results/NAME.json, named after the script that runs, if the command line has ``--save``.
+    """Write benchmarks/results/NAME.json, if the command line has ``--save``.
 
     Parameters
     ----------
@@ -37,6 +47,8 @@ def save(
         Cells as they are printed, with units.
     about : str, optional
         A sentence or two above the table.
+    name : str, optional
+        The script's name by default.
     """
     script, *arguments = sys.argv
     if "--save" in arguments:
@@ -48,7 +60,7 @@ def save(
             else:
                 told.append(argument)
         write(
-            Path(script).stem,
+            name or Path(script).stem,
             " ".join(
                 [
                     "python",

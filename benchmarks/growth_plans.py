@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import resource
 import warnings
 from pathlib import Path
 
 import brachis
-from committed import processor_time, save
+from committed import peak_memory, processor_time, save
 
 ROOT = Path(__file__).parents[1]
 INTERVALS = (10, 20, 50, 100, 200)
@@ -30,11 +29,8 @@ def measure_plan(intervals: int) -> tuple[float, float, float]:
         task, effort="single", intervals=intervals, least_motion=False
     )
     used = processor_time() - began
-    # Large solves run in a process of their own.
-    both = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    memory = max(resource.getrusage(who).ru_maxrss for who in both) / 1024.0
     assert result.verified
-    return result.t_end, used, memory
+    return result.t_end, used, peak_memory()
 
 
 def main() -> None:

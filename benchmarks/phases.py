@@ -173,11 +173,16 @@ def squares() -> dict[str, Keys]:
         ("TX90L on its rail", example(RAIL), 0.2),
         ("iiwa", iiwa("pose", []), -0.2),
     ):
-        corners = ([0, way, 0], [0, 0, -way], [0, -way, 0], [0, 0, way])
-        sides = [{"line": {"by": by}, "stop": True} for by in corners]
-        del sides[-1]["stop"]
-        cases[f"square, {name}"] = {**task, "path": sides}
+        cases[f"square, {name}"] = {**task, "path": square_sides(way)}
     return cases
+
+
+def square_sides(way: float) -> list[Keys]:
+    """Return the sides of a square, the first one so far along y, m, with stops at the corners."""
+    corners = ([0, way, 0], [0, 0, -way], [0, -way, 0], [0, 0, way])
+    sides: list[Keys] = [{"line": {"by": by}, "stop": True} for by in corners]
+    del sides[-1]["stop"]
+    return sides
 
 
 def refused() -> dict[str, Keys]:

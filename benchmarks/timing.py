@@ -14,9 +14,8 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import itertools
-import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +33,8 @@ ROOT = Path(__file__).parents[1]
 PLACES = 10_000
 LENGTH = 0.5  # m
 WALKS = (5, 20, 100, 500, 2000)
+WITHOUT_TORQUE = {"torque": None, "acceleration": 8.0}
+"""Limits of walks: the URDF's velocities, and an acceleration, rad/s^2."""
 SEAMS = range(10)
 CORNERS = (5.0, 1.0, 0.3, 0.1)  # mm
 COLUMNS = ("case", "found", "compared with", "difference", "processor time")
@@ -150,64 +151,75 @@ def _row(name: str, found: float, known: float, what: str, seconds: float) -> Ro
     )
 
 
-def walks() -> list[Row]:
-    """Plan random walks of a seven-joint arm."""
-    rows = []
-    robot = brachis.Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf")
+def walk(count: int, limits: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a task of a random walk of a seven-joint arm through so many waypoints."""
+    urdf = ROOT / "robots/iiwa14/robot.urdf"
+    robot = brachis.Robot.from_urdf(urdf)
     low = np.maximum(robot.limits.position_lower, -2.5) * 0.8
     high = np.minimum(robot.limits.position_upper, 2.5) * 0.8
+    rng = np.random.default_rng(count)
+    q = [rng.uniform(low, high)]
+    for _ in range(count - 1):
+        q.append(np.clip(q[-1] + rng.normal(0.0, 0.35, robot.n), low, high))
+    return {
+        "brachis": 1,
+        "robot": {"urdf": str(urdf), "limits": dict(limits)},
+        "start": {"joints": q[0].tolist()},
+        "task_space": "joints",
+        "path": [{"spline": {"through": np.array(q[1:]).tolist()}}],
+        "search": {"least_motion": False},
+    }
+
+
+def walks() -> list[Row]:
+    """Plan random walks."""
+    rows = []
     for count, with_torque in itertools.product(WALKS, (False, True)):
-        rng = np.random.default_rng(count)
-        q = [rng.uniform(low, high)]
-        for _ in range(count - 1):
-            q.append(np.clip(q[-1] + rng.normal(0.0, 0.35, robot.n), low, high))
-        limits = {} if with_torque else {"torque": None, "acceleration": 8.0}
+        task = walk(count, {} if with_torque else WITHOUT_TORQUE)
         began = processor_time()
-        result = brachis.plan(
-            "iiwa14",
-            path=[{"spline": {"through": np.array(q[1:]).tolist()}}],
-            start=q[0].tolist(),
-            task_space="joints",
-            limits=limits,
-            least_motion=False,
-        )
+        result = brachis.plan(task)
         seconds = processor_time() - began
         kind = "torque" if with_torque else "velocity, acceleration"
         rows.append(_planned(f"{count} waypoints, {kind}", result, seconds))
     return rows
 
 
+def seam(seed: int, corner: float, folder: Path) -> tuple[str, dict[str, Any]]:
+    """Return name and task of a seam whose corners are rounded within a tolerance, mm; its points go into a folder."""
+    cam = load(ROOT / "studies/cam_seams.py")
+    file = folder / f"seam-{seed}.csv"
+    position, rotations, scatter = cam.seam(seed)
+    cam.write(file, position, rotations)
+    allowed = max(0.05, 6.0 * scatter)
+    points = {
+        "file": str(file),
+        "orientation": "rotation_vector",
+        "tolerance": {
+            "position": f"{allowed:.6f} mm",
+            "corner": f"{max(corner, allowed):.6f} mm",
+        },
+        "corner": "blend",
+    }
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": str(ROOT / "robots/tx90l_rail/robot.urdf")},
+        "path": [{"csv": points}],
+        "start": "free",
+        "task_space": "pose",
+        "search": {"least_motion": False},
+    }
+    return f"seam {seed}, {len(position)} points, corners {corner:g} mm", task
+
+
 def seams() -> list[Row]:
     """Plan seams with corners that are rounded within ever smaller tolerances."""
-    sys.path.append(str(ROOT / "studies"))
-    cam = load(ROOT / "studies/cam_seams.py")
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "seam.csv"
         for seed, corner in itertools.product(SEAMS, CORNERS):
-            position, rotations, scatter = cam.seam(seed)
-            cam.write(file, position, rotations)
-            allowed = max(0.05, 6.0 * scatter)
-            tolerance = {
-                "position": f"{allowed:.6f} mm",
-                "corner": f"{max(corner, allowed):.6f} mm",
-            }
-            points = {
-                "file": str(file),
-                "orientation": "rotation_vector",
-                "tolerance": tolerance,
-                "corner": "blend",
-            }
-            name = f"seam {seed}, {len(position)} points, corners {corner:g} mm"
+            name, task = seam(seed, corner, Path(folder))
             began = processor_time()
             try:
-                result = brachis.plan(
-                    "tx90l_rail",
-                    path=[{"csv": points}],
-                    start="free",
-                    task_space="pose",
-                    least_motion=False,
-                )
+                result = brachis.plan(task)
             except brachis.BrachisError as error:
                 row = name, f"refused: {str(error)[:60]}", "", "", ""
             else:
