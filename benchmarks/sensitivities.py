@@ -35,7 +35,7 @@ import process_tasks
 from brachis import LimitSpec, Result, Robot, Trajectory, load_task, plan
 from brachis.apps.bottleneck import CheckedSensitivity, check_sensitivities
 from brachis.errors import BrachisError, BrachisWarning, PlanningError
-from brachis.explain import Sensitivity, multipliers_of, sensitivities
+from brachis.explain import Sensitivity, multipliers_of
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.backends import SolverOptions, SolverReport, solvers_for
 from brachis.optimise.near_rows import solve_near_rows
