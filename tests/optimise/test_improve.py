@@ -181,7 +181,7 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
         steps.append(monitor.options.first_step)
         return monitor.report("fake", SolveStatus.OPTIMAL, x, np.zeros_like(x), "")
 
-    def solve_some(problem, x, solve):
+    def solve_some(problem, x, solve, **_):
         return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)
 
     monkeypatch.setattr(module, "solve_near_rows", solve_some)

@@ -13,7 +13,7 @@ from brachis.optimise.backends import (
     residual,
     solvers_for,
 )
-from brachis.optimise.near_rows import solve_near_rows
+from brachis.optimise.near_rows import solve_near_rows, solve_near_values
 
 COUNT = 600
 ANGLES = np.linspace(0.0, 2.0 * np.pi, COUNT, endpoint=False)
@@ -43,6 +43,11 @@ class Disc:
 
     def curvature(self, _x):
         return None
+
+    @property
+    def value_numbers(self):
+        """The tangents are six values at a hundred places each."""
+        return np.arange(COUNT) // 100
 
 
 class Counting:
@@ -161,3 +166,28 @@ def test_all_iterations_are_not_used_up_again():
     report = solve_near_rows(Disc(), start, solve)
     assert report.status is SolveStatus.ITERATION_LIMIT
     assert len(solves) == 1
+
+
+def test_values_that_are_far_everywhere_are_left_out(solve):
+    start = np.array([0.0, -0.9, 0.0])
+    report = solve_near_values(Disc(), start, solve)
+    assert solve.rows == [COUNT // 2]
+    assert report.objective == pytest.approx(-1.0, abs=1e-8)
+    assert len(report.multipliers) == COUNT
+
+
+def test_values_that_are_violated_are_added(solve):
+    report = solve_near_values(Disc(), np.array([0.8, 0.0, 0.0]), solve)
+    assert len(solve.rows) > 1
+    assert solve.rows == sorted(set(solve.rows))
+    assert report.objective == pytest.approx(-1.0, abs=1e-8)
+    assert report.violation <= 1e-8
+
+
+@pytest.mark.parametrize(("is_answer", "rows"), [(True, COUNT // 2), (False, COUNT)])
+def test_an_answer_goes_on_with_whole_values_where_few_rows_hold_it(
+    solve, is_answer, rows
+):
+    start = np.array([0.0, -0.9, 0.0])
+    solve_near_rows(Disc(), start, solve, is_answer=is_answer)
+    assert solve.rows == [rows]

@@ -176,8 +176,8 @@ def test_large_programs_over_the_path_go_to_an_interior_point_first(
     solvers = []
     solved = improve.solve_near_rows
 
-    def near_rows(program, x, solve):
-        report = solved(program, x, solve)
+    def near_rows(program, x, solve, **options):
+        report = solved(program, x, solve, **options)
         solvers.append(report.solver)
         return report
 

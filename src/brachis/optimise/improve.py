@@ -262,6 +262,9 @@ _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve ends where many motions are
 equally fast."""
 
+_SAME = 1e-3
+"""Part of the time by which an answer may get longer over other knots or points."""
+
 
 @dataclass(frozen=True)
 class SolverSession:
@@ -376,7 +379,15 @@ class SolverSession:
         solve = partial(solve_with, self.backend)
         if self.backend.is_interior:
             return self._accept(solve(program, x))
-        return self._accept(solve_near_rows(program, x, solve))
+        is_answer = self._goes_on(program, x)
+        report = solve_near_rows(program, x, solve, is_answer=is_answer)
+        return self._accept(report)
+
+    def _goes_on(self, program: Program | PathProgram, x: np.ndarray) -> bool:
+        """Tell whether a point, (v,), is about as fast as the answer of the last solve, which gave a motion."""
+        if not self._last or not self._last[0].status.usable:
+            return False
+        return bool(np.isclose(program.objective(x), self._last[0].objective, _SAME))
 
     def _accept(self, report: SolverReport) -> SolverReport:
         """Take an answer that violates rows by little, however the solve ended."""

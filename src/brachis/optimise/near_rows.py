@@ -5,7 +5,7 @@ back. A solver's effort grows with all rows that it is given. So it is given tho
 checked at its answer; those that are violated then are added, and it goes on from there.
 
 An interior-point method leaves the bounds at first. It needs the rows of whole values, such as a joint's torque all
-along the path, where these come near a bound anywhere.
+along the path, where these come near a bound anywhere. So does any method where few rows hold the motion.
 """
 
 from __future__ import annotations
@@ -103,19 +103,32 @@ class NearRows:
         return Curvature(find_hessian, curvature.multipliers[self._numbers])
 
 
+class HasValues(Problem, Protocol):
+    """A problem whose rows are values of limits at places."""
+
+    @property
+    def value_numbers(self) -> np.ndarray:
+        """Number of the value that each row holds at a place, (c,)."""
+
+
 def solve_near_rows(
-    program: Problem,
+    program: HasValues,
     x: np.ndarray,
     solve: Callable[[Problem, np.ndarray], SolverReport],
+    *,
+    is_answer: bool = False,
 ) -> SolverReport:
     """Solve a program from a point, with the rows near their bounds where that is enough.
 
     Parameters
     ----------
-    program : Problem
+    program : HasValues
     x : (v,) ndarray
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
+    is_answer : bool, optional
+        Whether the point is the answer of a solve over other knots or points. If too few rows are near, whole values
+        are then left out.
 
     Returns
     -------
@@ -130,6 +143,9 @@ def solve_near_rows(
     holding = np.count_nonzero(slack < _AT_BOUND)
     numbers = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
     if holding < needed * len(x) or len(numbers) > _MOST_KEPT * len(slack):
+        report = solve_near_values(program, x, solve) if is_answer else None
+        if report and report.status.usable and report.violation <= FEASIBLE:
+            return report
         return solve(program, x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
@@ -146,12 +162,6 @@ def solve_near_rows(
         numbers = np.union1d(numbers, np.flatnonzero(slack < _NEAR))
         x = report.x
     return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
-
-
-class HasValues(Problem, Protocol):
-    """A problem whose rows are values of limits at places, one place after the other."""
-
-    value_numbers: np.ndarray
 
 
 def solve_near_values(

@@ -396,6 +396,16 @@ class Program(PhaseSequence[Phase], Summary):
             [first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)]
         )
 
+    @cached_property
+    def value_numbers(self) -> np.ndarray:
+        """Number of the limits' value that each row holds at the points of a phase, (c,); other rows have their own."""
+        numbers = np.arange(len(self.lower))
+        for phase, first in zip(self.phases, self._first_rows, strict=False):
+            for limit in phase.limits:
+                rows = first + phase.rows_of(limit)
+                numbers[rows] = rows[:1]
+        return numbers
+
     def motions(self, x: np.ndarray) -> list[Motion]:
         """Curves of every phase that belong to x."""
         return [phase.motion(x_of_phase) for phase, x_of_phase in self.split(x)]

@@ -154,8 +154,11 @@ def begin_with_timing(
     lost: float,
     intervals: int,
     points: int,
+    x: np.ndarray | None = None,
 ) -> tuple[Program, np.ndarray] | None:
     """Lay splines along the timings of all phases, over few knots, close together where these need them.
+
+    Phases whose time is given keep their knots.
 
     Parameters
     ----------
@@ -168,6 +171,8 @@ def begin_with_timing(
         Intervals of all phases together, about.
     points : int
         Collocation points an interval.
+    x : (v,) ndarray, optional
+        Of the program: where phases begin whose time is given. Not needed without any.
 
     Returns
     -------
@@ -178,15 +183,16 @@ def begin_with_timing(
     total = least_time(timings)
     phases = []
     parts = []
-    for phase, phase_timing in zip(program.phases, timings, strict=True):
+    parts_before = program.split(program.x_lower if x is None else x)
+    for (phase, x_of_phase), phase_timing in zip(parts_before, timings, strict=True):
         if phase_timing is None or phase_timing.timing is None:
             return None
-        share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
-        begun, x_of_phase = begin(
-            phase, phase_timing, phase_timing.timing, lost, share, points
-        )
-        phases.append(begun)
-        parts.append(x_of_phase)
+        begun = phase, x_of_phase
+        if phase.time_law is None:
+            share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
+            begun = begin(phase, phase_timing, phase_timing.timing, lost, share, points)
+        phases.append(begun[0])
+        parts.append(begun[1])
     first = program.with_phases(phases)
     try:
         return first, shortest_time(first, np.concatenate(parts))

@@ -32,6 +32,7 @@ from brachis.optimise.retiming import (
 from brachis.search.phase_plane import initial_guess
 from brachis.search.stages import InitialGuess
 from brachis.task import SplineSettings
+from brachis.timing import is_left_out
 
 _ENTRIES = 500_000
 """Variables times rows of a program over time that improves a joint path: with more an iteration takes tenths of a
@@ -81,14 +82,17 @@ def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.n
     task = guess.problem.task
     has_laws = any(guess.problem.time_laws)
     is_open = task.spline.intervals == "auto" and not task.boundary.periodic
-    if is_open and not has_laws:
+    x = None
+    if has_laws and is_open and not any(map(is_left_out, program.limits)):
+        x = initial_guess(program, guess)
+    if is_open and (not has_laws or x is not None):
         # Close together where the fastest timing of the joint path needs them.
         points = task.spline.points_per_interval
         with contextlib.suppress(UnreachableError):
             pairs = zip(program.phases, guess.legs, strict=True)
             timings = [PhaseTiming.through(*pair) for pair in pairs]
             first = begin_with_timing(
-                program, timings, _FIRST_LOSS, _FIRST_INTERVALS, points
+                program, timings, _FIRST_LOSS, _FIRST_INTERVALS, points, x
             )
             if first is not None:
                 return first
