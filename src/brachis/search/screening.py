@@ -32,6 +32,8 @@ _SAME_TIME = 0.02
 """Part of the time by which estimates of the same joint path differ, no more."""
 _SAME_POSTURE = 0.15
 """Distance of joints along the same joint path, rad or m, no more."""
+_FEWEST = 2
+"""Guesses that are kept, no fewer, however little of the time is free."""
 _PLACES = np.linspace(0.0, 1.0, 49)
 """Places at which joint paths are compared."""
 
@@ -56,11 +58,21 @@ def screen(
         With the better joint paths, and their least times as estimates; the fastest first.
     """
     listener(f"improving {len(guesses)} joint paths")
+    count = max(min(count, _FEWEST), round(count * _free_share(guesses)))
     improve = partial(_improve_in_parallel, deadline=deadline, listener=listener)
     if len(guesses) > count:
         coarse = improve(_spread_out(guesses), COARSE, 1, 2 * count)
         guesses = _choose_distinct(coarse, 2 * count)
     return _choose_distinct(improve(guesses, ROUGH, CHARTS, count), count)
+
+
+def _free_share(guesses: Sequence[InitialGuess]) -> float:
+    """Part of the least time that is not given: no more can be gained."""
+    problem = guesses[0].problem
+    durations = [law.duration for law in problem.time_laws if law is not None]
+    given = sum(durations) + problem.dwell_time
+    least = min(guess.estimate for guess in guesses)
+    return 1.0 - given / least if np.isfinite(least) else 1.0
 
 
 def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[InitialGuess]:
