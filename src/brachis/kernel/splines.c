@@ -1,5 +1,7 @@
 /* Interpolating splines, and their values; see splines.py. */
 
+#include <math.h>
+
 /* Solve equations with a band matrix: row i of `matrix`, (count, 2 d + 1), holds columns i - d to i + d, and is used up.
 `values`, (count, columns), become the solution. Rows are not exchanged: a matrix of B-splines, with no negative minor, does
 not need it (de Boor and Pinkus, 1977). */
@@ -90,5 +92,114 @@ void brachis_curves(
                 found[(o * count + k) * curves + j] = o == 0 ? sum + beside : sum;
             }
         }
+    }
+}
+
+/* The knot, between those with the numbers `low` and `high`, at which the piece of x begins; `piece` is looked at first. */
+static long find_piece(const double *knots, long low, long high, long piece, double x)
+{
+    if (x >= knots[piece] && x < knots[piece + 1]) {
+        return piece;
+    }
+    while (low < high) {
+        const long middle = (low + high + 1) / 2;
+        if (x >= knots[middle]) {
+            low = middle;
+        } else {
+            high = middle - 1;
+        }
+    }
+    return low;
+}
+
+/* Values and derivatives, (orders, count, columns), at `places`, (count), of a spline of degree d with control points `points`,
+(many, columns). Basis functions come from the recursion of Cox and de Boor (The NURBS Book, A2.2), derivatives from differences
+of control points: they vanish without rounding where points are equal. So that values do not round either, their sum is taken
+from the nearest point. A place that is no more than `rounding` before a knot is at this knot. */
+static inline __attribute__((always_inline)) void find_orders(
+    long orders, long count, long d, long columns, long many, const double *knots, const double *points, const double *places,
+    double rounding, double *found
+)
+{
+    const long width = d + 1;
+    double basis[width * width];    /* row p: the functions of degree p */
+    double inverses[width * width]; /* row p: of the widths of the functions of degree p - 1 */
+    double left[width];
+    double right[width];
+    double work[width * columns + 1];
+    long last = -1;
+    for (long k = 0; k < count; k++) {
+        const long piece = find_piece(knots, d, many - 1, last < 0 ? d : last, places[k] + rounding);
+        if (piece != last) {
+            for (long p = 1; p <= d; p++) {
+                for (long i = 0; i < p; i++) {
+                    inverses[p * width + i] = 1.0 / (knots[piece + 1 + i] - knots[piece + 1 + i - p]);
+                }
+            }
+            last = piece;
+        }
+        const double x = rounding > 0.0 ? fmax(places[k], knots[piece]) : places[k];
+        for (long i = 0; i < d; i++) {
+            left[i] = x - knots[piece - i];
+            right[i] = knots[piece + 1 + i] - x;
+        }
+        basis[0] = 1.0;
+        for (long p = 1; p <= d; p++) {
+            const double *lower = &basis[(p - 1) * width];
+            double *own = &basis[p * width];
+            double before = 0.0;
+            for (long i = 0; i < p; i++) {
+                const double share = lower[i] * inverses[p * width + i];
+                own[i] = before + right[i] * share;
+                before = left[p - 1 - i] * share;
+            }
+            own[p] = before;
+        }
+        const double *value = &basis[d * width];
+        long nearest = 0;
+        for (long i = 1; i <= d; i++) {
+            nearest = value[i] > value[nearest] ? i : nearest;
+        }
+        const double *first = &points[(piece - d) * columns];
+        for (long i = 0; i <= d; i++) {
+            for (long c = 0; c < columns; c++) {
+                work[i * columns + c] = first[i * columns + c] - first[nearest * columns + c];
+            }
+        }
+        for (long o = 0; o < orders; o++) {
+            const long p = d - o;
+            double *own = &found[(o * count + k) * columns];
+            for (long c = 0; c < columns; c++) {
+                own[c] = o == 0 ? first[nearest * columns + c] : 0.0;
+            }
+            for (long i = 0; i <= p; i++) {
+                for (long c = 0; c < columns; c++) {
+                    own[c] += basis[p * width + i] * work[i * columns + c];
+                }
+            }
+            for (long i = 0; i < p; i++) {
+                const double factor = p * inverses[p * width + i];
+                for (long c = 0; c < columns; c++) {
+                    work[i * columns + c] = factor * (work[(i + 1) * columns + c] - work[i * columns + c]);
+                }
+            }
+        }
+    }
+}
+
+void brachis_spline_orders(
+    long orders, long count, long d, long columns, long many, const double *knots, const double *points, const double *places,
+    double rounding, double *found
+)
+{
+    /* Loops whose ends the compiler knows are several times as fast. */
+    if (orders == 4 && d == 3 && columns == 1) {
+        find_orders(4, count, 3, 1, many, knots, points, places, rounding, found);
+    } else if (orders == 4 && d == 5 && columns == 1) {
+        find_orders(4, count, 5, 1, many, knots, points, places, rounding, found);
+    } else if (orders == 4 && d == 5) {
+        find_orders(4, count, 5, columns, many, knots, points, places, rounding, found);
+    } else {
+        find_orders(orders, count, d, columns, many, knots, points, places, rounding, found);
     }
 }

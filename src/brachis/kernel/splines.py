@@ -80,6 +80,20 @@ class Spline:
         values = blossom(self.knots, points, piece, [flat] * self.degree)
         return values.reshape(x.shape + self.control_points.shape[1:])
 
+    def derivatives(
+        self, x: np.ndarray, order: int, rounding: float = 0.0
+    ) -> np.ndarray:
+        """Value and derivatives up to `order`, (order + 1, K, ...), at x, (K,); at knots those just after them.
+
+        What is no more than `rounding` before a knot is at this knot.
+        """
+        shape = self.control_points.shape
+        points = self.control_points.reshape(len(self.control_points), -1)
+        sizes = {"o": order + 1, "g": self.degree}
+        arrays = (self.knots, points, x, rounding)
+        values = compute("brachis_spline_orders", *arrays, **sizes)
+        return np.reshape(values, (order + 1, len(x), *shape[1:]))
+
     @cached_property
     def derivative(self) -> Spline:
         """The derivative as a spline; zero of steps."""

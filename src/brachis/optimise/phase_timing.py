@@ -191,6 +191,8 @@ def _resolve_ramps(
         if lost.sum() <= allowed:
             break
         parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * allowed))).clip(1, _MOST_PARTS)
+        if parts.max() == 1:
+            break
         stations = spread(phase_timing.course.places, parts.astype(int))
     return phase_timing
 
