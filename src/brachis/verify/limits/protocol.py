@@ -10,6 +10,10 @@ import numpy as np
 from brachis.verify.motion import Given, MotionStates, turns
 
 
+_AT_ONCE = 5000
+"""Steps that are looked at together: they stay in the processor's cache."""
+
+
 class Worst(NamedTuple):
     """The largest ratio to a limit.
 
@@ -66,7 +70,7 @@ def worst_between(
     """
     states = given.states if states is None else states
     most_states = len(states.t) + 100_000
-    ratio = ratio_at(states)
+    ratio = np.concatenate([ratio_at(part) for part in states.split()])
     for _ in range(40):
         steps, most = _may_hold_more(states, given.pieces.lengths, ratio)
         if not len(steps):
@@ -106,6 +110,24 @@ def _may_hold_more(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
+    highest = ratio.max()
+    found = []
+    for begin in range(0, len(ratio), _AT_ONCE):
+        # The bend at an end of a step takes the step beside it.
+        first = max(begin - 1, 0)
+        rows = slice(first, begin + _AT_ONCE + 2)
+        step, most = _open_steps(states.only(rows), lengths, ratio[rows], highest)
+        number = first + step
+        is_own = (number >= begin) & (number < begin + _AT_ONCE)
+        found.append((number[is_own], most[is_own]))
+    steps, most = (np.concatenate(part) for part in zip(*found, strict=True))
+    return steps, most
+
+
+def _open_steps(
+    states: MotionStates, lengths: np.ndarray, ratio: np.ndarray, highest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """List the steps within which a ratio above the highest one that is known may lie; see `_may_hold_more`."""
     inside = states.piece[1:] == states.piece[:-1]
     part = np.where(inside, np.diff(states.u), 1.0)
     length = (part * lengths[states.piece[:-1]])[:, None]
@@ -119,7 +141,7 @@ def _may_hold_more(
     rise = climb**2 / np.maximum(4.0 * bend, np.finfo(float).tiny)
     most = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
     # Steps of a millionth of a piece are not halved, nor searched for an excess of 5e-6.
-    open_steps = inside & (part > 1e-6) & (most > ratio.max() + 5e-6)
+    open_steps = inside & (part > 1e-6) & (most > highest + 5e-6)
     steps = np.flatnonzero(open_steps)
     return steps, most[steps]
 
