@@ -63,6 +63,8 @@ _AT_ONCE = 8192
 """Times looked at together: their states stay in the processor's cache."""
 _SMALL = 0.01
 """Violation from which on limits are narrowed by no more than it."""
+_MOST_MORE = 8.0
+_RARE = 0.01
 _MORE = 1.5
 """Factor on smaller ones: splines give way by less than limits are narrowed."""
 
@@ -410,6 +412,7 @@ def _hold_limits(
     idle = 0
     looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
+    earlier: dict[Limit, tuple[np.ndarray, np.ndarray]] = {}
     for _ in range(_ROUNDS):
         try:
             violations.look(laid, looks)
@@ -428,16 +431,23 @@ def _hold_limits(
         if violation <= _ENOUGH and looks < closer:
             looks = closer
             violations.forget()
+            earlier = {}
             best = replace(best, violation=np.inf)
             continue
         if violation <= _ENOUGH or idle > _PATIENCE or deadline.passed:
             break
-        factor = _MORE if narrower else 1.0
+        is_rare = np.mean(violations.worst > _ENOUGH) < _RARE
+        most = _MOST_MORE if is_rare else _MORE
         for limit, known in violations.by_limit.items():
-            factors = np.where(known < _SMALL, factor, 1.0)
-            factors[known <= _UNCHANGED] = 0.0
-            excess = factors * known / limit.violation_scale
-            added = _between_stations(excess, breaks, timing)
+            factor = np.full_like(known, _MORE if narrower else 1.0)
+            if limit in earlier:
+                before, narrowed = earlier[limit]
+                gain = (before - known).clip(min=np.finfo(float).tiny)
+                factor = (narrowed / gain).clip(_MORE, most)
+            factor[known > _SMALL] = 1.0
+            excess = np.where(known > _UNCHANGED, factor * known, 0.0)
+            earlier[limit] = (known.copy(), excess)
+            added = _between_stations(excess / limit.violation_scale, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
         next_timing = phase_timing.course.solve(phase_timing.rates, narrower)
         if next_timing is None:
