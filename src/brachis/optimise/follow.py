@@ -438,12 +438,13 @@ def _hold_limits(
             break
         is_rare = np.mean(violations.worst > _ENOUGH) < _RARE
         most = _MOST_MORE if is_rare else _MORE
+        least = _MORE if narrower else 1.0
         for limit, known in violations.by_limit.items():
-            factor = np.full_like(known, _MORE if narrower else 1.0)
+            factor = np.full_like(known, least)
             if limit in earlier:
                 before, narrowed = earlier[limit]
                 gain = (before - known).clip(min=np.finfo(float).tiny)
-                factor = (narrowed / gain).clip(_MORE, most)
+                factor = (narrowed / gain).clip(least, most)
             factor[known > _SMALL] = 1.0
             excess = np.where(known > _UNCHANGED, factor * known, 0.0)
             earlier[limit] = (known.copy(), excess)
