@@ -150,6 +150,7 @@ class PhaseTiming:
         passed = np.maximum.accumulate(y[:, 0])
         s = drop_near(np.union1d(passed.clip(begin, end), pieces), tolerances.PATH)
         s[0] = begin
+        del course, timing, y  # they take much memory
 
         def time_at(s: np.ndarray) -> PhaseTiming:
             """Time the course at path coordinates, (S,)."""
@@ -194,6 +195,7 @@ def _resolve_ramps(
         if parts.max() == 1:
             break
         stations = spread(phase_timing.course.places, parts.astype(int))
+        del phase_timing, timing  # two of them take too much memory
     return phase_timing
 
 

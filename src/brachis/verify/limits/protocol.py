@@ -146,24 +146,39 @@ def _open_steps(
     return steps, most[steps]
 
 
-def largest(given: Given, above: np.ndarray, below: np.ndarray) -> Worst:
-    """Find the largest value of polynomials in Bernstein form, two for every piece and joint, (m + 1, L, n) each.
+def largest(
+    given: Given, ratios: Callable[[slice], tuple[np.ndarray, np.ndarray]]
+) -> Worst:
+    """Find the largest value of polynomials in Bernstein form, two for every piece and joint.
 
     It is at an end of a piece or where a polynomial turns that has a coefficient above the values at all ends.
+
+    Parameters
+    ----------
+    given : Given
+    ratios : callable
+        ``ratios(part)`` returns the coefficients of both in some pieces, (m + 1, l, n) each.
     """
-    flat = np.concatenate([above, below], axis=1).reshape(len(above), -1)
-    ends = flat[[0, -1]]
-    end, column = map(int, np.unravel_index(np.argmax(ends), ends.shape))
-    value = float(ends[end, column])
-    u = np.array([float(end)])
-    higher = np.flatnonzero(flat.max(axis=0) > value)
-    turning, at, values = turns(flat[:, higher])
-    if values.max(initial=-np.inf) > value:
-        k = np.argmax(values)
-        value = values[k]
-        column = higher[turning[k]]
-        u = at[[k]]
-    _, count, n = above.shape
-    piece = np.array([column // n % count])
-    time = given.pieces.time(piece, u)[0]
-    return Worst(value, given.robot.joint_names[column % n], time)
+    found: list[tuple[float, int, float, int]] = []
+    highest = -np.inf
+    count = len(given.pieces.lengths)
+    for begin in range(0, count, _AT_ONCE):
+        coefficients = np.stack(ratios(slice(begin, begin + _AT_ONCE)), axis=1)
+        _, _, pieces, joints = coefficients.shape
+        flat = coefficients.reshape(len(coefficients), -1)
+        ends = flat[[0, -1]]
+        end, column = map(int, np.unravel_index(np.argmax(ends), ends.shape))
+        value = float(ends[end, column])
+        u = float(end)
+        highest = max(value, highest)
+        higher = np.flatnonzero(flat.max(axis=0) > highest)
+        turning, at, values = turns(flat[:, higher])
+        if values.max(initial=-np.inf) > value:
+            k = int(np.argmax(values))
+            value = float(values[k])
+            column = int(higher[turning[k]])
+            u = float(at[k])
+        found.append((value, begin + column // joints % pieces, u, column % joints))
+    value, piece, u, joint = found[int(np.argmax([row[0] for row in found]))]
+    time = given.pieces.time(np.array([piece]), np.array([u]))[0]
+    return Worst(value, given.robot.joint_names[joint], time)
