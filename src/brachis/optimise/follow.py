@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from brachis.common.arrays import interpolate_columns, spread
+from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.kinematics import JointMap, JointState
@@ -96,7 +96,8 @@ class LaidSplines:
         """Yield the joint motion at times, (K,), s, part by part; raises UnreachableError as `JointMap.state` does."""
         for begin in range(0, len(t), _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
-            near = interpolate_columns(t[part], self.times, self.timing.path.q)
+            station = np.searchsorted(self.times[1:-1], t[part])
+            near = self.timing.path.q[station]
             yield part, joint_map.state(*self.motion.at(t[part]), near=near)
 
 

@@ -311,7 +311,10 @@ class PhasePlane:
             moved = np.subtract(held.get(limit, 0.0), self._narrower.get(limit, 0.0))
             changed |= moved.reshape(-1, *moved.shape[-2:]).any(axis=(0, 2))
         self._narrower = held
-        rows = [block.within(held.get(block.limit, 0.0)) for block in self._rounds[0]]
+        rows = [
+            block if block.by_u is None else block.within(held.get(block.limit, 0.0))
+            for block in self._rounds[0]
+        ]
         self._rounds = [rows]
         self._set_levels()
         self._set_bounds(rows, changed)
