@@ -203,3 +203,29 @@ void brachis_spline_orders(
         find_orders(orders, count, d, columns, many, knots, points, places, rounding, found);
     }
 }
+
+/* Values of polynomials in Bernstein form by de Casteljau's algorithm, (count, n): of those with the numbers `pieces`, (count),
+among `coefficients`, (width, many, n), at `places`, (count), from 0 to 1. */
+void brachis_bernstein(
+    long count, long width, long many, long n, const double *coefficients, const long *pieces, const double *places,
+    double *found
+)
+{
+    double work[width * n + 1];
+    for (long k = 0; k < count; k++) {
+        const double u = places[k];
+        for (long i = 0; i < width; i++) {
+            for (long j = 0; j < n; j++) {
+                work[i * n + j] = coefficients[(i * many + pieces[k]) * n + j];
+            }
+        }
+        for (long level = width - 1; level > 0; level--) {
+            for (long i = 0; i < level * n; i++) {
+                work[i] = (1.0 - u) * work[i] + u * work[i + n];
+            }
+        }
+        for (long j = 0; j < n; j++) {
+            found[k * n + j] = work[j];
+        }
+    }
+}

@@ -7,6 +7,7 @@ behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -143,6 +144,31 @@ def blossom(
     arrays = (knots, control_points, piece, places)
     values: np.ndarray = compute("brachis_blossoms", *arrays, g=degree, L=points)
     return values
+
+
+def bernstein(
+    coefficients: np.ndarray, piece: np.ndarray, u: np.ndarray
+) -> np.ndarray:
+    """Evaluate polynomials in Bernstein form by de Casteljau's algorithm.
+
+    Parameters
+    ----------
+    coefficients : (m + 1, L, ...) ndarray
+        Of L pieces.
+    piece : (K,) int ndarray
+    u : (K,) ndarray
+        Places in the pieces, 0 to 1.
+
+    Returns
+    -------
+    (K, ...) ndarray
+    """
+    width, count, *others = coefficients.shape
+    if len(piece) and not 0 <= piece.min() <= piece.max() < count:
+        raise ValueError(f"a piece does not exist; they are 0 to {count - 1}")
+    columns = coefficients.reshape(width, count, math.prod(others))
+    values = compute("brachis_bernstein", columns, piece, u)
+    return np.reshape(values, (len(u), *others))
 
 
 def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:

@@ -20,12 +20,12 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import bisect, count_each
 from brachis.errors import InputError
+from brachis.kernel import bernstein
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of, with_held_speeds
 from brachis.robot import Robot, TaskMap
 from brachis.task import SpeedTable, Task
 from brachis.trajectory import MotionPhase, Trajectory
-from brachis.trajectory.pieces import values_of
 from brachis.verify.mechanics import joint_placements, torques
 from brachis.verify.report import VerifyOptions
 
@@ -95,7 +95,7 @@ def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     u, value : (Z,) ndarray
     """
     column, u = roots(np.diff(coefficients, axis=0))
-    return column, u, values_of(coefficients[:, column], u)
+    return column, u, bernstein(coefficients, column, u)
 
 
 SAME_PLACE = 1e-9
@@ -148,7 +148,7 @@ class MotionPieces:
 
     def positions(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Joint positions at places, (K, n)."""
-        return self.nodes[piece] + values_of(self.position[:, piece], u)
+        return self.nodes[piece] + bernstein(self.position, piece, u)
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
@@ -211,21 +211,19 @@ class MotionStates:
 
     @cached_property
     def q(self) -> np.ndarray:
-        return np.concatenate(
-            [self.pieces.positions(part.piece, part.u) for part in self.split()]
-        )
+        return self.pieces.positions(self.piece, self.u)
 
     @cached_property
     def qdot(self) -> np.ndarray:
-        return self._values(self.pieces.velocity)
+        return bernstein(self.pieces.velocity, self.piece, self.u)
 
     @cached_property
     def qddot(self) -> np.ndarray:
-        return self._values(self.pieces.acceleration)
+        return bernstein(self.pieces.acceleration, self.piece, self.u)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
-        return self._values(self.pieces.jerk)
+        return bernstein(self.pieces.jerk, self.piece, self.u)
 
     @cached_property
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
@@ -237,12 +235,6 @@ class MotionStates:
         robot = self.pieces.robot
         return np.concatenate(
             [torques(robot, part.q, part.qdot, part.qddot) for part in self.split()]
-        )
-
-    def _values(self, coefficients: np.ndarray) -> np.ndarray:
-        """Evaluate polynomials of all pieces, (m + 1, L, n), at the places, (K, n)."""
-        return np.concatenate(
-            [values_of(coefficients[:, part.piece], part.u) for part in self.split()]
         )
 
     def torque(self, robot: Robot) -> np.ndarray:

@@ -63,7 +63,7 @@ def _parts_of_ranges(
     ends = given.robot.limits.both_ways("position")[:, :count]
     joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
     lower, upper = ends[:, joints]
-    away = np.abs(states.q[:, joints] - 0.5 * (lower + upper))
+    away = np.abs(states.q.take(joints, axis=1) - 0.5 * (lower + upper))
     names = [given.robot.joint_names[joint] for joint in joints]
     return away / (0.5 * (upper - lower)), names
 
