@@ -146,9 +146,7 @@ def blossom(
     return values
 
 
-def bernstein(
-    coefficients: np.ndarray, piece: np.ndarray, u: np.ndarray
-) -> np.ndarray:
+def bernstein(coefficients: np.ndarray, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Evaluate polynomials in Bernstein form by de Casteljau's algorithm.
 
     Parameters

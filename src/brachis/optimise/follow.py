@@ -57,16 +57,20 @@ _PATIENCE = 8
 _ENOUGH = 5e-5
 """Violation of a limit, as a part of it, that is small enough."""
 _UNCHANGED = 1e-5
-"""Changes of rates and of accelerations, as parts of limits, for which nothing is looked at again; and violations for which
-limits are not narrowed. A fifth of `_ENOUGH`: with that itself ...."""
+"""Change of a rate or an acceleration, as a part of its limit, after which nothing is looked at again, and violation
+for which limits are not narrowed: a fifth of `_ENOUGH`. A path through 500 waypoints ended 4e-5 later where all was
+looked at again, and all was narrowed, in every round."""
 _AT_ONCE = 8192
 """Times looked at together: their states stay in the processor's cache."""
 _SMALL = 0.01
 """Violation from which on limits are narrowed by no more than it."""
-_MOST_MORE = 8.0
-_RARE = 0.01
 _MORE = 1.5
 """Factor on smaller ones: splines give way by less than limits are narrowed."""
+_MOST_MORE = 8.0
+"""Largest such factor, where few intervals exceed a limit: it is what the last narrowing lacked there. With 1.5 a path
+through 500 waypoints took 18 rounds, with 8 it takes 11."""
+_RARE = 0.01
+"""Part of the intervals that is few: where more were narrowed by so much, that path was 3e-5 slower."""
 
 
 @dataclass(frozen=True)
@@ -347,6 +351,7 @@ class _Violations:
     def forget(self) -> None:
         """Look at all intervals next time."""
         self._known = np.full((len(self._fastest), 1), np.inf)
+        self._earlier: dict[Limit, tuple[np.ndarray, np.ndarray]] = {}
 
     def look(self, laid: LaidSplines, looks: int) -> None:
         """Look at stations, and at `looks` steps in every interval, next to which the timing changed.
@@ -371,6 +376,21 @@ class _Violations:
         self._raise(laid, laid.times[at_stations], self._interval[at_stations])
         largest = [violations.max(axis=1) for violations in self.by_limit.values()]
         self.worst = np.max([np.zeros(len(is_new)), *largest], axis=0)
+
+    def find_excess(self, least: float) -> Iterator[tuple[Limit, np.ndarray]]:
+        """Yield by how much limits should be narrowed, (N, c): violations, and small ones times `least` or more."""
+        is_rare = np.mean(self.worst > _ENOUGH) < _RARE
+        most = _MOST_MORE if is_rare else _MORE
+        for limit, known in self.by_limit.items():
+            factor = np.full_like(known, least)
+            if limit in self._earlier:
+                before, narrowed = self._earlier[limit]
+                gain = (before - known).clip(min=np.finfo(float).tiny)
+                factor = (narrowed / gain).clip(least, most)
+            factor[known > _SMALL] = 1.0
+            excess = np.where(known > _UNCHANGED, factor * known, 0.0)
+            self._earlier[limit] = (known.copy(), excess)
+            yield limit, excess / limit.violation_scale
 
     def _raise(self, laid: LaidSplines, t: np.ndarray, interval: np.ndarray) -> None:
         """Raise what is known of intervals, (K,), ascending, to what is found at times in them, (K,), s."""
@@ -413,7 +433,6 @@ def _hold_limits(
     idle = 0
     looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
-    earlier: dict[Limit, tuple[np.ndarray, np.ndarray]] = {}
     for _ in range(_ROUNDS):
         try:
             violations.look(laid, looks)
@@ -432,24 +451,13 @@ def _hold_limits(
         if violation <= _ENOUGH and looks < closer:
             looks = closer
             violations.forget()
-            earlier = {}
             best = replace(best, violation=np.inf)
             continue
         if violation <= _ENOUGH or idle > _PATIENCE or deadline.passed:
             break
-        is_rare = np.mean(violations.worst > _ENOUGH) < _RARE
-        most = _MOST_MORE if is_rare else _MORE
         least = _MORE if narrower else 1.0
-        for limit, known in violations.by_limit.items():
-            factor = np.full_like(known, least)
-            if limit in earlier:
-                before, narrowed = earlier[limit]
-                gain = (before - known).clip(min=np.finfo(float).tiny)
-                factor = (narrowed / gain).clip(least, most)
-            factor[known > _SMALL] = 1.0
-            excess = np.where(known > _UNCHANGED, factor * known, 0.0)
-            earlier[limit] = (known.copy(), excess)
-            added = _between_stations(excess / limit.violation_scale, breaks, timing)
+        for limit, excess in violations.find_excess(least):
+            added = _between_stations(excess, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
         next_timing = phase_timing.course.solve(phase_timing.rates, narrower)
         if next_timing is None:

@@ -11,7 +11,6 @@ from brachis.common import tolerances
 from brachis.common.arrays import drop_near, greville, spread
 from brachis.errors import UnreachableError
 from brachis.kernel import Spline
-from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import ORDERS, clamped_knots, insert_knots, local_basis
 from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
@@ -133,8 +132,7 @@ class Motion(PhaseSpline):
             s = law.at(places * self.t_end)[0]
             points = make_interp_spline(places, s, k=self.degree, t=knots).c
             t_norm = spread(breaks, _LOOKS)
-            basis = LocalBasis.of(knots, self.degree, t_norm)
-            spline_s = basis.curves(points[None])[0, :, 0]
+            spline_s = Spline(knots, points, self.degree)(t_norm)
             miss = np.abs(spline_s - law.at(t_norm * self.t_end)[0])
             worst = miss[:-1].reshape(-1, _LOOKS).max(axis=1)
             if worst.max() < _S_MISS:

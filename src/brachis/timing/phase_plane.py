@@ -165,6 +165,7 @@ class PhasePlane:
         ]
         self._steps = np.diff(path.p)
         self._narrower: Mapping[Limit, np.ndarray] = {}
+        self._labels: list[str] = []
         self._rounds: list[list[_Rows]] = []
         if rate is None:
             rate = np.full(len(path.p), path.p[-1] - path.p[0])
@@ -245,7 +246,9 @@ class PhasePlane:
         """Put a, b and the bounds of rows with acceleration side by side in some steps, (S, c) each."""
         blank = [np.empty((len(self._steps[steps]), 0))]
         return tuple(
-            np.hstack(blank + [getattr(block, attribute)[steps] for block in self._sloped])
+            np.hstack(
+                blank + [getattr(block, attribute)[steps] for block in self._sloped]
+            )
             for attribute in ("by_u", "by_x", "lower", "upper")
         )
 

@@ -164,7 +164,7 @@ class MotionPieces:
 
 @dataclass(frozen=True, eq=False)
 class MotionStates:
-    """The motion at K places, ascending in time; where pieces join, both sides. It is evaluated as far as it is asked for.
+    """The motion at K places, ascending in time; where pieces join, both sides. Only what is asked for is evaluated.
 
     Attributes
     ----------
@@ -203,26 +203,32 @@ class MotionStates:
 
     @cached_property
     def t(self) -> np.ndarray:
+        """Times, (K,), s."""
         return self.pieces.time(self.piece, self.u)
 
     @cached_property
     def s(self) -> np.ndarray:
+        """Path coordinates, (K,)."""
         return self.pieces.path_coordinate(self.t)
 
     @cached_property
     def q(self) -> np.ndarray:
+        """Positions, (K, n)."""
         return self.pieces.positions(self.piece, self.u)
 
     @cached_property
     def qdot(self) -> np.ndarray:
+        """Velocities, (K, n)."""
         return bernstein(self.pieces.velocity, self.piece, self.u)
 
     @cached_property
     def qddot(self) -> np.ndarray:
+        """Accelerations, (K, n)."""
         return bernstein(self.pieces.acceleration, self.piece, self.u)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
+        """Jerks, (K, n)."""
         return bernstein(self.pieces.jerk, self.piece, self.u)
 
     @cached_property
@@ -232,6 +238,7 @@ class MotionStates:
 
     @cached_property
     def tau(self) -> np.ndarray:
+        """Torques, (K, n)."""
         robot = self.pieces.robot
         return np.concatenate(
             [torques(robot, part.q, part.qdot, part.qddot) for part in self.split()]

@@ -124,7 +124,10 @@ def verify_trajectory(
         *check_continuity(given),
     ]
     worst = max((check.value for check in ratios), default=0.0)
-    least = (min(same, key=lambda margin: margin.value) for same in zip(*margins))
+    least = (
+        min(same, key=lambda margin: margin.value)
+        for same in zip(*margins, strict=False)
+    )
     return Verification(
         tuple(checks), len(given.states.t), worst, path_check.value, tuple(least)
     )

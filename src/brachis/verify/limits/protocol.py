@@ -9,7 +9,6 @@ import numpy as np
 
 from brachis.verify.motion import Given, MotionStates, turns
 
-
 _AT_ONCE = 5000
 """Steps that are looked at together: they stay in the processor's cache."""
 
