@@ -113,35 +113,32 @@ static long find_piece(const double *knots, long low, long high, long piece, dou
 }
 
 /* Values and derivatives, (orders, count, columns), at `places`, (count), of a spline of degree d with control points `points`,
-(many, columns). Basis functions come from the recursion of Cox and de Boor (The NURBS Book, A2.2), derivatives from differences
-of control points: they vanish without rounding where points are equal. So that values do not round either, their sum is taken
-from the nearest point. A place that is no more than `rounding` before a knot is at this knot. */
+(many, columns). Basis functions come from the recursion of Cox and de Boor (The NURBS Book, A2.2), as in bspline.py, to the last
+digit. Their sum is taken from the nearest point, so that derivatives vanish without rounding where points are equal. A place
+that is within `rounding` of a knot is at this knot. */
 static inline __attribute__((always_inline)) void find_orders(
     long orders, long count, long d, long columns, long many, const double *knots, const double *points, const double *places,
     double rounding, double *found
 )
 {
     const long width = d + 1;
-    double basis[width * width];    /* row p: the functions of degree p */
-    double inverses[width * width]; /* row p: of the widths of the functions of degree p - 1 */
+    double basis[width * width]; /* row p: the functions of degree p */
+    double slopes[width];
     double left[width];
     double right[width];
-    double work[width * columns + 1];
-    long last = -1;
+    long piece = d;
     for (long k = 0; k < count; k++) {
-        const long piece = find_piece(knots, d, many - 1, last < 0 ? d : last, places[k] + rounding);
-        if (piece != last) {
-            for (long p = 1; p <= d; p++) {
-                for (long i = 0; i < p; i++) {
-                    inverses[p * width + i] = 1.0 / (knots[piece + 1 + i] - knots[piece + 1 + i - p]);
-                }
-            }
-            last = piece;
-        }
-        const double x = rounding > 0.0 ? fmax(places[k], knots[piece]) : places[k];
-        for (long i = 0; i < d; i++) {
-            left[i] = x - knots[piece - i];
-            right[i] = knots[piece + 1 + i] - x;
+        double x = places[k];
+        piece = find_piece(knots, d, many - 1, piece, x + rounding);
+        const double begin = knots[piece];
+        const double length = knots[piece + 1] - begin;
+        x = fabs(x - begin) <= rounding ? begin : x;
+        x = fabs(x - knots[piece + 1]) <= rounding ? knots[piece + 1] : x;
+        left[0] = (x - begin) / length * length;
+        right[0] = length - left[0];
+        for (long i = 1; i < d; i++) {
+            left[i] = left[i - 1] + (knots[piece + 1 - i] - knots[piece - i]);
+            right[i] = right[i - 1] + (knots[piece + 1 + i] - knots[piece + i]);
         }
         basis[0] = 1.0;
         for (long p = 1; p <= d; p++) {
@@ -149,7 +146,7 @@ static inline __attribute__((always_inline)) void find_orders(
             double *own = &basis[p * width];
             double before = 0.0;
             for (long i = 0; i < p; i++) {
-                const double share = lower[i] * inverses[p * width + i];
+                const double share = lower[i] / (left[p - 1 - i] + right[i]);
                 own[i] = before + right[i] * share;
                 before = left[p - 1 - i] * share;
             }
@@ -161,27 +158,27 @@ static inline __attribute__((always_inline)) void find_orders(
             nearest = value[i] > value[nearest] ? i : nearest;
         }
         const double *first = &points[(piece - d) * columns];
-        for (long i = 0; i <= d; i++) {
-            for (long c = 0; c < columns; c++) {
-                work[i * columns + c] = first[i * columns + c] - first[nearest * columns + c];
-            }
-        }
         for (long o = 0; o < orders; o++) {
-            const long p = d - o;
+            for (long i = 0; i <= d; i++) {
+                slopes[i] = i <= d - o ? basis[(d - o) * width + i] : 0.0;
+            }
+            for (long p = o <= d ? d - o + 1 : 1; p <= d; p++) {
+                double before = 0.0;
+                for (long i = 0; i < p; i++) {
+                    const double share = p * slopes[i] / (left[p - 1 - i] + right[i]);
+                    slopes[i] = before - share;
+                    before = share;
+                }
+                slopes[p] = before;
+            }
             double *own = &found[(o * count + k) * columns];
             for (long c = 0; c < columns; c++) {
-                own[c] = o == 0 ? first[nearest * columns + c] : 0.0;
-            }
-            for (long i = 0; i <= p; i++) {
-                for (long c = 0; c < columns; c++) {
-                    own[c] += basis[p * width + i] * work[i * columns + c];
+                const double beside = first[nearest * columns + c];
+                double sum = 0.0;
+                for (long i = 0; i <= d; i++) {
+                    sum += slopes[i] * (first[i * columns + c] - beside);
                 }
-            }
-            for (long i = 0; i < p; i++) {
-                const double factor = p * inverses[p * width + i];
-                for (long c = 0; c < columns; c++) {
-                    work[i * columns + c] = factor * (work[(i + 1) * columns + c] - work[i * columns + c]);
-                }
+                own[c] = o == 0 ? sum + beside : sum;
             }
         }
     }
