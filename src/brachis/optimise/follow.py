@@ -431,6 +431,7 @@ def _hold_limits(
     best = SplineFit(laid)
     violations = _Violations(phase, phase_timing, breaks)
     idle = 0
+    least_excess = np.inf
     looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
     for _ in range(_ROUNDS):
@@ -442,7 +443,10 @@ def _hold_limits(
         if not narrower and looks < closer:
             beyond = violations.worst
         fit = SplineFit(laid, violation, beyond=beyond)
-        idle = 0 if fit.needed_time < best.needed_time * (1.0 - _ENOUGH) else idle + 1
+        excess = float(violations.worst.sum())
+        is_faster = fit.needed_time < best.needed_time * (1.0 - _ENOUGH)
+        idle = 0 if is_faster or excess < least_excess else idle + 1
+        least_excess = min(excess, least_excess)
         if fit.needed_time < best.needed_time:
             best = fit
         slower = laid.motion.t_end / fastest.t_end - 1.0
@@ -451,13 +455,14 @@ def _hold_limits(
         if violation <= _ENOUGH and looks < closer:
             looks = closer
             violations.forget()
+            least_excess = np.inf
             best = replace(best, violation=np.inf)
             continue
         if violation <= _ENOUGH or idle > _PATIENCE or deadline.passed:
             break
         least = _MORE if narrower else 1.0
-        for limit, excess in violations.find_excess(least):
-            added = _between_stations(excess, breaks, timing)
+        for limit, amount in violations.find_excess(least):
+            added = _between_stations(amount, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
         next_timing = phase_timing.course.solve(phase_timing.rates, narrower)
         if next_timing is None:
