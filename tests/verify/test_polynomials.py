@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from brachis.trajectory.pieces import values_of
+from brachis.kernel import bernstein
 from brachis.verify.motion import roots, turns
 
 
@@ -33,7 +33,7 @@ def test_roots_of_random_polynomials(degree):
             u[column == f], real[(real > 0.0) & (real < 1.0)], atol=1e-9
         )
     np.testing.assert_array_equal(column, np.sort(column))
-    np.testing.assert_allclose(values_of(c[:, column], u), 0.0, atol=1e-12)
+    np.testing.assert_allclose(bernstein(c, column, u), 0.0, atol=1e-12)
 
 
 def test_polynomials_without_a_root_and_without_a_number():

@@ -19,7 +19,7 @@ from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Fault, PathMotion, find_least_singular
 from brachis.kernel.postures import Branch
 from brachis.kernel.rotations import body_twists, rotation_derivatives
-from brachis.kernel.splines import Basis, Spline, blossom, collocation
+from brachis.kernel.splines import Basis, Spline, bernstein, blossom, collocation
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 from brachis.kernel.value_groups import (
     FormulaQuantity,
@@ -45,6 +45,7 @@ __all__ = [
     "TorqueDerivatives",
     "ValueGroups",
     "VariableSlopes",
+    "bernstein",
     "blossom",
     "body_twists",
     "bounds_of_pairs",

@@ -52,6 +52,8 @@ FUNCTIONS = {
     "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
     "brachis_solve_band": "- l l l p p",
     "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
+    "brachis_spline_orders": "- o K g c L [k] [Lc] [K] d >[oKc]",
+    "brachis_bernstein": "- K w L n [wLn] l[K] [K] >[Kn]",
     "brachis_curves": "- l l l l l p p p p",
     "brachis_formula": "- p l p l p l p",
 }

@@ -7,6 +7,7 @@ behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,6 +81,20 @@ class Spline:
         values = blossom(self.knots, points, piece, [flat] * self.degree)
         return values.reshape(x.shape + self.control_points.shape[1:])
 
+    def derivatives(
+        self, x: np.ndarray, order: int, rounding: float = 0.0
+    ) -> np.ndarray:
+        """Value and derivatives up to `order`, (order + 1, K, ...), at x, (K,); at knots those just after them.
+
+        What is no more than `rounding` before a knot is at this knot.
+        """
+        shape = self.control_points.shape
+        points = self.control_points.reshape(len(self.control_points), -1)
+        sizes = {"o": order + 1, "g": self.degree}
+        arrays = (self.knots, points, x, rounding)
+        values = compute("brachis_spline_orders", *arrays, **sizes)
+        return np.reshape(values, (order + 1, len(x), *shape[1:]))
+
     @cached_property
     def derivative(self) -> Spline:
         """The derivative as a spline; zero of steps."""
@@ -129,6 +144,29 @@ def blossom(
     arrays = (knots, control_points, piece, places)
     values: np.ndarray = compute("brachis_blossoms", *arrays, g=degree, L=points)
     return values
+
+
+def bernstein(coefficients: np.ndarray, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Evaluate polynomials in Bernstein form by de Casteljau's algorithm.
+
+    Parameters
+    ----------
+    coefficients : (m + 1, L, ...) ndarray
+        Of L pieces.
+    piece : (K,) int ndarray
+    u : (K,) ndarray
+        Places in the pieces, 0 to 1.
+
+    Returns
+    -------
+    (K, ...) ndarray
+    """
+    width, count, *others = coefficients.shape
+    if len(piece) and not 0 <= piece.min() <= piece.max() < count:
+        raise ValueError(f"a piece does not exist; they are 0 to {count - 1}")
+    columns = coefficients.reshape(width, count, math.prod(others))
+    values = compute("brachis_bernstein", columns, piece, u)
+    return np.reshape(values, (len(u), *others))
 
 
 def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:

@@ -10,11 +10,13 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import drop_near, greville, spread
 from brachis.errors import UnreachableError
-from brachis.optimise.boundary import LocalBasis
+from brachis.kernel import Spline
 from brachis.optimise.bspline import ORDERS, clamped_knots, insert_knots, local_basis
 from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 
+_ROUNDING = 1e-13
+"""Part of the time by which rounding moves a time."""
 _S_MISS = 2e-13
 """Largest deviation of the spline of s from the time law."""
 _LOOKS = 5
@@ -76,8 +78,10 @@ class Motion(PhaseSpline):
         At knots those just after them.
         """
         t_norm = t / self.t_end
-        basis = LocalBasis.of(self.knots, self.degree, t_norm)
-        orders = basis.curves(self.control_points)
+        within = t_norm.clip(self.knots[0], self.knots[-1])
+        spline = Spline(self.knots, self.control_points.T, self.degree)
+        # Rounding must not choose the side of a knot: the highest derivative jumps there.
+        orders = spline.derivatives(within, ORDERS - 1, _ROUNDING)
         if self.time_law is not None:
             law_orders = sample_law(self.time_law, t_norm)
             orders = np.concatenate([law_orders, orders], axis=2)
@@ -128,8 +132,7 @@ class Motion(PhaseSpline):
             s = law.at(places * self.t_end)[0]
             points = make_interp_spline(places, s, k=self.degree, t=knots).c
             t_norm = spread(breaks, _LOOKS)
-            basis = LocalBasis.of(knots, self.degree, t_norm)
-            spline_s = basis.curves(points[None])[0, :, 0]
+            spline_s = Spline(knots, points, self.degree)(t_norm)
             miss = np.abs(spline_s - law.at(t_norm * self.t_end)[0])
             worst = miss[:-1].reshape(-1, _LOOKS).max(axis=1)
             if worst.max() < _S_MISS:

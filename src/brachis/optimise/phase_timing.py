@@ -150,6 +150,7 @@ class PhaseTiming:
         passed = np.maximum.accumulate(y[:, 0])
         s = drop_near(np.union1d(passed.clip(begin, end), pieces), tolerances.PATH)
         s[0] = begin
+        del course, timing, y  # they take much memory
 
         def time_at(s: np.ndarray) -> PhaseTiming:
             """Time the course at path coordinates, (S,)."""
@@ -178,21 +179,30 @@ def _resolve_ramps(
     time_at: Callable[[np.ndarray], PhaseTiming], stations: np.ndarray
 ) -> PhaseTiming:
     """Time a joint path at stations, (P,), and at others where the timing switches within a step."""
-    for _ in range(_TIMINGS):
+    for _ in range(_TIMINGS - 1):
         phase_timing = time_at(stations)
-        timing = phase_timing.timing
-        if timing is None:
-            break
-        jumps = np.pad(np.abs(np.diff(timing.acceleration)), 1)
-        change = np.maximum(jumps[1:], jumps[:-1])
-        fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
-        lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
-        allowed = _LOSS_OF_SWITCHES / len(lost)
-        if lost.sum() <= allowed:
-            break
-        parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * allowed))).clip(1, _MOST_PARTS)
-        stations = spread(phase_timing.course.places, parts.astype(int))
-    return phase_timing
+        finer = _divide_switches(phase_timing)
+        if finer is None:
+            return phase_timing
+        stations = finer
+        del phase_timing  # two of them take too much memory
+    return time_at(stations)
+
+
+def _divide_switches(phase_timing: PhaseTiming) -> np.ndarray | None:
+    """Divide the steps in which a timing switches, at too great a cost; None where none does, or without a timing."""
+    timing = phase_timing.timing
+    if timing is None:
+        return None
+    jumps = np.pad(np.abs(np.diff(timing.acceleration)), 1)
+    change = np.maximum(jumps[1:], jumps[:-1])
+    fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
+    lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
+    allowed = _LOSS_OF_SWITCHES / len(lost)
+    parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * allowed))).clip(1, _MOST_PARTS)
+    if lost.sum() <= allowed or parts.max() == 1:
+        return None
+    return spread(phase_timing.course.places, parts.astype(int))
 
 
 def _lay_finely(

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.kernel import Spline
 from brachis.path.context import SegmentContext
 from brachis.path.protocol import Array
 from brachis.robot.task_map.protocol import ANGLES, AXES
@@ -21,9 +21,6 @@ from brachis.task.segments import (
     LineTo,
 )
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
 _MOST_TURNS = 1000
 """Turns of an arc. They have four knots each; a plan of 100 turns takes half a minute and 1.1 GB of memory."""
 
@@ -34,8 +31,8 @@ class SplineCurve:
 
     Attributes
     ----------
-    spline : BSpline
-        The spline with values of shape (m,).
+    spline : Spline
+        With values of shape (m,).
     length : float
         Range of sigma; of waypoints the cumulative chord length of the position rows, m (of the angle, rad, where they
         stand still).
@@ -43,13 +40,13 @@ class SplineCurve:
         Values of sigma between which the spline is a polynomial; of waypoints their chord lengths.
     """
 
-    spline: BSpline
+    spline: Spline
     length: float
     knots: Array
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
-        return np.stack([self.spline(sigma, nu=k) for k in range(order + 1)])
+        return self.spline.derivatives(sigma, order)
 
 
 def septic(start: Array, end: Array, length: float) -> SplineCurve:
@@ -62,12 +59,12 @@ def septic(start: Array, end: Array, length: float) -> SplineCurve:
     length : float
         Range of sigma.
     """
-    from scipy.interpolate import BPoly, BSpline
+    from scipy.interpolate import BPoly
 
     ends = np.array([0.0, length])
     polynomial = BPoly.from_derivatives(ends, [start, end])
     # As a spline without inner knots it has the same control points, and is evaluated faster.
-    spline = BSpline(np.repeat(ends, 8), polynomial.c[:, 0], 7)
+    spline = Spline(np.repeat(ends, 8), polynomial.c[:, 0], 7)
     return SplineCurve(spline, length, ends)
 
 

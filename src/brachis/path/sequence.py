@@ -224,7 +224,7 @@ class Path:
                 for begin, end in pairwise([0, *runs.tolist(), values.size])
             ]
             result = np.concatenate(parts, axis=1)
-        result = result * self.total ** np.arange(order + 1)[:, None, None]
+        result *= self.total ** np.arange(order + 1)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
             result[0] += self.frame.origin

@@ -9,6 +9,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
 from brachis.errors import PathError
+from brachis.kernel import Spline
 from brachis.path.context import SegmentContext, place
 from brachis.path.curves import LineCurve, SplineCurve
 from brachis.path.orientation import AMBIGUOUS, half_turn, turn_between
@@ -22,7 +23,6 @@ from brachis.task.points.units import quaternions_of
 from brachis.task.segments import BSplineCurve, SplineThrough
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
     from scipy.spatial.transform import Rotation
 
 START_TOLERANCE = 1e-4
@@ -260,7 +260,7 @@ def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
         ) from error
 
 
-def _natural(knots: Array, waypoints: Array) -> BSpline:
+def _natural(knots: Array, waypoints: Array) -> Spline:
     # Imported here: it takes half a second, which tasks without a spline need not wait for.
     from scipy.interpolate import make_interp_spline
 
@@ -274,7 +274,7 @@ def _natural(knots: Array, waypoints: Array) -> BSpline:
         ends = [(3, zero), (4, zero)]
         # The stubs do not know conditions on chosen derivatives, which SciPy documents.
         spline = make_interp_spline(unit, waypoints, k=5, bc_type=(ends, ends))  # type: ignore[arg-type]
-    return type(spline)(spline.t * knots[-1], spline.c, spline.k)
+    return Spline(spline.t * knots[-1], spline.c, spline.k)
 
 
 def bspline_curve(shape: BSplineCurve, context: SegmentContext) -> SplineCurve:
@@ -333,8 +333,6 @@ def pose_bspline(
 
 def _of_control_points(shape: BSplineCurve, points: Array) -> SplineCurve:
     """Return the curve of control points, (n, m), from sigma = 0 on."""
-    from scipy.interpolate import BSpline
-
-    spline = BSpline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
-    breaks = np.unique(spline.t)
+    spline = Spline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
+    breaks = np.unique(spline.knots)
     return SplineCurve(spline, float(breaks[-1]), breaks)

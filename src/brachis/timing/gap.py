@@ -178,6 +178,8 @@ def _time_phase(
     count = max(PLACES, min(_LEAST_PLACES * intervals, _MOST_PLACES))
     ends = np.unique(np.clip(trajectory.times, phase.begin, phase.end))
     ends = ends[np.append(np.diff(ends) > _STILL * phase.duration, True)]
+    # Of very many nodes not all.
+    ends = np.append(ends[: -1 : -(-len(ends) // count)], ends[-1])
     steps = np.ceil(count * np.diff(ends) / phase.duration).astype(int)
     t = spread(ends, steps)
     t = divide_turns(t, trajectory.velocity(t))

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,6 +51,8 @@ _CREDIBLE = 1e-2
 """Difference of rows from values, as a part of the limit, above which a timing is not believed."""
 AGREEMENT = 1e-6
 """Change of the time, as a part of it, with which linearisations end, unless stated."""
+_AT_ONCE = 2048
+"""Steps whose bounds are found together: their rows stay in the processor's cache."""
 _HELD_BACK = 0.8
 """Part of what a limit leaves at rest that may be taken."""
 
@@ -84,31 +86,36 @@ class _Rows:
     upper: np.ndarray
 
     @classmethod
-    def of(
-        cls, limit: Limit, path: JointPath, motion: Passage, narrower: Narrower
-    ) -> _Rows:
-        """Linearise a limit at a motion."""
+    def of(cls, limit: Limit, path: JointPath, motion: Passage) -> _Rows:
+        """Linearise a limit at a motion; bounds are not set."""
         partials = limit.partials(motion)
-        values = limit.values(motion)
-        below, above = np.broadcast_to(narrower, (2, *values.shape))
-        lower = limit.lower + below
-        upper = limit.upper - above
+        constant = limit.values(motion)
         rate = motion.rate[:, None]
-        by_rate = np.zeros_like(values)
+        by_u = None
+        by_x = np.zeros_like(constant)
         if partials.qdot is not None:
-            by_rate = apply_each(partials.qdot, path.q_dp)
+            by_x = apply_each(partials.qdot, path.q_dp)
         if partials.qddot is None:
-            room = np.where(by_rate > 0.0, upper, lower) - values
-            ahead = np.full_like(values, np.inf)
-            np.divide(room, by_rate, out=ahead, where=np.abs(by_rate) > _TINY)
-            squares = np.maximum(rate + ahead, 0.0) ** 2
-            constant = values - by_rate * rate
-            return cls(limit, None, by_rate, constant, np.zeros_like(squares), squares)
-        by_u = apply_each(partials.qddot, path.q_dp)
-        by_x = apply_each(partials.qddot, path.q_ddp)
-        by_x += by_rate / (2.0 * rate)
-        constant = values - by_u * motion.acceleration[:, None] - by_x * rate**2
-        return cls(limit, by_u, by_x, constant, lower - constant, upper - constant)
+            constant = constant - by_x * rate
+        else:
+            by_u = apply_each(partials.qddot, path.q_dp)
+            by_x = by_x / (2.0 * rate) + apply_each(partials.qddot, path.q_ddp)
+            constant = constant - by_u * motion.acceleration[:, None] - by_x * rate**2
+        return cls(limit, by_u, by_x, constant, constant, constant)
+
+    def within(self, narrower: Narrower) -> _Rows:
+        """Set bounds, nearer than those of the limit."""
+        below, above = np.broadcast_to(narrower, (2, *self.constant.shape))
+        lower = self.limit.lower + below - self.constant
+        upper = self.limit.upper - above - self.constant
+        if self.by_u is None:
+            rates = np.full_like(upper, np.inf)
+            is_sloped = np.abs(self.by_x) > _TINY
+            bound = np.where(self.by_x > 0.0, upper, lower)
+            np.divide(bound, self.by_x, out=rates, where=is_sloped)
+            upper = np.maximum(rates, 0.0) ** 2
+            lower = np.zeros_like(upper)
+        return replace(self, lower=lower, upper=upper)
 
     def is_tangent_below(self, motion: Passage) -> bool:
         """Tell whether the rows, from another motion, may be kept: those of sizes of vectors, which are convex."""
@@ -158,6 +165,7 @@ class PhasePlane:
         ]
         self._steps = np.diff(path.p)
         self._narrower: Mapping[Limit, np.ndarray] = {}
+        self._labels: list[str] = []
         self._rounds: list[list[_Rows]] = []
         if rate is None:
             rate = np.full(len(path.p), path.p[-1] - path.p[0])
@@ -177,7 +185,9 @@ class PhasePlane:
         known = {block.limit: block for block in agreeing}
         rows = [
             known.get(limit)
-            or _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
+            or _Rows.of(limit, self._middles, motion).within(
+                self._narrower.get(limit, 0.0)
+            )
             for limit in self._limits
         ]
         self._motion = motion
@@ -185,7 +195,15 @@ class PhasePlane:
             block.by_u is None for block in rows if block not in agreeing
         )
         if has_new_levels or not agreeing:
-            self._levels = self._levels_at_stations(rows, motion.rate)
+            rates = np.pad(halfway(motion.rate), 1, mode="edge")
+            rates[[0, -1]] = motion.rate[[0, -1]]
+            at_stations = Passage(self.path, rates, np.zeros_like(rates))
+            self._level_rows = [
+                _Rows.of(block.limit, self.path, at_stations)
+                for block in rows
+                if block.by_u is None
+            ]
+            self._set_levels()
         self._rounds = [rows, *self._rounds[:2]]
         older = dict.fromkeys(block for last in self._rounds[1:] for block in last)
         earlier = [
@@ -195,60 +213,80 @@ class PhasePlane:
         ]
         self._set_bounds([*rows, *earlier])
 
-    def _set_bounds(self, rows: Sequence[_Rows]) -> None:
-        """Find the bounds on u and x that rows with and without acceleration set, `_levels` known."""
-        sloped = [block for block in rows if block.by_u is not None]
+    def _set_bounds(
+        self, rows: Sequence[_Rows], changed: np.ndarray | None = None
+    ) -> None:
+        """Find the bounds on u and x that rows with and without acceleration set, `_levels` known.
+
+        Parts without steps that have changed, (P - 1,) bool, stay.
+        """
+        self._sloped = [block for block in rows if block.by_u is not None]
         levels = [block for block in rows if block.by_u is None]
-        blank = [np.empty((len(self._steps), 0))]
-        self._labels = [
-            str(label) for block in (*sloped, *levels) for label in block.limit.labels
+        labels = [
+            str(label)
+            for block in (*self._sloped, *levels)
+            for label in block.limit.labels
         ]
-        a, b, low, high = (
-            np.hstack(blank + [getattr(block, attribute) for block in sloped])
+        count = len(self._steps)
+        if changed is None or labels != self._labels:
+            changed = np.ones(count, dtype=bool)
+            columns = sum(len(block.limit.labels) for block in self._sloped)
+            self._next = np.empty((3, count, columns))
+            self._floor = np.empty(count)
+            self._ceiling = np.empty(count + 1)
+        self._labels = labels
+        for begin in range(0, count, _AT_ONCE):
+            end = min(begin + _AT_ONCE, count)
+            # A step bounds x at both its ends.
+            if changed[max(begin - 1, 0) : end].any():
+                self._set_part(begin, end)
+        self._ceiling[self.path.stops] = 0.0
+
+    def _stack(self, steps: slice) -> tuple[np.ndarray, ...]:
+        """Put a, b and the bounds of rows with acceleration side by side in some steps, (S, c) each."""
+        blank = [np.empty((len(self._steps[steps]), 0))]
+        return tuple(
+            np.hstack(
+                blank + [getattr(block, attribute)[steps] for block in self._sloped]
+            )
             for attribute in ("by_u", "by_x", "lower", "upper")
         )
-        self._slope, self._lower, self._upper = _as_lines(a, b, low, high)
-        # Half-way x is x + step u, seen from the station before.
-        step = self._steps[:, None]
-        slope, lower, upper = _as_lines(a + step * b, b, low, high)
-        self._floor, ceiling = kernel.bounds_of_pairs(slope, lower, upper, _TINY)
-        highest = self._levels.min(axis=1, initial=np.inf)
-        ceilings = [np.append(ceiling, np.inf), highest]
+
+    def _set_part(self, begin: int, end: int) -> None:
+        """Find the bounds in steps, and at the stations where these begin; at the last station with the last step."""
+        first = max(begin - 1, 0)
+        steps = self._steps[first:end, None]
+        a, b, low, high = self._stack(slice(first, end))
+        own = slice(begin, end)
+        inside = slice(begin - first, None)
+        # Half-way x is x + step u, seen from the station before, and x + 2 step u is x at the next station.
+        lines = _as_lines(a + steps * b, b, low, high)
+        self._next[:, own] = 2.0 * steps[inside] * np.array(lines)[:, inside]
+        self._next[0, own] += 1.0
+        floor, ceiling = kernel.bounds_of_pairs(*lines, _TINY)
+        self._floor[own] = floor[inside]
         # The rows at the stations themselves keep u from swinging between its neighbours.
-        lines = _as_lines(*map(self._at_stations, (a, b, low, high)))
-        ceilings.append(kernel.bounds_of_pairs(*lines, _TINY)[1])
-        self._ceiling = np.min(ceilings, axis=0)
-        self._ceiling[self.path.stops] = 0.0
-        # x + 2 step u is x at the next station.
-        self._factor = 1.0 + 2.0 * step * slope
-        self._next_lower = 2.0 * step * lower
-        self._next_upper = 2.0 * step * upper
+        lines = _as_lines(*(_at_stations(part, steps) for part in (a, b, low, high)))
+        at_stations = kernel.bounds_of_pairs(*lines, _TINY)[1]
+        last = end + 1 if end == len(self._steps) else end
+        stations = slice(begin, last)
+        highest = self._levels[stations].min(axis=1, initial=np.inf)
+        own_ceiling = np.append(ceiling, np.inf)[begin - first : last - first]
+        ceilings = [own_ceiling, highest, at_stations[begin - first : last - first]]
+        self._ceiling[stations] = np.min(ceilings, axis=0)
 
-    def _levels_at_stations(
-        self, rows: Sequence[_Rows], rate: np.ndarray
-    ) -> np.ndarray:
-        """Largest x at the stations, (P, c), by limits without acceleration."""
-        rates = np.concatenate([rate[:1], halfway(rate), rate[-1:]])
-        motion = Passage(self.path, rates, np.zeros_like(rates))
+    def _set_levels(self) -> None:
+        """Find the largest x at the stations, (P, c), by limits without acceleration."""
         levels = [np.empty((len(self.path.p), 0))]
-        for block in rows:
-            if block.by_u is None:
-                narrower: Narrower = 0.0
-                if block.limit in self._narrower:
-                    between = self._narrower[block.limit]
-                    ends = between[..., :1, :], between, between[..., -1:, :]
-                    padded = np.concatenate(ends, axis=-2)
-                    narrower = np.maximum(padded[..., 1:, :], padded[..., :-1, :])
-                level = _Rows.of(block.limit, self.path, motion, narrower)
-                levels.append(level.upper)
-        return np.hstack(levels)
-
-    def _at_stations(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values known half-way between the stations, (P - 1, c), at the stations, (P, c)."""
-        share = (self._steps[1:] / (self._steps[1:] + self._steps[:-1]))[:, None]
-        with np.errstate(invalid="ignore"):
-            between = share * values[:-1] + (1.0 - share) * values[1:]
-        return np.concatenate([values[:1], between, values[-1:]])
+        for block in self._level_rows:
+            narrower: Narrower = 0.0
+            if block.limit in self._narrower:
+                between = self._narrower[block.limit]
+                ends = between[..., :1, :], between, between[..., -1:, :]
+                padded = np.concatenate(ends, axis=-2)
+                narrower = np.maximum(padded[..., 1:, :], padded[..., :-1, :])
+            levels.append(block.within(narrower).upper)
+        self._levels = np.hstack(levels)
 
     def narrow(self, narrower: Mapping[Limit, np.ndarray]) -> None:
         """Bring the bounds of limits nearer half-way between the stations.
@@ -271,9 +309,18 @@ class PhasePlane:
                 slack = np.minimum(above, below)
                 allowed = np.where(slack > 0.0, _HELD_BACK * slack, np.inf)
                 held[block.limit] = np.minimum(held[block.limit], allowed)
+        changed = np.zeros(len(self._steps), dtype=bool)
+        for limit in {**held, **self._narrower}:
+            moved = np.subtract(held.get(limit, 0.0), self._narrower.get(limit, 0.0))
+            changed |= moved.reshape(-1, *moved.shape[-2:]).any(axis=(0, 2))
         self._narrower = held
-        self._rounds = []
-        self._linearise(self._motion)
+        rows = [
+            block if block.by_u is None else block.within(held.get(block.limit, 0.0))
+            for block in self._rounds[0]
+        ]
+        self._rounds = [rows]
+        self._set_levels()
+        self._set_bounds(rows, changed)
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -344,8 +391,9 @@ class PhasePlane:
         if last > self._ceiling[-1] * (1.0 + _ROUNDING):
             return None
         # The intervals of x from which the end can be reached.
+        factor, next_lower, next_upper = self._next
         reach = kernel.go_backwards(
-            (self._factor, self._next_lower, self._next_upper),
+            (factor, next_lower, next_upper),
             (self._floor, self._ceiling[:-1]),
             last,
             flat=_TINY,
@@ -356,7 +404,7 @@ class PhasePlane:
         low, high = reach
         if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
             return None
-        squares = kernel.go_forwards(self._factor, self._next_upper, reach, first)
+        squares = kernel.go_forwards(factor, next_upper, reach, first)
         if not squares.max() > 0.0:
             return None
         # Between stations nothing stops; a station where the grid says so is an artefact of its width.
@@ -393,9 +441,10 @@ class PhasePlane:
     def _factors(self, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         """Largest factor, (P - 1, c), of the speed of a motion half-way between the stations for each limit alone."""
         x = rate[:, None] ** 2
-        beside = acceleration[:, None] - self._slope * x
+        slope, lower, upper = _as_lines(*self._stack(slice(None)))
+        beside = acceleration[:, None] - slope * x
         levels = np.minimum(self._levels[1:], self._levels[:-1])
-        bound = np.hstack([np.where(beside > 0.0, self._upper, self._lower), levels])
+        bound = np.hstack([np.where(beside > 0.0, upper, lower), levels])
         used = np.hstack([beside, np.broadcast_to(x, levels.shape)])
         squares = np.divide(
             bound, used, out=np.full_like(bound, np.inf), where=used != 0.0
@@ -412,8 +461,11 @@ class PhasePlane:
     def largest_rate(self, end: int) -> tuple[float, str]:
         """Find the largest dp/dt, 1/s, that the limits allow beside an end (0 or -1), and which one allows no more."""
         for _ in range(_LOOKS_AT_END):
-            tilt = self._slope[end][:, None] - self._slope[end]
-            clearance = self._upper[end][:, None] - self._lower[end]
+            slope, lower, upper = (
+                line[end] for line in _as_lines(*self._stack(slice(None)))
+            )
+            tilt = slope[:, None] - slope
+            clearance = upper[:, None] - lower
             falls = tilt < -_TINY
             squares = np.divide(
                 clearance, -tilt, out=np.full_like(tilt, np.inf), where=falls
@@ -427,6 +479,14 @@ class PhasePlane:
             rates = np.full(len(self._steps), rate)
             self._linearise(Passage(self._middles, rates, np.zeros_like(rates)))
         return rate, label
+
+
+def _at_stations(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Interpolate values known half-way between stations, (P - 1, c), at these, (P, c); steps are (P - 1, 1)."""
+    share = steps[1:] / (steps[1:] + steps[:-1])
+    with np.errstate(invalid="ignore"):
+        between = share * values[:-1] + (1.0 - share) * values[1:]
+    return np.concatenate([values[:1], between, values[-1:]])
 
 
 def _not_too_slow(rate: np.ndarray) -> np.ndarray:

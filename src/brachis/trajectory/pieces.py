@@ -26,6 +26,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brachis.kernel import bernstein
+
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
@@ -55,7 +57,7 @@ class Pieces:
         piece = np.searchsorted(self.x[1:-1], flat, side="right")
         begin = self.x[piece]
         u = (flat - begin) / (self.x[piece + 1] - begin)
-        values = values_of(self.c[:, piece], u)
+        values = bernstein(self.c, piece, u)
         return values.reshape(t.shape + self.c.shape[2:])
 
     @cached_property
@@ -67,15 +69,6 @@ class Pieces:
         return Pieces(
             degree * np.diff(self.c, axis=0) / np.diff(self.x)[:, None], self.x
         )
-
-
-def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,), by de Casteljau's algorithm."""
-    values = coefficients
-    u = u.reshape(-1, *[1] * (values.ndim - 2))
-    while len(values) > 1:
-        values = (1.0 - u) * values[:-1] + u * values[1:]
-    return values[0]
 
 
 def piece_coefficients(

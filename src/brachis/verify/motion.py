@@ -20,12 +20,12 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import bisect, count_each
 from brachis.errors import InputError
+from brachis.kernel import bernstein
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of, with_held_speeds
 from brachis.robot import Robot, TaskMap
 from brachis.task import SpeedTable, Task
 from brachis.trajectory import MotionPhase, Trajectory
-from brachis.trajectory.pieces import values_of
 from brachis.verify.mechanics import joint_placements, torques
 from brachis.verify.report import VerifyOptions
 
@@ -95,7 +95,7 @@ def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     u, value : (Z,) ndarray
     """
     column, u = roots(np.diff(coefficients, axis=0))
-    return column, u, values_of(coefficients[:, column], u)
+    return column, u, bernstein(coefficients, column, u)
 
 
 SAME_PLACE = 1e-9
@@ -148,7 +148,7 @@ class MotionPieces:
 
     def positions(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Joint positions at places, (K, n)."""
-        return self.nodes[piece] + values_of(self.position[:, piece], u)
+        return self.nodes[piece] + bernstein(self.position, piece, u)
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
@@ -164,61 +164,85 @@ class MotionPieces:
 
 @dataclass(frozen=True, eq=False)
 class MotionStates:
-    """The motion at K places, ascending in time; where pieces join, both sides.
+    """The motion at K places, ascending in time; where pieces join, both sides. Only what is asked for is evaluated.
 
     Attributes
     ----------
+    pieces : MotionPieces
     piece : (K,) int ndarray
     u, t, s : (K,) ndarray
         Place in the piece; time, s; path coordinate.
     q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
+    pieces: MotionPieces
     piece: np.ndarray
     u: np.ndarray
-    t: np.ndarray
-    s: np.ndarray
-    q: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
-    qdddot: np.ndarray
-    tau: np.ndarray
 
     @classmethod
     def at(cls, pieces: MotionPieces, piece: np.ndarray, u: np.ndarray) -> MotionStates:
-        """Evaluate pieces at places, in any order; each place once."""
+        """Take pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece = piece[order]
         u = u[order]
         near = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= SAME_PLACE)
         again = near & ((u[1:] < 1.0) | (u[:-1] == 1.0))  # an end stays
         first = np.append(True, ~again)[: len(piece)]
-        piece = piece[first]
-        u = u[first]
-        blocks = range(_AT_ONCE, max(len(piece), 1), _AT_ONCE)
-        parts = zip(np.split(piece, blocks), np.split(u, blocks), strict=True)
-        return cls.join([cls._evaluate(pieces, *part) for part in parts])
+        return cls(pieces, piece[first], u[first])
 
     @classmethod
     def join(cls, parts: list[MotionStates]) -> MotionStates:
         """Put states one after the other."""
-        rows = zip(*(vars(part).values() for part in parts), strict=True)
-        return cls(*map(np.concatenate, rows))
+        piece = np.concatenate([part.piece for part in parts])
+        return cls(parts[0].pieces, piece, np.concatenate([part.u for part in parts]))
 
-    @classmethod
-    def _evaluate(
-        cls, pieces: MotionPieces, piece: np.ndarray, u: np.ndarray
-    ) -> MotionStates:
-        """Evaluate pieces at places, ascending."""
-        t = pieces.time(piece, u)
-        q = pieces.positions(piece, u)
-        qdot, qddot, qdddot = (
-            values_of(coefficients[:, piece], u)
-            for coefficients in (pieces.velocity, pieces.acceleration, pieces.jerk)
+    def split(self) -> list[MotionStates]:
+        """Divide the states into parts that take little memory."""
+        begins = range(0, max(len(self.u), 1), _AT_ONCE)
+        return [self.only(slice(begin, begin + _AT_ONCE)) for begin in begins]
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Times, (K,), s."""
+        return self.pieces.time(self.piece, self.u)
+
+    @cached_property
+    def s(self) -> np.ndarray:
+        """Path coordinates, (K,)."""
+        return self.pieces.path_coordinate(self.t)
+
+    @cached_property
+    def q(self) -> np.ndarray:
+        """Positions, (K, n)."""
+        return self.pieces.positions(self.piece, self.u)
+
+    @cached_property
+    def qdot(self) -> np.ndarray:
+        """Velocities, (K, n)."""
+        return bernstein(self.pieces.velocity, self.piece, self.u)
+
+    @cached_property
+    def qddot(self) -> np.ndarray:
+        """Accelerations, (K, n)."""
+        return bernstein(self.pieces.acceleration, self.piece, self.u)
+
+    @cached_property
+    def qdddot(self) -> np.ndarray:
+        """Jerks, (K, n)."""
+        return bernstein(self.pieces.jerk, self.piece, self.u)
+
+    @cached_property
+    def joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """The `joint_placements`."""
+        return joint_placements(self.pieces.robot, self.q)
+
+    @cached_property
+    def tau(self) -> np.ndarray:
+        """Torques, (K, n)."""
+        robot = self.pieces.robot
+        return np.concatenate(
+            [torques(robot, part.q, part.qdot, part.qddot) for part in self.split()]
         )
-        tau = torques(pieces.robot, q, qdot, qddot)
-        s = pieces.path_coordinate(t)
-        return cls(piece, u, t, s, q, qdot, qddot, qdddot, tau)
 
     def torque(self, robot: Robot) -> np.ndarray:
         """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
@@ -227,7 +251,7 @@ class MotionStates:
 
     def only(self, chosen: np.ndarray | slice | list[int]) -> MotionStates:
         """Return some of the states, in the order that is chosen."""
-        return MotionStates(*(values[chosen] for values in vars(self).values()))
+        return MotionStates(self.pieces, self.piece[chosen], self.u[chosen])
 
     def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
@@ -271,11 +295,6 @@ class Given:
         return MotionStates.at(self.pieces, *_all_places(self))
 
     @cached_property
-    def joints(self) -> tuple[np.ndarray, np.ndarray]:
-        """The `joint_placements` in the states."""
-        return joint_placements(self.robot, self.states.q)
-
-    @cached_property
     def legs(self) -> tuple[Leg, ...]:
         """Legs of the path, found anew from the task."""
         task = with_held_speeds(self.task, self.task_map, self.path)
@@ -295,8 +314,8 @@ MOST_INSTANTS = 2_000_000
 """Instants at which a motion is checked before limits ask for more: some ten seconds' work, and 3 GB."""
 _USUAL_INSTANTS = 200_000
 """Instants in the knot intervals, unless each has the fewest."""
-_AT_ONCE = 50_000
-"""Instants that are evaluated at once."""
+_AT_ONCE = 5000
+"""Instants that are evaluated at once: they stay in the processor's cache."""
 _FEWEST = 8
 """Steps in a knot interval, no fewer, however many intervals there are; accelerations are polynomials within it."""
 _LEAST_STEPS = 3

@@ -32,7 +32,7 @@ from brachis.verify.checks import (
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given
+from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
@@ -96,7 +96,13 @@ def verify_trajectory(
             allowed=", ".join(trajectory.joint_names),
         )
     given = Given(trajectory, robot, task_map, path_of(task_map, task), options)
-    path_check = _check_path(given)
+    # Part by part, for placements of all joints take much memory.
+    surveys = [
+        (_path_errors(given, part), find_margins(given, part))
+        for part in given.states.split()
+    ]
+    errors, margins = zip(*surveys, strict=True)
+    path_check = _check_path(given, np.concatenate(errors))
     ratios = check_limits(given, own_limits)
     names = Counter(check.name.removesuffix(" ratio") for check in ratios)
     left_out = Counter(trajectory.own_limits) - names
@@ -118,19 +124,22 @@ def verify_trajectory(
         *check_continuity(given),
     ]
     worst = max((check.value for check in ratios), default=0.0)
-    margins = find_margins(given)
+    least = (
+        min(same, key=lambda margin: margin.value)
+        for same in zip(*margins, strict=False)
+    )
     return Verification(
-        tuple(checks), len(given.states.t), worst, path_check.value, margins
+        tuple(checks), len(given.states.t), worst, path_check.value, tuple(least)
     )
 
 
-def _path_errors(given: Given) -> np.ndarray:
+def _path_errors(given: Given, states: MotionStates) -> np.ndarray:
     """Return the tool's distance, m, or largest angle of an axis, rad, from the path at the saved s(t), (K,)."""
     task_map = given.task_map
-    targets = given.path.sample(np.clip(given.states.s, 0.0, 1.0)).target
+    targets = given.path.derivatives(np.clip(states.s, 0.0, 1.0), 0)[0]
     if isinstance(task_map, JointSpace):
-        return np.linalg.norm(given.states.q - targets, axis=1)
-    positions, rotations = tool_placements(given.robot, given.states.q, given.joints)
+        return np.linalg.norm(states.q - targets, axis=1)
+    positions, rotations = tool_placements(given.robot, states.q, states.joints)
     axes = list(task_map.axes)
     distances = np.linalg.norm(positions[:, axes] - targets[:, : len(axes)], axis=1)
     if not task_map.angles:
@@ -148,9 +157,8 @@ def _path_errors(given: Given) -> np.ndarray:
     return np.maximum(distances, 2.0 * np.arcsin((0.5 * chords).clip(max=1.0)))
 
 
-def _check_path(given: Given) -> Check:
-    """Check the largest distance of the tool from the path at the saved s(t)."""
-    errors = _path_errors(given)
+def _check_path(given: Given, errors: np.ndarray) -> Check:
+    """Check the largest distance, (K,), of the tool from the path at the saved s(t)."""
     worst = np.argmax(errors)
     tolerance = given.options.path_tolerance
     remark = ""

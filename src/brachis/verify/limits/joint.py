@@ -29,7 +29,7 @@ def _worst_derivative(kind: str, given: Given) -> Worst | None:
     if not np.isfinite(upper).any():
         return None
     rates = getattr(given.pieces, kind)
-    return largest(given, rates / upper, rates / lower)
+    return largest(given, lambda part: (rates[:, part] / upper, rates[:, part] / lower))
 
 
 def _worst_position(given: Given) -> Worst | None:
@@ -55,9 +55,14 @@ def _worst_in_range(given: Given, scale: np.ndarray) -> Worst:
     """Find the largest ratio, where a distance of `scale`, (n,), from an end changes it by 1."""
     lower, upper = given.robot.limits.both_ways("position")
     pieces = given.pieces
-    above = 1.0 + (pieces.nodes - upper + pieces.position) / scale
-    below = 1.0 + (lower - pieces.nodes - pieces.position) / scale
-    return largest(given, above, below)
+
+    def ratios(part: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ratios to the upper and to the lower ends."""
+        positions = pieces.nodes[part] + pieces.position[:, part]
+        above = 1.0 + (positions - upper) / scale
+        return above, 1.0 + (lower - positions) / scale
+
+    return largest(given, ratios)
 
 
 def _worst_quantity(

@@ -11,19 +11,18 @@ import numpy as np
 from brachis.common.arrays import cross
 from brachis.robot.task_map import JointSpace
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
-from brachis.verify.mechanics import joint_placements, tool_placements
+from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Margin
 
 
-def find_margins(given: Given) -> tuple[Margin, ...]:
+def find_margins(given: Given, states: MotionStates) -> tuple[Margin, ...]:
     """Find the smallest singular value of the arm's Jacobian, and the smallest distance from the end of a range."""
-    states = given.states
     margins: list[Margin] = []
     if not np.isfinite(states.q).all():
         return ()
     if not isinstance(given.task_map, JointSpace):
-        singular = _singular_values(given, states.q, given.joints)
+        singular = _singular_values(given, states)
         k = np.argmin(singular)
         time = float(states.t[k])
         name = "smallest singular value"
@@ -38,16 +37,13 @@ def find_margins(given: Given) -> tuple[Margin, ...]:
     return tuple(margins)
 
 
-def _singular_values(
-    given: Given, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
+def _singular_values(given: Given, states: MotionStates) -> np.ndarray:
     """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints.
 
-    They are the roots of the least eigenvalues of J J^T, right to 1e-8 of the largest one; `joints` are the
-    `joint_placements` in postures q, (K, n).
+    They are the roots of the least eigenvalues of J J^T, right to 1e-8 of the largest one.
     """
-    rotations, origins = joints
-    tool = tool_placements(given.robot, q, joints)[0].T
+    rotations, origins = states.joints
+    tool = tool_placements(given.robot, states.q, states.joints)[0].T
     columns = []
     for number, body in enumerate(given.robot.urdf_dynamics.bodies, 1):
         axis = (rotations[:, number] @ body.axis).T
@@ -67,7 +63,7 @@ def _parts_of_ranges(
     ends = given.robot.limits.both_ways("position")[:, :count]
     joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
     lower, upper = ends[:, joints]
-    away = np.abs(states.q[:, joints] - 0.5 * (lower + upper))
+    away = np.abs(states.q.take(joints, axis=1) - 0.5 * (lower + upper))
     names = [given.robot.joint_names[joint] for joint in joints]
     return away / (0.5 * (upper - lower)), names
 
@@ -80,8 +76,7 @@ def _worst_singularity(given: Given) -> Worst | None:
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return 2 - value / wanted, (K, 1)."""
-        joints = joint_placements(given.robot, states.q)
-        return 2.0 - _singular_values(given, states.q, joints)[:, None] / wanted
+        return 2.0 - _singular_values(given, states)[:, None] / wanted
 
     return worst_between(given, ratios, ("arm",))
 

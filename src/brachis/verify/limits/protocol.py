@@ -9,6 +9,9 @@ import numpy as np
 
 from brachis.verify.motion import Given, MotionStates, turns
 
+_AT_ONCE = 5000
+"""Steps that are looked at together: they stay in the processor's cache."""
+
 
 class Worst(NamedTuple):
     """The largest ratio to a limit.
@@ -66,7 +69,7 @@ def worst_between(
     """
     states = given.states if states is None else states
     most_states = len(states.t) + 100_000
-    ratio = ratio_at(states)
+    ratio = np.concatenate([ratio_at(part) for part in states.split()])
     for _ in range(40):
         steps, most = _may_hold_more(states, given.pieces.lengths, ratio)
         if not len(steps):
@@ -106,6 +109,24 @@ def _may_hold_more(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
+    highest = ratio.max()
+    found = []
+    for begin in range(0, len(ratio), _AT_ONCE):
+        # The bend at an end of a step takes the step beside it.
+        first = max(begin - 1, 0)
+        rows = slice(first, begin + _AT_ONCE + 2)
+        step, most = _open_steps(states.only(rows), lengths, ratio[rows], highest)
+        number = first + step
+        is_own = (number >= begin) & (number < begin + _AT_ONCE)
+        found.append((number[is_own], most[is_own]))
+    steps, most = (np.concatenate(part) for part in zip(*found, strict=True))
+    return steps, most
+
+
+def _open_steps(
+    states: MotionStates, lengths: np.ndarray, ratio: np.ndarray, highest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """List the steps within which a ratio above the highest one that is known may lie; see `_may_hold_more`."""
     inside = states.piece[1:] == states.piece[:-1]
     part = np.where(inside, np.diff(states.u), 1.0)
     length = (part * lengths[states.piece[:-1]])[:, None]
@@ -119,29 +140,44 @@ def _may_hold_more(
     rise = climb**2 / np.maximum(4.0 * bend, np.finfo(float).tiny)
     most = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
     # Steps of a millionth of a piece are not halved, nor searched for an excess of 5e-6.
-    open_steps = inside & (part > 1e-6) & (most > ratio.max() + 5e-6)
+    open_steps = inside & (part > 1e-6) & (most > highest + 5e-6)
     steps = np.flatnonzero(open_steps)
     return steps, most[steps]
 
 
-def largest(given: Given, above: np.ndarray, below: np.ndarray) -> Worst:
-    """Find the largest value of polynomials in Bernstein form, two for every piece and joint, (m + 1, L, n) each.
+def largest(
+    given: Given, ratios: Callable[[slice], tuple[np.ndarray, np.ndarray]]
+) -> Worst:
+    """Find the largest value of polynomials in Bernstein form, two for every piece and joint.
 
     It is at an end of a piece or where a polynomial turns that has a coefficient above the values at all ends.
+
+    Parameters
+    ----------
+    given : Given
+    ratios : callable
+        ``ratios(part)`` returns the coefficients of both in some pieces, (m + 1, l, n) each.
     """
-    flat = np.concatenate([above, below], axis=1).reshape(len(above), -1)
-    ends = flat[[0, -1]]
-    end, column = map(int, np.unravel_index(np.argmax(ends), ends.shape))
-    value = float(ends[end, column])
-    u = np.array([float(end)])
-    higher = np.flatnonzero(flat.max(axis=0) > value)
-    turning, at, values = turns(flat[:, higher])
-    if values.max(initial=-np.inf) > value:
-        k = np.argmax(values)
-        value = values[k]
-        column = higher[turning[k]]
-        u = at[[k]]
-    _, count, n = above.shape
-    piece = np.array([column // n % count])
-    time = given.pieces.time(piece, u)[0]
-    return Worst(value, given.robot.joint_names[column % n], time)
+    found: list[tuple[float, int, float, int]] = []
+    highest = -np.inf
+    count = len(given.pieces.lengths)
+    for begin in range(0, count, _AT_ONCE):
+        coefficients = np.stack(ratios(slice(begin, begin + _AT_ONCE)), axis=1)
+        _, _, pieces, joints = coefficients.shape
+        flat = coefficients.reshape(len(coefficients), -1)
+        ends = flat[[0, -1]]
+        end, column = map(int, np.unravel_index(np.argmax(ends), ends.shape))
+        value = float(ends[end, column])
+        u = float(end)
+        highest = max(value, highest)
+        higher = np.flatnonzero(flat.max(axis=0) > highest)
+        turning, at, values = turns(flat[:, higher])
+        if values.max(initial=-np.inf) > value:
+            k = int(np.argmax(values))
+            value = float(values[k])
+            column = int(higher[turning[k]])
+            u = float(at[k])
+        found.append((value, begin + column // joints % pieces, u, column % joints))
+    value, piece, u, joint = found[int(np.argmax([row[0] for row in found]))]
+    time = given.pieces.time(np.array([piece]), np.array([u]))[0]
+    return Worst(value, given.robot.joint_names[joint], time)
