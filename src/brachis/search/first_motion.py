@@ -48,7 +48,7 @@ _ROUNDS = 12
 _MARGIN = 1e-3
 """Distance from their bounds at which rows are held, so that few are exceeded between the collocation points."""
 _DAMPING = 1e-8
-"""Part of the largest entry that is added to a diagonal: some joints, and some rows, do not count."""
+"""Part of the largest entry that is added to a diagonal: some joints do not count, and rows may depend on others."""
 
 
 def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
@@ -125,7 +125,7 @@ def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
     places = (program.jacobian_rows, program.jacobian_columns)
     entries = sp.coo_array((program.jacobian(x), places), (len(values), len(x)))
     is_free = program.x_lower < program.x_upper
-    jacobian = entries.tocsr() * is_free
+    jacobian = (entries * is_free).tocsr()
     metric = _measure_smoothness(program, x)
     margin = np.minimum(_MARGIN, 0.25 * (program.upper - program.lower))
     low = program.lower + margin - values
