@@ -47,6 +47,8 @@ _ROUNDS = 12
 """Sets of rows that are tried for a change, no more."""
 _MARGIN = 1e-3
 """Distance from their bounds at which rows are held, so that few are exceeded between the collocation points."""
+_ENOUGH = 1e-10
+"""Violation that is small enough: with 1e-8 the tool went back on its path between knots that are close together."""
 _DAMPING = 1e-8
 """Part of the largest entry that is added to a diagonal: some joints do not count, and rows may depend on others."""
 
@@ -91,7 +93,7 @@ def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> Solver
     began = time.perf_counter()
     violation = residual(program, x)
     count = 0
-    while FEASIBLE < violation < np.inf and count < _CHANGES and not deadline.passed:
+    while _ENOUGH < violation < np.inf and count < _CHANGES and not deadline.passed:
         count += 1
         change = _smoothest_change(program, x)
         share = 1.0
@@ -135,7 +137,7 @@ def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
     held = is_equal
     for _ in range(_ROUNDS):
         beyond = jacobian @ change
-        is_missed = (beyond < low - FEASIBLE) | (beyond > high + FEASIBLE)
+        is_missed = (beyond < low - _ENOUGH) | (beyond > high + _ENOUGH)
         if not is_missed.any():
             break
         held = held | is_missed
