@@ -36,6 +36,8 @@ from brachis.search.phase_plane import initial_guess
 from brachis.search.stages import Candidate, InitialGuess, begin_candidate, fail, rank
 from brachis.search.verified import refine_and_verify
 
+LITTLE_TIME = 5.0
+"""Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
 _NOT_COMPLETED = "there was time for a first motion alone, which may be far from the fastest"
 _SLOWER = (1.1, 1.5, 2.5)
 """Factors on the times of the first splines, one tried after the other: with 1 most rows are at their bounds."""

@@ -32,7 +32,7 @@ from brachis.optimise.backends import SolveStatus
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import pipeline
 from brachis.search.failure import explain_first_failures, explain_no_motion
-from brachis.search.first_motion import find_first_motion
+from brachis.search.first_motion import LITTLE_TIME, find_first_motion
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.holding import explain_holding, explain_postures
 from brachis.search.hopeless import explain_speeds
@@ -56,8 +56,6 @@ _LEAST_COST = 0.5
 of the smallest cost so far. With 10 intervals they cost joint paths of a planar arm 17 to 20 % of the time."""
 _RANKING_SHARE = 0.6
 """Part of the time left after which no joint path is improved while nothing is verified."""
-_LITTLE_TIME = 5.0
-"""Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
 _FIRST_SHARE = 0.6
 """Part of the time left in which it is looked for."""
 _LATER = 0.2
@@ -233,7 +231,7 @@ class Search:
         until = self._deadline.part(_FIRST_SHARE)
         for guess in sorted(batch.guesses, key=lambda guess: guess.estimate):
             has_motion = self.is_satisfied or self._first_motion is not None
-            if has_motion or self._deadline.left > _LITTLE_TIME or until.passed:
+            if has_motion or self._deadline.left > LITTLE_TIME or until.passed:
                 return
             outcome = find_first_motion(guess, until)
             if isinstance(outcome, FinishedCandidate) and outcome.is_settled:
