@@ -399,10 +399,14 @@ def _lengthen(
     factor = 1.0
     too_short = factor
     best = (factor, violation)
+    stride = 1.0
     while goal < violation and factor < max_factor:
         before = violation
         too_short = factor
-        factor = min(factor * (1.0 + violation - 0.5 * goal), max_factor)
+        lack = stride * (violation - 0.5 * goal)
+        factor = min(factor * (1.0 + lack), max_factor)
+        if options.deadline.passed:
+            stride *= 2.0
         violation, _ = violations(dense, dense.scale_time(x, factor), goal)
         if violation <= goal or (violation < best[1] and factor < max_factor):
             best = (factor, violation)

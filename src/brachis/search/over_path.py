@@ -264,5 +264,7 @@ def lay_along_timing(
         done = verify(candidate, reports, longer)
         if done.is_settled or not isinstance(done, FinishedCandidate):
             break
+        if done.verification.worst_ratio <= 1.0 or options.deadline.passed:
+            break
         excess = max(done.verification.worst_ratio - 1.0, 2.0 * options.tolerance)
     return done

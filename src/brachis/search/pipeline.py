@@ -37,6 +37,7 @@ from brachis.optimise.mesh import adapt_mesh
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import FINE, improve_joint_paths, is_timing_all
 from brachis.optimise.transcription import program_of
+from brachis.search.first_motion import LITTLE_TIME
 from brachis.search.joint_choice import best_of_joints
 from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
 from brachis.search.over_time import (
@@ -60,6 +61,8 @@ from brachis.search.verified import refine_and_verify
 
 _BEFORE_REFINEMENT = 0.5
 """Part of the time left for all that comes before refinement."""
+_IF_SHORT = 0.2
+"""The same where splines are laid in little time, which takes half a second. With 0.5 they were laid too late."""
 
 
 def rank_candidate(
@@ -111,12 +114,12 @@ def finish_candidate(
     Candidate
         A finished one where there is a motion.
     """
-    session = _open_session(
-        candidate.guess, deadline.part(_BEFORE_REFINEMENT), listener
-    )
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
     is_followed = follows_timing(candidate.guess, candidate.program)
+    is_short = is_followed and deadline.left < LITTLE_TIME
+    share = _IF_SHORT if is_short else _BEFORE_REFINEMENT
+    session = _open_session(candidate.guess, deadline.part(share), listener)
     finish = _finish_over_path if is_followed else _finish_over_time
     try:
         return finish(candidate, session, options, to_beat)

@@ -1,0 +1,177 @@
+"""A motion within the limits near a joint path, found without a solve: the first one where there is little time.
+
+Splines along a joint path nearly keep the limits if they are slow enough. Phases that are laid one by one do not quite
+meet, and limits are exceeded beside their ends. The smoothest change d of the variables after which the linearised
+rows hold,
+
+    minimise   the mean over time of sum_i (weights_i d qddot_i)^2    subject to    lower <= rows(x) + J d <= upper,
+
+is made again and again. That takes hundredths of a second, where a solve takes tenths, or seconds.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+
+from brachis.common.deadline import Deadline
+from brachis.errors import UnreachableError
+from brachis.optimise.backends import (
+    FEASIBLE,
+    SolverReport,
+    SolveStatus,
+    objective_at,
+    residual,
+)
+from brachis.optimise.mesh import coarsest
+from brachis.optimise.program import Program
+from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.transcription import program_of
+from brachis.search.least_motion import least_acceleration
+from brachis.search.phase_plane import initial_guess
+from brachis.search.stages import Candidate, InitialGuess, begin_candidate, fail, rank
+from brachis.search.verified import refine_and_verify
+
+LITTLE_TIME = 5.0
+"""Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
+_NOT_COMPLETED = "there was time for a first motion alone, which may be far from the fastest"
+_SLOWER = (1.1, 1.5, 2.5)
+"""Factors on the times of the first splines, one tried after the other: with 1 most rows are at their bounds."""
+_CHANGES = 10
+"""Changes that are made, no more."""
+_LEAST_SHARE = 0.02
+"""Part of a change that is made, at least: where no larger one is better the rows are far from linear."""
+_ROUNDS = 12
+"""Sets of rows that are tried for a change, no more."""
+_MARGIN = 1e-3
+"""Distance from their bounds at which rows are held, so that few are exceeded between the collocation points."""
+_ENOUGH = 1e-10
+"""Violation that is small enough: with 1e-8 the tool went back on its path between knots that are close together."""
+_DAMPING = 1e-8
+"""Part of the largest entry that is added to a diagonal: some joints do not count, and rows may depend on others."""
+
+
+def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
+    """Find a verified motion near the joint path of a guess, over few knots.
+
+    Parameters
+    ----------
+    guess : InitialGuess
+    deadline : Deadline
+
+    Returns
+    -------
+    Candidate
+        A finished one where there is a motion.
+    """
+    outcome = begin_candidate(guess, "no motion was found near the joint path")
+    try:
+        program = program_of(guess.problem, guess.maps_by_leg())
+        candidate = replace(rank(guess, program), not_completed=_NOT_COMPLETED)
+        pairs = zip(coarsest(program).phases, guess.legs, strict=True)
+        program = program.with_phases(
+            phase.restrict_to(curves) for phase, curves in pairs
+        )
+        x = initial_guess(program, guess)
+    except UnreachableError as error:
+        return fail(outcome, str(error))
+    options = RefinementOptions.of(guess.problem.task.refinement, deadline)
+    solve = partial(_find_nearest, deadline=deadline)
+    for factor in _SLOWER if x is not None else ():
+        report = solve(program, program.scale_time(x, factor))
+        if report.status.usable:
+            outcome = refine_and_verify(candidate, program, (report,), solve, options)
+        if outcome.is_settled or deadline.passed:
+            break
+    return outcome
+
+
+def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> SolverReport:
+    """Find a point within the limits near x, (v,); `ACCEPTABLE` where it is feasible."""
+    began = time.perf_counter()
+    violation = residual(program, x)
+    count = 0
+    while _ENOUGH < violation < np.inf and count < _CHANGES and not deadline.passed:
+        count += 1
+        change = _smoothest_change(program, x)
+        share = 1.0
+        while share > _LEAST_SHARE:
+            changed = np.clip(x + share * change, program.x_lower, program.x_upper)
+            remaining = residual(program, changed)
+            if remaining < violation:
+                break
+            share *= 0.5
+        else:
+            break
+        x = changed
+        violation = remaining
+    is_feasible = violation <= FEASIBLE
+    return SolverReport(
+        solver="nearest motion",
+        status=SolveStatus.ACCEPTABLE if is_feasible else SolveStatus.STALLED,
+        x=x,
+        objective=objective_at(program, x),
+        violation=violation,
+        multipliers=np.zeros(len(program.lower)),
+        iterations=count,
+        wall_time=time.perf_counter() - began,
+        message="a motion within the limits near the joint path",
+    )
+
+
+def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
+    """Find the smoothest change of x, (v,), after which the linearised rows hold; see the module."""
+    values = program.rows(x)
+    places = (program.jacobian_rows, program.jacobian_columns)
+    entries = sp.coo_array((program.jacobian(x), places), (len(values), len(x)))
+    is_free = program.x_lower < program.x_upper
+    jacobian = (entries * is_free).tocsr()
+    metric = _measure_smoothness(program, x)
+    margin = np.minimum(_MARGIN, 0.25 * (program.upper - program.lower))
+    low = program.lower + margin - values
+    high = program.upper - margin - values
+    is_equal = low == high
+    change = np.zeros(len(x))
+    held = is_equal
+    for _ in range(_ROUNDS):
+        beyond = jacobian @ change
+        is_missed = (beyond < low - _ENOUGH) | (beyond > high + _ENOUGH)
+        if not is_missed.any():
+            break
+        held = held | is_missed
+        rows = np.flatnonzero(held)
+        if len(rows) > len(x):
+            break
+        # Rows are held at the bound that is nearer, or exceeded.
+        at_low = beyond[rows] - low[rows] < high[rows] - beyond[rows]
+        goals = np.where(at_low, low[rows], high[rows])
+        slopes = jacobian[rows].toarray()
+        moved = np.linalg.solve(metric, slopes.T)
+        forces = np.linalg.solve(_damp(slopes @ moved), goals)
+        change = moved @ forces
+        # Rows that are pulled towards their bound are let go.
+        is_pulled = np.where(at_low, forces < 0.0, forces > 0.0)
+        held[rows[is_pulled & ~is_equal[rows]]] = False
+    return change
+
+
+def _measure_smoothness(program: Program, x: np.ndarray) -> np.ndarray:
+    """Make the matrix by which changes of x count: by the accelerations of the joints, and durations by their parts."""
+    smooth = program.with_objective(least_acceleration(program, x, 1.0))
+    curvature = smooth.curvature(x)
+    assert curvature is not None
+    metric = curvature.hessian(x, 1.0, np.zeros(len(program.lower)))
+    durations = program.first_variables
+    metric[durations] = 0.0
+    metric[:, durations] = 0.0
+    metric[durations, durations] = np.diag(metric).mean() / x[durations] ** 2
+    return _damp(metric)
+
+
+def _damp(matrix: np.ndarray) -> np.ndarray:
+    """Make a matrix, (m, m), regular."""
+    return matrix + _DAMPING * np.diag(matrix).max() * np.eye(len(matrix))
