@@ -175,9 +175,7 @@ def _is_corner(problem: Problem, number: int) -> bool:
 
 
 def _gain(phase: Phase, x: np.ndarray, end: int) -> float:
-    """Time, s, that a phase gains if it need not rest at its start (0) or end (-1); 0 where its speed is given."""
-    if phase.time_law is not None:
-        return 0.0
+    """Time, s, that a phase gains if it need not rest at its start (0) or end (-1)."""
     every = slice(None)
     return _least_time(phase, x, every) - _least_time(phase, x, every, free_end=end)
 

@@ -77,7 +77,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         saved = multipliers.change(rates, rows_side)
         costs.append(_sensitivity(label, bound, saved))
     return Sensitivities(
-        _costliest_first(costs),
+        tuple(costs),
         tuple(boundaries),
         multipliers.source,
         multipliers.residual,
@@ -90,11 +90,6 @@ def _sensitivity(label: Label, bound: Bound, saved_per_unit: float) -> Sensitivi
     outwards = -1.0 if bound.side == "lower" else 1.0
     derivative = outwards * saved_per_unit
     return Sensitivity(label, bound.side, bound.figure, bound.full_scale, derivative)
-
-
-def _costliest_first(costs: list[Sensitivity]) -> tuple[Sensitivity, ...]:
-    """Sort what figures cost."""
-    return tuple(sorted(costs, key=lambda entry: entry.change(1.0)))
 
 
 def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
@@ -136,7 +131,7 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
         _sensitivity(label, bound, changes[label, side] / (_RAISED * bound.full_scale))
         for (label, side), bound in bounds.items()
     ]
-    return Sensitivities(_costliest_first(costs), (), TIMINGS, 0.0, unique=True)
+    return Sensitivities(tuple(costs), (), TIMINGS, 0.0, unique=True)
 
 
 def _change_if_raised(timing: PhaseTiming, limit: Limit, bound: Bound) -> float:

@@ -74,29 +74,23 @@ class OptimalMotion:
     def with_multipliers(
         cls, problem: Problem, program: Program, x: np.ndarray, multipliers: Multipliers
     ) -> OptimalMotion:
-        """Take the Lagrangian; limits without active rows are left out."""
+        """Take the Lagrangian; rows that are not of limits or links are left out: ends in motion have others."""
         active = multipliers.active_set
+        of_rows = multipliers.weights[: len(active.rows)]
         weights = np.zeros(len(program.lower))
-        np.add.at(
-            weights, active.rows, active.signs * multipliers.weights[: len(active.rows)]
-        )
-        by_limit = [
-            (limit, weights[program.rows_of(limit)]) for limit in program.limits
-        ]
-        held = [(limit, of_limit) for limit, of_limit in by_limit if of_limit.any()]
-        of_links = weights[len(weights) - sum(link.size for link in program.links) :]
-        kept = {limit for limit, _ in held}
-        program = program.with_phases(
-            phase.with_limits([limit for limit in phase.limits if limit in kept])
-            for phase in program.phases
-        )
+        np.add.at(weights, active.rows, active.signs * of_rows)
+
+        def choose(program: Program, values: np.ndarray) -> np.ndarray:
+            of_limits = [program.rows_of(limit).ravel() for limit in program.limits]
+            links = sum(link.size for link in program.links)
+            of_links = np.arange(len(values) - links, len(values))
+            return values[np.concatenate([*of_limits, of_links])]
+
+        held = choose(program, weights)
 
         def value(program: Program, x: np.ndarray) -> float:
-            rows = program.rows(x)
-            total = of_links @ rows[len(rows) - len(of_links) :]
-            for limit, of_limit in held:
-                total += np.sum(of_limit * rows[program.rows_of(limit)])
-            return program.end_time(x) - float(total)
+            rows = choose(program, program.rows(x))
+            return program.end_time(x) - float(held @ rows)
 
         return cls(problem, program, x, value, _STEP)
 
@@ -171,33 +165,24 @@ def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
     return carried
 
 
-@dataclass(frozen=True)
-class _Figure:
-    """A figure of a task: its name, its value, the parts of the path where it counts, and the problem with another."""
-
-    label: Label
-    value: float
-    s: tuple[tuple[float, float], ...]
-    change: Callable[[float], Problem]
+Figure = tuple[Sensitivity, Callable[[float], Problem]]
+"""A figure of a task, what it costs not known yet, and the problem with another value of it."""
 
 
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
     """Derive what the task's figures cost; figures that cannot be larger are left out."""
     costs = []
-    for figure in (*_speeds(motion.problem), *_blends(motion.problem)):
-        value = figure.value
-        step = motion.step * value
+    for cost, change in (*_speeds(motion.problem), *_blends(motion.problem)):
+        step = motion.step * cost.figure
         try:
-            changed = figure.change(value + step)
+            changed = change(cost.figure + step)
         except InputError:
             continue
-        derivative = motion.change(changed) / step
-        cost = Sensitivity(figure.label, None, value, value, derivative, figure.s)
-        costs.append(cost)
+        costs.append(replace(cost, derivative=motion.change(changed) / step))
     return tuple(costs)
 
 
-def _speeds(problem: Problem) -> Iterator[_Figure]:
+def _speeds(problem: Problem) -> Iterator[Figure]:
     """List process speeds; parts of the path with the same speed have one figure."""
     limits = problem.task.tool_limits
 
@@ -217,11 +202,11 @@ def _speeds(problem: Problem) -> Iterator[_Figure]:
             for part in parts
         )
         label = label_of_speed(PROCESS_SPEED, speed, ", ".join(keys))
-        places = tuple(part.s for part in parts)
-        yield _Figure(label, speed, places, partial(change, speed))
+        s = tuple(part.s for part in parts)
+        yield Sensitivity(label, None, speed, speed, 0.0, s), partial(change, speed)
 
 
-def _blends(problem: Problem) -> Iterator[_Figure]:
+def _blends(problem: Problem) -> Iterator[Figure]:
     """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
     path = problem.path
     segments = problem.task.path
@@ -232,15 +217,14 @@ def _blends(problem: Problem) -> Iterator[_Figure]:
         )
         if blend.segment is None and before.segment is not None
     }
-    groups: defaultdict[tuple[str, float], list[int]] = defaultdict(list)
+    groups: defaultdict[str | float | None, list[int]] = defaultdict(list)
     source = ""
     for number, (segment, after) in enumerate(pairwise(segments)):
         if isinstance(segment, BSplineSegment) and segment.bspline.fit:
             source = segment.bspline.fit.source
         if number in places:
             is_of_file = isinstance(after, BSplineSegment) and not after.bspline.fit
-            size = 0.0 if is_of_file else segment.blend or 0.0
-            groups[source if is_of_file else "", size].append(number)
+            groups[source if is_of_file else segment.blend].append(number)
 
     def change(numbers: list[int], before: float, after: float) -> Problem:
         path = list(segments)
@@ -250,13 +234,17 @@ def _blends(problem: Problem) -> Iterator[_Figure]:
         task = problem.task.model_copy(update={"path": tuple(path)})
         return _with_task(problem, task)
 
-    for (source, _), numbers in groups.items():
-        largest = max(segments[number].blend or 0.0 for number in numbers)
-        cause = f"blend at the corners of {source}" if source else "blend"
-        key = "csv.tolerance.corner" if source else "path.blend"
-        label = Label("path", f"{cause}, {largest:.10g} m", "m", key, cause=cause)
+    for group, numbers in groups.items():
+        size = max(segments[number].blend or 0.0 for number in numbers)
+        cause = "blend"
+        key = "path.blend"
+        if isinstance(group, str):
+            cause = f"blend at the corners of {group}"
+            key = "csv.tolerance.corner"
+        label = Label("path", f"{cause}, {size:.10g} m", "m", key, cause=cause)
         s = tuple(places[number] for number in numbers)
-        yield _Figure(label, largest, s, partial(change, numbers, largest))
+        cost = Sensitivity(label, None, size, size, 0.0, s)
+        yield cost, partial(change, numbers, size)
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:
