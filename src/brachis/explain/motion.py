@@ -77,11 +77,10 @@ def _merge_figures(
     limit_costs: Iterable[Sensitivity], figure_costs: Iterable[Sensitivity]
 ) -> tuple[Sensitivity, ...]:
     """Join what limits and figures of the task cost: some limits follow from process speeds."""
-    joined = {(str(entry.label), entry.side): entry for entry in figure_costs}
-    for entry in limit_costs:
+    joined: dict[tuple[str, str | None], Sensitivity] = {}
+    for entry in (*figure_costs, *limit_costs):
         name = str(entry.label), entry.side
-        derivative = entry.derivative
-        if name in joined:
-            derivative += joined[name].derivative
-        joined[name] = replace(joined.get(name, entry), derivative=derivative)
+        before = joined.get(name, replace(entry, derivative=0.0))
+        derivative = before.derivative + entry.derivative
+        joined[name] = replace(before, derivative=derivative)
     return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))

@@ -115,11 +115,10 @@ def _list_rest(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
         return
     saved = 0.0
     for phase, x in parts:
-        sides = zip((phase.boundary.start, phase.boundary.end), (0, -1), strict=True)
-        for conditions, end in sides:
+        for end, conditions in enumerate((phase.boundary.start, phase.boundary.end)):
             derivatives = conditions[0].derivatives
             if len(derivatives) > 1 and not derivatives.any():
-                saved += _gain_of_ramp(phase, x, end)
+                saved += _gain_of_ramp(phase, x, -end)
     change = f"spline.rest: velocity in place of {spline.rest}"
     yield TaskSaving(change, saved, "estimate")
 

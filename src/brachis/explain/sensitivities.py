@@ -119,14 +119,12 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
             if is_safeguard(limit):
                 continue
             nearest = limit.violation(values).max(axis=0)
+            is_relieved = limit.longer_time == "relieves"
             for bound in limit.bounds:
                 figure = _figure(limit, bound)
-                is_near = nearest[bound.column] > -_NEAR
-                is_relieved = is_near and limit.longer_time == "relieves"
                 bounds[figure] = bound
-                changes[figure] += (
-                    _change_if_raised(timing, limit, bound) if is_relieved else 0.0
-                )
+                if is_relieved and nearest[bound.column] > -_NEAR:
+                    changes[figure] += _change_if_raised(timing, limit, bound)
     costs = [
         _sensitivity(label, bound, changes[label, side] / (_RAISED * bound.full_scale))
         for (label, side), bound in bounds.items()

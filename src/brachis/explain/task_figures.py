@@ -20,7 +20,7 @@ from brachis.errors import InputError, UnreachableError
 from brachis.explain.multipliers import Multipliers
 from brachis.explain.sensitivities import label_of_speed
 from brachis.limits.tool import PROCESS_SPEED
-from brachis.optimise.boundary import Boundary, EndCondition
+from brachis.optimise.boundary import Boundary
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
@@ -138,18 +138,14 @@ class OptimalMotion:
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
     """Give as many derivatives as before: from rest, those of redundant joints stay zero if the tool begins to move."""
-
-    def join(
-        old: tuple[EndCondition, ...], new: tuple[EndCondition, ...]
-    ) -> tuple[EndCondition, ...]:
-        return tuple(
-            EndCondition(one.value, max(one.derivatives, other.derivatives, key=len))
-            for one, other in zip(new, old, strict=True)
+    sides = {}
+    for side in ("start", "end"):
+        pairs = zip(getattr(before, side), getattr(after, side), strict=True)
+        sides[side] = tuple(
+            replace(new, derivatives=max(new.derivatives, old.derivatives, key=len))
+            for old, new in pairs
         )
-
-    start = join(before.start, after.start)
-    end = join(before.end, after.end)
-    return replace(after, start=start, end=end)
+    return replace(after, **sides)
 
 
 def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:

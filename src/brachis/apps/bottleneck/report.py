@@ -187,18 +187,18 @@ def report(
     if isinstance(motion, str | os.PathLike):
         motion = Trajectory.load(motion)
     trajectory = motion_of(motion, "motion")
-    if trajectory.recovered is not None:
-        if check or reference:
-            raise InputError(
-                "this motion was not planned, so the cost of its limits cannot be computed",
-                where=trajectory.recovered.source,
-                hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
-            )
-        active = saturations(trajectory)
-        phases = limits_by_phase(trajectory, active)
-        return BottleneckReport(trajectory.t_end, None, active, phases)
+    recovered = trajectory.recovered
+    if recovered is None:
+        trajectory = narrow_motion(trajectory)
+    elif check or reference:
+        raise InputError(
+            "this motion was not planned, so the cost of its limits cannot be computed",
+            where=recovered.source,
+            hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
+        )
+    else:
+        solve = False
     costs = motion.sensitivities
-    trajectory = narrow_motion(trajectory)
     checked = None
     best = None
     listener("looking for what is active, and when")
@@ -229,7 +229,7 @@ def report(
         sensitivities=costs,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
-        timing=find_timing_gap(trajectory, limits),
+        timing=None if recovered else find_timing_gap(trajectory, limits),
         check=checked,
         reference=best,
         reference_sought=reference,

@@ -194,11 +194,7 @@ class Saturation(Summary):
 
 
 def saturations(
-    motion: Trajectory | LimitRatios,
-    limits: Sequence[Limit] | None = None,
-    *,
-    threshold: float = THRESHOLD,
-    ripple: float = RIPPLE,
+    motion: Trajectory | LimitRatios, limits: Sequence[Limit] | None = None
 ) -> tuple[Saturation, ...]:
     """Find when every limit is active.
 
@@ -208,10 +204,6 @@ def saturations(
         Any trajectory, a saved one for example, or its ratios.
     limits : sequence of Limit, optional
         Those of the trajectory's task if left out.
-    threshold : float, optional
-        Part of the limit from which on it counts as active.
-    ripple : float, optional
-        Part of the limit above which dips below the threshold count as ripple, which does not end an interval.
 
     Returns
     -------
@@ -226,7 +218,7 @@ def saturations(
         active = [
             ActiveInterval(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
-            for begin, end in _find_active(ratios.t, sign * column, threshold, ripple)
+            for begin, end in _find_active(ratios.t, sign * column)
         ]
         active.sort(key=lambda interval: interval.begin)
         duration = sum(interval.end - interval.begin for interval in active)
@@ -287,20 +279,12 @@ def limits_by_phase(
     return tuple(phases)
 
 
-def _find_active(
-    t: np.ndarray, values: np.ndarray, threshold: float, ripple: float
-) -> list[tuple[float, float]]:
+def _find_active(t: np.ndarray, values: np.ndarray) -> list[tuple[float, float]]:
     """Find the intervals in which values, linear between the times (K,), keep to the threshold but for ripple."""
-    found: list[list[int]] = []  # first and last sample at the limit
-    is_active = False
-    for k in np.flatnonzero((values >= threshold) | (values < ripple)).tolist():
-        if values[k] < threshold:
-            is_active = False
-        elif is_active:
-            found[-1][1] = k
-        else:
-            found.append([k, k])
-            is_active = True
+    samples = np.flatnonzero((values >= THRESHOLD) | (values < RIPPLE))
+    is_active = np.pad(values[samples] >= THRESHOLD, 1)
+    firsts = samples[is_active[1:-1] & ~is_active[:-2]]
+    lasts = samples[is_active[1:-1] & ~is_active[2:]]
 
     def crossing(before: int) -> float:
         """Time between two samples at which the line between them meets the threshold, s; an end of the motion."""
@@ -308,6 +292,7 @@ def _find_active(
             return float(t[max(before, 0)])
         low, high = values[before : before + 2]
         step = t[before + 1] - t[before]
-        return float(t[before] + step * (threshold - low) / (high - low))
+        return float(t[before] + step * (THRESHOLD - low) / (high - low))
 
-    return [(crossing(first - 1), crossing(last)) for first, last in found]
+    pairs = zip(firsts.tolist(), lasts.tolist(), strict=True)
+    return [(crossing(first - 1), crossing(last)) for first, last in pairs]
