@@ -8,7 +8,13 @@ from dataclasses import replace
 from brachis.explain.multipliers import Multipliers, multipliers_of
 from brachis.explain.savings import task_savings
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
-from brachis.explain.task_figures import OptimalMotion, figure_sensitivities
+from brachis.explain.task_figures import (
+    STEP_OF_TIMING,
+    OptimalMotion,
+    figure_sensitivities,
+    lagrangian_of,
+    least_time_of,
+)
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
 from brachis.problem.problem import Problem
@@ -48,10 +54,12 @@ def explain_motion(
     multipliers = _find_multipliers(motion, optimum)
     if multipliers is None:
         costs = sensitivities_of_timing(motion)
-        answer = OptimalMotion.with_timings(problem, motion.program, motion.x)
+        timed = (motion.program, motion.x, least_time_of)
+        answer = OptimalMotion(problem, *timed, step=STEP_OF_TIMING)
     else:
         costs = sensitivities_at(program, multipliers)
-        answer = OptimalMotion.with_multipliers(problem, program, x, multipliers)
+        lagrangian = lagrangian_of(program, multipliers)
+        answer = OptimalMotion(problem, program, x, lagrangian)
     time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
     limits = _merge_figures(costs.limits, figure_sensitivities(answer))
     limits = tuple(

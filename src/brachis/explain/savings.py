@@ -25,9 +25,9 @@ from brachis.trajectory.sensitivities import Accuracy, TaskSaving
 
 _POINTS = 400
 """Points at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
-_RAMP_INTERVALS = 2
-"""Intervals beside rest within which an acceleration that is zero there costs time. Estimates were 40 to 129 % of what
-planning again saved on 15 motions, in the median 95 %; with 1 they were lower."""
+_RAMPS = (slice(3), slice(-3, None))
+"""Ends of the two intervals beside rest within which an acceleration that is zero there costs time. Estimates were 40
+to 129 % of what planning again saved on 15 motions, in the median 95 %; with one interval they were lower."""
 _RANGE_SHARE = 1e-3
 """Part of the range of a joint by which a posture is changed: what it saves was up to 12 % off on 20 tasks, 2 % in the
 median. With 1 % it was 4 to 23 % off on six, and all of it on one."""
@@ -77,7 +77,10 @@ def _list_stops(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
     for number, leg in enumerate(problem.legs[:-1]):
         if not leg.stops:
             continue
-        saved = _gain(*parts[number], -1) + _gain(*parts[number + 1], 0)
+        sides = ((parts[number], -1), (parts[number + 1], 0))
+        saved = sum(
+            _least_time(*part) - _least_time(*part, free_end=end) for part, end in sides
+        )
         words = "with a blend in place of" if _is_corner(problem, number) else "without"
         change = f"{words} the stop at s = {leg.end:.4g}"
         yield TaskSaving(change, saved, "bound")
@@ -118,7 +121,9 @@ def _list_rest(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
         for end, conditions in enumerate((phase.boundary.start, phase.boundary.end)):
             derivatives = conditions[0].derivatives
             if len(derivatives) > 1 and not derivatives.any():
-                saved += _gain_of_ramp(phase, x, -end)
+                ramp = _RAMPS[end]
+                duration = float(np.ptp(phase.motion(x).breaks[ramp]))
+                saved += duration - _least_time(phase, x, ramp)
     change = f"spline.rest: velocity in place of {spline.rest}"
     yield TaskSaving(change, saved, "estimate")
 
@@ -145,9 +150,8 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
         length = _RANGE_SHARE / shares[most]
         step = -length * null @ slopes
         moved = posture + step
-        if (moved < limits.position_lower).any() or (
-            moved > limits.position_upper
-        ).any():
+        inside = moved.clip(limits.position_lower, limits.position_upper)
+        if (moved != inside).any():
             continue
         saved = float(length * (slopes @ slopes))
         amount = f"{abs(step[most]):.3g} {robot.position_units[most]}"
@@ -173,21 +177,11 @@ def _is_corner(problem: Problem, number: int) -> bool:
     return bool(change > tolerances.ANGLE)
 
 
-def _gain(phase: Phase, x: np.ndarray, end: int) -> float:
-    """Time, s, that a phase gains if it need not rest at its start (0) or end (-1)."""
-    every = slice(None)
-    return _least_time(phase, x, every) - _least_time(phase, x, every, free_end=end)
-
-
-def _gain_of_ramp(phase: Phase, x: np.ndarray, end: int) -> float:
-    """Time, s, that a phase gains if its acceleration may jump where it rests, at its start (0) or end (-1)."""
-    ramp = slice(_RAMP_INTERVALS + 1) if end == 0 else slice(-_RAMP_INTERVALS - 1, None)
-    duration = float(np.ptp(phase.motion(x).breaks[ramp]))
-    return duration - _least_time(phase, x, ramp)
-
-
 def _least_time(
-    phase: Phase, x: np.ndarray, intervals: slice, free_end: int | None = None
+    phase: Phase,
+    x: np.ndarray,
+    intervals: slice = slice(None),
+    free_end: int | None = None,
 ) -> float:
     """Time the joint path over some intervals of a phase, s; NaN where that is not possible.
 

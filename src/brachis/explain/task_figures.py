@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -40,12 +41,37 @@ from brachis.trajectory.sensitivities import Sensitivity
 
 Value = Callable[[Program, np.ndarray], float]
 """A function of a program and a point, (v,), whose change is that of t_E, s, if a figure of the task changes."""
-_STEP = 1e-4
-"""Part by which a figure is changed in the Lagrangian."""
-_STEP_OF_TIMING = 1e-2
-"""The same in timings, whose stations make an error of about 1e-6 of the time."""
+STEP_OF_TIMING = 1e-2
+"""Part by which figures are changed in timings, whose stations make an error of about 1e-6 of the time."""
 PROCESS_SPEED_KEY = "tool_limits.process_speed"
 """Key of the task that lists process speeds which are not those of segments."""
+
+
+def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
+    """Return the Lagrangian, of rows of limits and links: where the tool moves at an end, others are not the same."""
+    active = multipliers.active_set
+    of_rows = multipliers.weights[: len(active.rows)]
+    weights = np.zeros(len(program.lower))
+    np.add.at(weights, active.rows, active.signs * of_rows)
+
+    def choose(program: Program, values: np.ndarray) -> np.ndarray:
+        of_limits = [program.rows_of(limit).ravel() for limit in program.limits]
+        links = sum(link.size for link in program.links)
+        of_links = np.arange(len(values) - links, len(values))
+        return values[np.concatenate([*of_limits, of_links])]
+
+    weights = choose(program, weights)
+
+    def value(program: Program, x: np.ndarray) -> float:
+        rows = choose(program, program.rows(x))
+        return program.end_time(x) - float(weights @ rows)
+
+    return value
+
+
+def least_time_of(program: Program, x: np.ndarray) -> float:
+    """Time the joint path of a point, (v,)."""
+    return least_time(PhaseTiming.of(*pair, is_rough=True) for pair in program.split(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +86,7 @@ class OptimalMotion:
     x : (v,) ndarray
         The answer.
     value : callable
+        `lagrangian_of` the program, or `least_time_of`.
     step : float
         Part by which figures are changed.
     """
@@ -68,45 +95,7 @@ class OptimalMotion:
     program: Program
     x: np.ndarray
     value: Value
-    step: float
-
-    @classmethod
-    def with_multipliers(
-        cls, problem: Problem, program: Program, x: np.ndarray, multipliers: Multipliers
-    ) -> OptimalMotion:
-        """Take the Lagrangian; rows that are not of limits or links are left out: ends in motion have others."""
-        active = multipliers.active_set
-        of_rows = multipliers.weights[: len(active.rows)]
-        weights = np.zeros(len(program.lower))
-        np.add.at(weights, active.rows, active.signs * of_rows)
-
-        def choose(program: Program, values: np.ndarray) -> np.ndarray:
-            of_limits = [program.rows_of(limit).ravel() for limit in program.limits]
-            links = sum(link.size for link in program.links)
-            of_links = np.arange(len(values) - links, len(values))
-            return values[np.concatenate([*of_limits, of_links])]
-
-        held = choose(program, weights)
-
-        def value(program: Program, x: np.ndarray) -> float:
-            rows = choose(program, program.rows(x))
-            return program.end_time(x) - float(held @ rows)
-
-        return cls(problem, program, x, value, _STEP)
-
-    @classmethod
-    def with_timings(
-        cls, problem: Problem, program: Program, x: np.ndarray
-    ) -> OptimalMotion:
-        """Take the least time of the joint path."""
-
-        def value(program: Program, x: np.ndarray) -> float:
-            timings = (
-                PhaseTiming.of(*pair, is_rough=True) for pair in program.split(x)
-            )
-            return least_time(timings)
-
-        return cls(problem, program, x, value, _STEP_OF_TIMING)
+    step: float = 1e-4
 
     def change(self, changed: Problem) -> float:
         """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
@@ -138,7 +127,7 @@ class OptimalMotion:
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
     """Give as many derivatives as before: from rest, those of redundant joints stay zero if the tool begins to move."""
-    sides = {}
+    sides: dict[str, Any] = {}
     for side in ("start", "end"):
         pairs = zip(getattr(before, side), getattr(after, side), strict=True)
         sides[side] = tuple(

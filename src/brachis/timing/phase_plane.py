@@ -341,19 +341,17 @@ class PhasePlane:
     def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
         """Largest dp/dt at the stations, (P,), 1/s, within the rows as they are; see `solve`."""
         first, last = (rate**2 for rate in rates)
-        steps = (self._factor, self._next_lower, self._next_upper)
+        steps = [self._factor, self._next_lower, self._next_upper]
         floor = self._floor
         ceiling = self._ceiling
         if math.isinf(last):
             # One step more, from any x to any other one, leaves x at the end free.
             last = 0.0
             floor = np.append(floor, 0.0)
-            behind = ((0, 1), (0, 0))
-            steps = (
-                np.pad(self._factor, behind, constant_values=1.0),
-                np.pad(self._next_lower, behind, constant_values=-np.inf),
-                np.pad(self._next_upper, behind, constant_values=np.inf),
-            )
+            steps = [
+                np.pad(rows, ((0, 1), (0, 0)), constant_values=value)
+                for rows, value in zip(steps, (1.0, -np.inf, np.inf), strict=True)
+            ]
         elif last > ceiling[-1] * (1.0 + _ROUNDING):
             return None
         # The intervals of x from which the end can be reached.

@@ -213,12 +213,8 @@ def _check_limit(
     for limit, bound in bounds:
         raised = raised.relax(limit, bound, step * entry.full_scale)
     linearised = linearised_change(raised, base)
-    # The base is an optimum to a tolerance only; the rest of its way does not count.
-    lacking = linearised_change(program, base)
-    if linearised is None or lacking is None:
+    if linearised is None:
         linearised = predicted
-    else:
-        linearised -= lacking
     answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
     same = 1e-6 * t_end(base)  # end times of one optimum differ by less

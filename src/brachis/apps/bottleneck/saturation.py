@@ -108,17 +108,12 @@ def limit_ratios(
     values = [limit.ratios(moments, t) for limit in limits]
     labels = [label for limit in limits for label in limit.labels]
     for speed in sorted({phase.speed or 0.0 for phase in trajectory.phases} - {0.0}):
-        labels.append(_label_of_held_speed(speed))
+        label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
+        text = f"the tool is held at its {label.kind}"
+        labels.append(replace(label, active_text=text, share="tool speed / limit"))
         values.append(_has_speed(trajectory, speed, t)[:, None])
     together = np.hstack([np.empty((len(t), 0)), *values])
     return LimitRatios(t, tuple(labels), together)
-
-
-def _label_of_held_speed(speed: float) -> Label:
-    """Name a process speed, m/s, as what holds the tool back."""
-    label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
-    text = f"the tool is held at its {label.kind}"
-    return replace(label, active_text=text, share="tool speed / limit")
 
 
 def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarray:
