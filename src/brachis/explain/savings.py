@@ -11,20 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import spread
-from brachis.errors import UnreachableError
 from brachis.explain.task_figures import OptimalMotion
+from brachis.explain.timings import lay_course, least_time
 from brachis.kinematics import Newton
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Phase
 from brachis.path import path_speed
 from brachis.problem.problem import Problem
 from brachis.robot.task_map import JointSpace
-from brachis.timing import Course, TimedCourse
 from brachis.trajectory.sensitivities import Accuracy, TaskSaving
 
-_POINTS = 400
-"""Points at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
+_PLACES = 400
+"""Places at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
 _RAMPS = (slice(3), slice(-3, None))
 """Ends of the two intervals beside rest within which an acceleration that is zero there costs time. Estimates were 40
 to 129 % of what planning again saved on 15 motions, in the median 95 %; with one interval they were lower."""
@@ -33,10 +31,8 @@ _RANGE_SHARE = 1e-3
 median. With 1 % it was 4 to 23 % off on six, and all of it on one."""
 _SHARE_OF_SPEED = 0.1
 """By how much the speed at an end is higher, as a part of it; from rest, as a part of the mean speed."""
-_SPEED_STEP = 1e-3
-"""Part of it for a derivative."""
 _SELF_MOTION_STEP = 1e-5
-"""The same for a derivative, m or rad."""
+"""By how much a posture is changed for a derivative, m or rad."""
 
 Part = tuple[Phase, np.ndarray]
 """A phase and its variables."""
@@ -78,9 +74,10 @@ def _list_stops(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
         if not leg.stops:
             continue
         sides = ((parts[number], -1), (parts[number + 1], 0))
-        saved = sum(
-            _least_time(*part) - _least_time(*part, free_end=end) for part, end in sides
-        )
+        saved = 0.0
+        for part, end in sides:
+            course = lay_course(*part, _PLACES)
+            saved += least_time(course) - least_time(course, end)
         words = "with a blend in place of" if _is_corner(problem, number) else "without"
         change = f"{words} the stop at s = {leg.end:.4g}"
         yield TaskSaving(change, saved, "bound")
@@ -102,9 +99,9 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
         length = path_speed(problem.task_map, problem.path, float(-end))
         mean = length / answer.program.end_time(answer.x)
         more = _SHARE_OF_SPEED * (speed or mean)
-        changed = boundary.model_copy(update={key: speed + _SPEED_STEP * more})
+        changed = boundary.model_copy(update={key: speed + answer.step * more})
         task = problem.task.model_copy(update={"boundary": changed})
-        saved = -answer.change(replace(problem, task=task)) / _SPEED_STEP
+        saved = -answer.change(replace(problem, task=task)) / answer.step
         change = f"boundary.{key}: {speed + more:.2g} in place of {speed:.2g}"
         accuracy: Accuracy = "least" if problem.r and not speed else "estimate"
         yield TaskSaving(change, saved, accuracy)
@@ -123,7 +120,8 @@ def _list_rest(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
             if len(derivatives) > 1 and not derivatives.any():
                 ramp = _RAMPS[end]
                 duration = float(np.ptp(phase.motion(x).breaks[ramp]))
-                saved += duration - _least_time(phase, x, ramp)
+                course = lay_course(phase, x, _PLACES, ramp)
+                saved += duration - least_time(course)
     change = f"spline.rest: velocity in place of {spline.rest}"
     yield TaskSaving(change, saved, "estimate")
 
@@ -175,29 +173,3 @@ def _is_corner(problem: Problem, number: int) -> bool:
         before / np.linalg.norm(before) - after / np.linalg.norm(after)
     )
     return bool(change > tolerances.ANGLE)
-
-
-def _least_time(
-    phase: Phase,
-    x: np.ndarray,
-    intervals: slice = slice(None),
-    free_end: int | None = None,
-) -> float:
-    """Time the joint path over some intervals of a phase, s; NaN where that is not possible.
-
-    The ends are passed as the motion, (v,), passes them; one of them, 0 or -1, may be free.
-    """
-    curves = phase.motion(x)
-    breaks = curves.breaks[intervals]
-    t = spread(breaks, max(2, _POINTS // len(breaks)))
-    course = Course(t, *curves.at(t)[:3])
-    try:
-        # The parameter is the time of the motion, so that its rate is 1.
-        timed = TimedCourse(course, phase.joint_map, phase.limits, np.ones_like(t))
-    except UnreachableError:
-        return np.nan
-    rates = timed.speeds[[0, -1]]
-    if free_end is not None:
-        rates[free_end] = np.inf
-    timing = timed.solve((float(rates[0]), float(rates[-1])))
-    return np.nan if timing is None else timing.t_end

@@ -20,12 +20,11 @@ from brachis.common.labels import Label
 from brachis.errors import InputError, UnreachableError
 from brachis.explain.multipliers import Multipliers
 from brachis.explain.sensitivities import label_of_speed
+from brachis.explain.timings import FINE_PLACES, lay_course, least_time
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.boundary import Boundary
 from brachis.optimise.phase import Phase
-from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
-from brachis.optimise.retiming import least_time
 from brachis.optimise.transcription import boundary_of
 from brachis.path import (
     legs_of,
@@ -70,8 +69,8 @@ def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
 
 
 def least_time_of(program: Program, x: np.ndarray) -> float:
-    """Time the joint path of a point, (v,)."""
-    return least_time(PhaseTiming.of(*pair, is_rough=True) for pair in program.split(x))
+    """Time the joint paths of a point, (v,); NaN where the speed of a phase is given."""
+    return sum(least_time(lay_course(*pair, FINE_PLACES)) for pair in program.split(x))
 
 
 @dataclass(frozen=True, eq=False)
