@@ -61,10 +61,8 @@ def explain_motion(
         lagrangian = lagrangian_of(program, multipliers)
         answer = OptimalMotion(problem, program, x, lagrangian)
     time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
-    limits = _merge_figures(costs.limits, figure_sensitivities(answer))
-    limits = tuple(
-        replace(entry, derivative=time_ratio * entry.derivative) for entry in limits
-    )
+    figures = (*figure_sensitivities(answer), *costs.limits)
+    limits = _merge_figures(figures, time_ratio)
     savings = task_savings(problem, motion, answer)
     return replace(costs, limits=limits, task=savings)
 
@@ -82,13 +80,13 @@ def _find_multipliers(
 
 
 def _merge_figures(
-    limit_costs: Iterable[Sensitivity], figure_costs: Iterable[Sensitivity]
+    costs: Iterable[Sensitivity], time_ratio: float
 ) -> tuple[Sensitivity, ...]:
-    """Join what limits and figures of the task cost: some limits follow from process speeds."""
+    """Add up what figures of the same name cost, times a ratio: some limits follow from process speeds."""
     joined: dict[tuple[str, str | None], Sensitivity] = {}
-    for entry in (*figure_costs, *limit_costs):
+    for entry in costs:
         name = str(entry.label), entry.side
         before = joined.get(name, replace(entry, derivative=0.0))
-        derivative = before.derivative + entry.derivative
+        derivative = before.derivative + time_ratio * entry.derivative
         joined[name] = replace(before, derivative=derivative)
     return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))

@@ -136,17 +136,18 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
     widths = np.where(np.isfinite(widths), widths, 2.0 * np.pi)
     for name, posture in problem.given_postures.items():
         null = Newton(problem.task_map).self_motions(posture[None])[0]
-        moved_postures = posture + _SELF_MOTION_STEP * null.T
         changes = [
-            answer.change(replace(problem, **{name: moved})) for moved in moved_postures
+            answer.change(replace(problem, **{name: moved}))
+            for moved in posture + _SELF_MOTION_STEP * null.T
         ]
         slopes = np.array(changes) / _SELF_MOTION_STEP
-        shares = np.abs(null @ slopes) / widths
+        direction = -null @ slopes
+        shares = np.abs(direction) / widths
         if not shares.any():
             continue
         most = int(np.argmax(shares))
         length = _RANGE_SHARE / shares[most]
-        step = -length * null @ slopes
+        step = length * direction
         moved = posture + step
         inside = moved.clip(limits.position_lower, limits.position_upper)
         if (moved != inside).any():
@@ -166,10 +167,6 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
 def _is_corner(problem: Problem, number: int) -> bool:
     """Tell whether the path changes its direction where a leg ends."""
     s = np.array([problem.legs[number].end])
-    before, after = (
-        path.sample(s).xi[0] for path in problem.leg_paths[number : number + 2]
-    )
-    change = np.linalg.norm(
-        before / np.linalg.norm(before) - after / np.linalg.norm(after)
-    )
-    return bool(change > tolerances.ANGLE)
+    tangents = [path.sample(s).xi[0] for path in problem.leg_paths[number:][:2]]
+    before, after = (tangent / np.linalg.norm(tangent) for tangent in tangents)
+    return bool(np.linalg.norm(before - after) > tolerances.ANGLE)

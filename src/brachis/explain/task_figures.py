@@ -192,15 +192,12 @@ def _speeds(problem: Problem) -> Iterator[Figure]:
 
 def _blends(problem: Problem) -> Iterator[Figure]:
     """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
-    path = problem.path
     segments = problem.task.path
-    places = {
-        before.segment: (float(begin), float(end))
-        for before, blend, (begin, end) in zip(
-            path.pieces, path.pieces[1:], pairwise(path.breaks[1:]), strict=False
-        )
-        if blend.segment is None and before.segment is not None
-    }
+    breaks = problem.path.breaks.tolist()
+    places: dict[int | None, tuple[float, float]] = {}
+    for number, (before, piece) in enumerate(pairwise(problem.path.pieces), 1):
+        if piece.segment is None:
+            places[before.segment] = (breaks[number], breaks[number + 1])
     groups: defaultdict[str | float | None, list[int]] = defaultdict(list)
     source = ""
     for number, (segment, after) in enumerate(pairwise(segments)):

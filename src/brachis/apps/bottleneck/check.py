@@ -83,11 +83,11 @@ class CheckedSensitivity:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
-        entry = self.sensitivity
+        label = self.sensitivity.label
         return {
-            "subject": entry.label.subject,
-            "kind": entry.label.kind,
-            "end": entry.side,
+            "subject": label.subject,
+            "kind": label.kind,
+            "end": self.sensitivity.side,
             "predicted_s": self.predicted,
             "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
@@ -196,8 +196,8 @@ def check_sensitivities(
                 checked.append(same)
             else:
                 checked.append(_check_limit(entry, step, program, base, bounds))
-    elapsed = time.perf_counter() - began
-    return SensitivityCheck(step, t_end(base), tuple(checked), elapsed)
+    wall_time = time.perf_counter() - began
+    return SensitivityCheck(step, t_end(base), tuple(checked), wall_time)
 
 
 def _check_limit(

@@ -19,6 +19,7 @@ from brachis.apps.bottleneck.saturation import (
     THRESHOLD,
     PhaseLimits,
     Saturation,
+    limit_ratios,
     limits_by_phase,
     limits_in,
     saturations,
@@ -208,7 +209,7 @@ def report(
         candidate = motion.candidate
         limits = limits_in(candidate.refined.program)
     began = time.perf_counter()
-    active = saturations(trajectory, limits)
+    active = saturations(limit_ratios(trajectory, limits))
     seconds = _LOOKS * (time.perf_counter() - began)
     if candidate is None and ((costs is None and solve) or check or reference):
         longest = trajectory.task.search.time_limit

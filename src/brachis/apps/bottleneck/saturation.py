@@ -188,26 +188,20 @@ class Saturation(Summary):
         }
 
 
-def saturations(
-    motion: Trajectory | LimitRatios, limits: Sequence[Limit] | None = None
-) -> tuple[Saturation, ...]:
+def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
     """Find when every limit is active.
 
     Parameters
     ----------
     motion : Trajectory or LimitRatios
         Any trajectory, a saved one for example, or its ratios.
-    limits : sequence of Limit, optional
-        Those of the trajectory's task if left out.
 
     Returns
     -------
     tuple of Saturation
         Of all limits, those active longest first.
     """
-    ratios = motion
-    if isinstance(ratios, Trajectory):
-        ratios = limit_ratios(ratios, limits)
+    ratios = limit_ratios(motion) if isinstance(motion, Trajectory) else motion
     found = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
