@@ -80,6 +80,17 @@ def test_ends_in_motion_save_what_is_said(corner, end):
     assert 0.1 * saving.saved == pytest.approx(gained, rel=0.05)
 
 
+def test_a_stop_on_a_straight_line_has_a_row():
+    half = {"line": {"by": [0.1, 0.1]}}
+    path = [{**half, "stop": True}, half]
+    stopping = brachis.plan(task_of(locked=True, path=path))
+    passing = brachis.plan(task_of(locked=True, path=[half, half]))
+    saving = named(stopping, "without the stop at s = 0.5")
+    gained = least_time(stopping) - least_time(passing)
+    assert saving.accuracy == "bound"
+    assert gained < saving.saved < 2.0 * gained
+
+
 def test_higher_speeds_at_the_ends_save_what_is_said():
     def moving(speed: float) -> brachis.Result:
         boundary = {"start_speed": 0.1, "end_speed": speed}

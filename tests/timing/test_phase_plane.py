@@ -50,6 +50,26 @@ def test_trapezoid_to_five_digits():
     assert found == pytest.approx(LENGTH / 0.5 + 0.5 / 3.0, rel=1e-5)
 
 
+@pytest.mark.parametrize("friction", [None, {"coulomb": 5.0, "coulomb_velocity": 0.05}])
+@pytest.mark.parametrize("end", [0, -1])
+def test_a_free_end_is_passed_at_the_best_rate(end, friction):
+    robot = gantry(torque=20.0, velocity=1.0, friction=friction)
+    path = JointPath.through(P, np.outer(P, [LENGTH, 0.0]))
+
+    def time_with(rate, estimate=None):
+        rates = [0.0, 0.0]
+        rates[end] = rate
+        return PhasePlane(limits_of(robot), path, estimate).solve(tuple(rates))
+
+    free = time_with(np.inf)
+    best = free.rate[end]
+    assert best > 0.0
+    nearly = time_with(0.999 * best, free.rate).t_end
+    assert free.t_end < nearly < 1.002 * free.t_end
+    assert time_with(0.9 * best, free.rate).t_end > nearly
+    assert time_with(1.1 * best, free.rate) is None
+
+
 @pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
 @pytest.mark.parametrize("shape", [np.ones_like, lambda p: 1.0 - (2.0 * p - 1.0) ** 2])
 def test_an_estimate_of_the_rate_leaves_the_time(size, shape):

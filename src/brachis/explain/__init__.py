@@ -7,28 +7,16 @@ from brachis.explain.multipliers import (
     jacobian_matrix,
     multipliers_of,
 )
-from brachis.explain.sensitivities import (
-    LimitBound,
-    figures_of,
-    sensitivities_at,
-)
-from brachis.trajectory.sensitivities import (
-    TIMINGS,
-    BranchBoundary,
-    Sensitivities,
-    Sensitivity,
-    TaskSaving,
-)
+from brachis.explain.sensitivities import LimitBound, figures_of, sensitivities_at
+from brachis.trajectory.sensitivities import TIMINGS, Sensitivities, Sensitivity
 
 __all__ = [
     "TIMINGS",
     "ActiveSet",
-    "BranchBoundary",
     "LimitBound",
     "Multipliers",
     "Sensitivities",
     "Sensitivity",
-    "TaskSaving",
     "explain_motion",
     "figures_of",
     "jacobian_matrix",

@@ -8,7 +8,13 @@ from dataclasses import replace
 from brachis.explain.multipliers import Multipliers, multipliers_of
 from brachis.explain.savings import task_savings
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
-from brachis.explain.task_figures import OptimalMotion, figure_sensitivities
+from brachis.explain.task_figures import (
+    STEP_OF_TIMING,
+    OptimalMotion,
+    figure_sensitivities,
+    lagrangian_of,
+    least_time_of,
+)
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
 from brachis.problem.problem import Problem
@@ -48,15 +54,15 @@ def explain_motion(
     multipliers = _find_multipliers(motion, optimum)
     if multipliers is None:
         costs = sensitivities_of_timing(motion)
-        answer = OptimalMotion.with_timings(problem, motion.program, motion.x)
+        timed = (motion.program, motion.x, least_time_of)
+        answer = OptimalMotion(problem, *timed, step=STEP_OF_TIMING)
     else:
         costs = sensitivities_at(program, multipliers)
-        answer = OptimalMotion.with_multipliers(problem, program, x, multipliers)
+        lagrangian = lagrangian_of(program, multipliers)
+        answer = OptimalMotion(problem, program, x, lagrangian)
     time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
-    limits = _merge_figures(costs.limits, figure_sensitivities(answer))
-    limits = tuple(
-        replace(entry, derivative=time_ratio * entry.derivative) for entry in limits
-    )
+    figures = (*figure_sensitivities(answer), *costs.limits)
+    limits = _merge_figures(figures, time_ratio)
     savings = task_savings(problem, motion, answer)
     return replace(costs, limits=limits, task=savings)
 
@@ -74,14 +80,13 @@ def _find_multipliers(
 
 
 def _merge_figures(
-    limit_costs: Iterable[Sensitivity], figure_costs: Iterable[Sensitivity]
+    costs: Iterable[Sensitivity], time_ratio: float
 ) -> tuple[Sensitivity, ...]:
-    """Join what limits and figures of the task cost: some limits follow from process speeds."""
-    joined = {(str(entry.label), entry.side): entry for entry in figure_costs}
-    for entry in limit_costs:
+    """Add up what figures of the same name cost, times a ratio: some limits follow from process speeds."""
+    joined: dict[tuple[str, str | None], Sensitivity] = {}
+    for entry in costs:
         name = str(entry.label), entry.side
-        derivative = entry.derivative
-        if name in joined:
-            derivative += joined[name].derivative
-        joined[name] = replace(joined.get(name, entry), derivative=derivative)
+        before = joined.get(name, replace(entry, derivative=0.0))
+        derivative = before.derivative + time_ratio * entry.derivative
+        joined[name] = replace(before, derivative=derivative)
     return tuple(sorted(joined.values(), key=lambda entry: entry.change(1.0)))

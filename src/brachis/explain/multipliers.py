@@ -96,13 +96,10 @@ class ActiveSet:
     @cached_property
     def dependent(self) -> bool:
         """Whether several sets of multipliers may balance a gradient; those of equalities have either sign."""
-        count, variables = self.slopes.shape
-        if count - self.equalities > variables:
-            return True
         # A slope that depends on those before it leaves nothing on the diagonal.
         diagonal = np.diag(np.linalg.qr(self.slopes.T, mode="r"))
         remaining = np.count_nonzero(np.abs(diagonal) > _INDEPENDENT)
-        return bool(remaining < count - self.equalities)
+        return bool(remaining < len(self.slopes) - self.equalities)
 
     def weights_of(
         self, gradient: np.ndarray, multipliers: np.ndarray | None

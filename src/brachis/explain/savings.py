@@ -11,37 +11,28 @@ from dataclasses import replace
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import spread
-from brachis.errors import UnreachableError
 from brachis.explain.task_figures import OptimalMotion
+from brachis.explain.timings import lay_course, least_time
 from brachis.kinematics import Newton
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Phase
 from brachis.path import path_speed
 from brachis.problem.problem import Problem
 from brachis.robot.task_map import JointSpace
-from brachis.timing import Course, TimedCourse
 from brachis.trajectory.sensitivities import Accuracy, TaskSaving
 
-_POINTS = 400
-"""Points at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
-_HALVINGS = 12
-"""Halvings of the range in which the largest speed is looked for."""
-_RATE_RANGE = 64.0
-"""Factor on the largest rate of the motion, and its inverse, between which it is looked for."""
-_RAMP_INTERVALS = (2, 1)
-"""Intervals beside rest within which an acceleration that is zero there costs time. With 2, estimates were 40 to 129 %
-of what planning again saved on 15 motions, in the median 95 %; with 1 they were lower. Over 2 some joint paths have no
-timing."""
+_PLACES = 400
+"""Places at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
+_RAMPS = (slice(3), slice(-3, None))
+"""Ends of the two intervals beside rest within which an acceleration that is zero there costs time. Estimates were 40
+to 129 % of what planning again saved on 15 motions, in the median 95 %; with one interval they were lower."""
 _RANGE_SHARE = 1e-3
 """Part of the range of a joint by which a posture is changed: what it saves was up to 12 % off on 20 tasks, 2 % in the
 median. With 1 % it was 4 to 23 % off on six, and all of it on one."""
 _SHARE_OF_SPEED = 0.1
 """By how much the speed at an end is higher, as a part of it; from rest, as a part of the mean speed."""
-_SPEED_STEP = 1e-3
-"""Part of it for a derivative."""
 _SELF_MOTION_STEP = 1e-5
-"""The same for a derivative, m or rad."""
+"""By how much a posture is changed for a derivative, m or rad."""
 
 Part = tuple[Phase, np.ndarray]
 """A phase and its variables."""
@@ -82,7 +73,11 @@ def _list_stops(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
     for number, leg in enumerate(problem.legs[:-1]):
         if not leg.stops:
             continue
-        saved = _gain(*parts[number], -1) + _gain(*parts[number + 1], 0)
+        sides = ((parts[number], -1), (parts[number + 1], 0))
+        saved = 0.0
+        for part, end in sides:
+            course = lay_course(*part, _PLACES)
+            saved += least_time(course) - least_time(course, end)
         words = "with a blend in place of" if _is_corner(problem, number) else "without"
         change = f"{words} the stop at s = {leg.end:.4g}"
         yield TaskSaving(change, saved, "bound")
@@ -104,9 +99,9 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
         length = path_speed(problem.task_map, problem.path, float(-end))
         mean = length / answer.program.end_time(answer.x)
         more = _SHARE_OF_SPEED * (speed or mean)
-        changed = boundary.model_copy(update={key: speed + _SPEED_STEP * more})
+        changed = boundary.model_copy(update={key: speed + answer.step * more})
         task = problem.task.model_copy(update={"boundary": changed})
-        saved = -answer.change(replace(problem, task=task)) / _SPEED_STEP
+        saved = -answer.change(replace(problem, task=task)) / answer.step
         change = f"boundary.{key}: {speed + more:.2g} in place of {speed:.2g}"
         accuracy: Accuracy = "least" if problem.r and not speed else "estimate"
         yield TaskSaving(change, saved, accuracy)
@@ -120,11 +115,13 @@ def _list_rest(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
         return
     saved = 0.0
     for phase, x in parts:
-        sides = zip((phase.boundary.start, phase.boundary.end), (0, -1), strict=True)
-        for conditions, end in sides:
+        for end, conditions in enumerate((phase.boundary.start, phase.boundary.end)):
             derivatives = conditions[0].derivatives
             if len(derivatives) > 1 and not derivatives.any():
-                saved += _gain_of_ramp(phase, x, end)
+                ramp = _RAMPS[end]
+                duration = float(np.ptp(phase.motion(x).breaks[ramp]))
+                course = lay_course(phase, x, _PLACES, ramp)
+                saved += duration - least_time(course)
     change = f"spline.rest: velocity in place of {spline.rest}"
     yield TaskSaving(change, saved, "estimate")
 
@@ -139,21 +136,21 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
     widths = np.where(np.isfinite(widths), widths, 2.0 * np.pi)
     for name, posture in problem.given_postures.items():
         null = Newton(problem.task_map).self_motions(posture[None])[0]
-        moved_postures = posture + _SELF_MOTION_STEP * null.T
         changes = [
-            answer.change(replace(problem, **{name: moved})) for moved in moved_postures
+            answer.change(replace(problem, **{name: moved}))
+            for moved in posture + _SELF_MOTION_STEP * null.T
         ]
         slopes = np.array(changes) / _SELF_MOTION_STEP
-        shares = np.abs(null @ slopes) / widths
+        direction = -null @ slopes
+        shares = np.abs(direction) / widths
         if not shares.any():
             continue
         most = int(np.argmax(shares))
         length = _RANGE_SHARE / shares[most]
-        step = -length * null @ slopes
+        step = length * direction
         moved = posture + step
-        if (moved < limits.position_lower).any() or (
-            moved > limits.position_upper
-        ).any():
+        inside = moved.clip(limits.position_lower, limits.position_upper)
+        if (moved != inside).any():
             continue
         saved = float(length * (slopes @ slopes))
         amount = f"{abs(step[most]):.3g} {robot.position_units[most]}"
@@ -170,61 +167,6 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
 def _is_corner(problem: Problem, number: int) -> bool:
     """Tell whether the path changes its direction where a leg ends."""
     s = np.array([problem.legs[number].end])
-    before, after = (
-        path.sample(s).xi[0] for path in problem.leg_paths[number : number + 2]
-    )
-    change = np.linalg.norm(
-        before / np.linalg.norm(before) - after / np.linalg.norm(after)
-    )
-    return bool(change > tolerances.ANGLE)
-
-
-def _lay_course(phase: Phase, x: np.ndarray, intervals: slice) -> TimedCourse | None:
-    """Time the joint path over some intervals of a phase; None where it leaves its map."""
-    curves = phase.motion(x)
-    breaks = curves.breaks[intervals]
-    t = spread(breaks, max(2, _POINTS // len(breaks)))
-    course = Course(t, *curves.at(t)[:3])
-    try:
-        return TimedCourse(course, phase.joint_map, phase.limits)
-    except UnreachableError:
-        return None
-
-
-def _gain(phase: Phase, x: np.ndarray, end: int) -> float:
-    """Time, s, that a phase gains if it need not rest at its start (0) or end (-1); 0 where its speed is given."""
-    if phase.time_law is not None:
-        return 0.0
-    course = _lay_course(phase, x, slice(None))
-    if course is None:
-        return 0.0
-    rates = [float(course.speeds[0]), float(course.speeds[-1])]
-    at_rest = course.solve((rates[0], rates[1]))
-    if at_rest is None:
-        return 0.0
-    least = at_rest.t_end
-    low = float(at_rest.rate.max()) / _RATE_RANGE
-    high = float(at_rest.rate.max()) * _RATE_RANGE
-    for _ in range(_HALVINGS):
-        rates[end] = (low * high) ** 0.5
-        timing = course.solve((rates[0], rates[1]))
-        if timing is None:
-            high = rates[end]
-            continue
-        low = rates[end]
-        least = min(least, timing.t_end)
-    return at_rest.t_end - least
-
-
-def _gain_of_ramp(phase: Phase, x: np.ndarray, end: int) -> float:
-    """Time, s, that a phase gains if its acceleration may jump where it rests, at its start (0) or end (-1)."""
-    breaks = phase.motion(x).breaks
-    for count in _RAMP_INTERVALS:
-        chosen = slice(count + 1) if end == 0 else slice(-count - 1, None)
-        course = _lay_course(phase, x, chosen)
-        if course is None:
-            continue
-        timing = course.solve((float(course.speeds[0]), float(course.speeds[-1])))
-        if timing is not None:
-            return max(0.0, float(np.ptp(breaks[chosen])) - timing.t_end)
-    return 0.0
+    tangents = [path.sample(s).xi[0] for path in problem.leg_paths[number:][:2]]
+    before, after = (tangent / np.linalg.norm(tangent) for tangent in tangents)
+    return bool(np.linalg.norm(before - after) > tolerances.ANGLE)

@@ -16,9 +16,9 @@ from collections import defaultdict
 import numpy as np
 
 from brachis.explain.multipliers import Multipliers
+from brachis.explain.timings import FINE_PLACES, lay_course, least_time
 from brachis.limits import Bound, Label, Limit
 from brachis.optimise.improve import SolvedProgram
-from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program, is_safeguard
 from brachis.trajectory.sensitivities import (
     TIMINGS,
@@ -77,7 +77,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         saved = multipliers.change(rates, rows_side)
         costs.append(_sensitivity(label, bound, saved))
     return Sensitivities(
-        _costliest_first(costs),
+        tuple(costs),
         tuple(boundaries),
         multipliers.source,
         multipliers.residual,
@@ -90,11 +90,6 @@ def _sensitivity(label: Label, bound: Bound, saved_per_unit: float) -> Sensitivi
     outwards = -1.0 if bound.side == "lower" else 1.0
     derivative = outwards * saved_per_unit
     return Sensitivity(label, bound.side, bound.figure, bound.full_scale, derivative)
-
-
-def _costliest_first(costs: list[Sensitivity]) -> tuple[Sensitivity, ...]:
-    """Sort what figures cost."""
-    return tuple(sorted(costs, key=lambda entry: entry.change(1.0)))
 
 
 def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
@@ -116,35 +111,28 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     changes: defaultdict[Figure, float] = defaultdict(float)
     bounds: dict[Figure, Bound] = {}
     for phase, x in solved.program.split(solved.x):
-        timing = PhaseTiming.of(phase, x, is_rough=True)
-        if timing is None or timing.timing is None:
+        course = lay_course(phase, x, FINE_PLACES)
+        before = least_time(course)
+        if course is None or np.isnan(before):
             continue
         evaluation = phase.evaluate(x)
         for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
             if is_safeguard(limit):
                 continue
             nearest = limit.violation(values).max(axis=0)
+            is_relieved = limit.longer_time == "relieves"
             for bound in limit.bounds:
                 figure = _figure(limit, bound)
-                is_near = nearest[bound.column] > -_NEAR
-                is_relieved = is_near and limit.longer_time == "relieves"
                 bounds[figure] = bound
-                changes[figure] += (
-                    _change_if_raised(timing, limit, bound) if is_relieved else 0.0
-                )
+                if is_relieved and nearest[bound.column] > -_NEAR:
+                    sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]
+                    nearer = np.zeros((2, len(course.path.p) - 1, len(limit.labels)))
+                    amount = _RAISED * bound.full_scale * bound.per_unit
+                    nearer[sides, :, bound.column] = -amount
+                    raised = least_time(course, narrower={limit: nearer})
+                    changes[figure] += float(np.nan_to_num(raised - before))
     costs = [
         _sensitivity(label, bound, changes[label, side] / (_RAISED * bound.full_scale))
         for (label, side), bound in bounds.items()
     ]
-    return Sensitivities(_costliest_first(costs), (), TIMINGS, 0.0, unique=True)
-
-
-def _change_if_raised(timing: PhaseTiming, limit: Limit, bound: Bound) -> float:
-    """Change of the least time of a joint path, s, if a bound is moved outwards."""
-    before = timing.timing
-    assert before is not None
-    sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]
-    nearer = np.zeros((2, len(before.acceleration), len(limit.labels)))
-    nearer[sides, :, bound.column] = -_RAISED * bound.full_scale * bound.per_unit
-    raised = timing.course.solve(timing.rates, {limit: nearer})
-    return 0.0 if raised is None else raised.t_end - before.t_end
+    return Sensitivities(tuple(costs), (), TIMINGS, 0.0, unique=True)

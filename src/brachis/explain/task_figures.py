@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +20,11 @@ from brachis.common.labels import Label
 from brachis.errors import InputError, UnreachableError
 from brachis.explain.multipliers import Multipliers
 from brachis.explain.sensitivities import label_of_speed
+from brachis.explain.timings import FINE_PLACES, lay_course, least_time
 from brachis.limits.tool import PROCESS_SPEED
-from brachis.optimise.boundary import Boundary, EndCondition
+from brachis.optimise.boundary import Boundary
 from brachis.optimise.phase import Phase
-from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
-from brachis.optimise.retiming import least_time
 from brachis.optimise.transcription import boundary_of
 from brachis.path import (
     legs_of,
@@ -40,12 +40,37 @@ from brachis.trajectory.sensitivities import Sensitivity
 
 Value = Callable[[Program, np.ndarray], float]
 """A function of a program and a point, (v,), whose change is that of t_E, s, if a figure of the task changes."""
-_STEP = 1e-4
-"""Part by which a figure is changed in the Lagrangian."""
-_STEP_OF_TIMING = 1e-2
-"""The same in timings, whose stations make an error of about 1e-6 of the time."""
+STEP_OF_TIMING = 1e-2
+"""Part by which figures are changed in timings, whose stations make an error of about 1e-6 of the time."""
 PROCESS_SPEED_KEY = "tool_limits.process_speed"
 """Key of the task that lists process speeds which are not those of segments."""
+
+
+def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
+    """Return the Lagrangian, of rows of limits and links: where the tool moves at an end, others are not the same."""
+    active = multipliers.active_set
+    of_rows = multipliers.weights[: len(active.rows)]
+    weights = np.zeros(len(program.lower))
+    np.add.at(weights, active.rows, active.signs * of_rows)
+
+    def choose(program: Program, values: np.ndarray) -> np.ndarray:
+        of_limits = [program.rows_of(limit).ravel() for limit in program.limits]
+        links = sum(link.size for link in program.links)
+        of_links = np.arange(len(values) - links, len(values))
+        return values[np.concatenate([*of_limits, of_links])]
+
+    weights = choose(program, weights)
+
+    def value(program: Program, x: np.ndarray) -> float:
+        rows = choose(program, program.rows(x))
+        return program.end_time(x) - float(weights @ rows)
+
+    return value
+
+
+def least_time_of(program: Program, x: np.ndarray) -> float:
+    """Time the joint paths of a point, (v,); NaN where the speed of a phase is given."""
+    return sum(least_time(lay_course(*pair, FINE_PLACES)) for pair in program.split(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +85,7 @@ class OptimalMotion:
     x : (v,) ndarray
         The answer.
     value : callable
+        `lagrangian_of` the program, or `least_time_of`.
     step : float
         Part by which figures are changed.
     """
@@ -68,51 +94,7 @@ class OptimalMotion:
     program: Program
     x: np.ndarray
     value: Value
-    step: float
-
-    @classmethod
-    def with_multipliers(
-        cls, problem: Problem, program: Program, x: np.ndarray, multipliers: Multipliers
-    ) -> OptimalMotion:
-        """Take the Lagrangian; limits without active rows are left out."""
-        active = multipliers.active_set
-        weights = np.zeros(len(program.lower))
-        np.add.at(
-            weights, active.rows, active.signs * multipliers.weights[: len(active.rows)]
-        )
-        by_limit = [
-            (limit, weights[program.rows_of(limit)]) for limit in program.limits
-        ]
-        held = [(limit, of_limit) for limit, of_limit in by_limit if of_limit.any()]
-        of_links = weights[len(weights) - sum(link.size for link in program.links) :]
-        kept = {limit for limit, _ in held}
-        program = program.with_phases(
-            phase.with_limits([limit for limit in phase.limits if limit in kept])
-            for phase in program.phases
-        )
-
-        def value(program: Program, x: np.ndarray) -> float:
-            rows = program.rows(x)
-            total = of_links @ rows[len(rows) - len(of_links) :]
-            for limit, of_limit in held:
-                total += np.sum(of_limit * rows[program.rows_of(limit)])
-            return program.end_time(x) - float(total)
-
-        return cls(problem, program, x, value, _STEP)
-
-    @classmethod
-    def with_timings(
-        cls, problem: Problem, program: Program, x: np.ndarray
-    ) -> OptimalMotion:
-        """Take the least time of the joint path."""
-
-        def value(program: Program, x: np.ndarray) -> float:
-            timings = (
-                PhaseTiming.of(*pair, is_rough=True) for pair in program.split(x)
-            )
-            return least_time(timings)
-
-        return cls(problem, program, x, value, _STEP_OF_TIMING)
+    step: float = 1e-4
 
     def change(self, changed: Problem) -> float:
         """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
@@ -144,18 +126,14 @@ class OptimalMotion:
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
     """Give as many derivatives as before: from rest, those of redundant joints stay zero if the tool begins to move."""
-
-    def join(
-        old: tuple[EndCondition, ...], new: tuple[EndCondition, ...]
-    ) -> tuple[EndCondition, ...]:
-        return tuple(
-            EndCondition(one.value, max(one.derivatives, other.derivatives, key=len))
-            for one, other in zip(new, old, strict=True)
+    sides: dict[str, Any] = {}
+    for side in ("start", "end"):
+        pairs = zip(getattr(before, side), getattr(after, side), strict=True)
+        sides[side] = tuple(
+            replace(new, derivatives=max(new.derivatives, old.derivatives, key=len))
+            for old, new in pairs
         )
-
-    start = join(before.start, after.start)
-    end = join(before.end, after.end)
-    return replace(after, start=start, end=end)
+    return replace(after, **sides)
 
 
 def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
@@ -171,33 +149,24 @@ def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
     return carried
 
 
-@dataclass(frozen=True)
-class _Figure:
-    """A figure of a task: its name, its value, the parts of the path where it counts, and the problem with another."""
-
-    label: Label
-    value: float
-    s: tuple[tuple[float, float], ...]
-    change: Callable[[float], Problem]
+Figure = tuple[Sensitivity, Callable[[float], Problem]]
+"""A figure of a task, what it costs not known yet, and the problem with another value of it."""
 
 
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
     """Derive what the task's figures cost; figures that cannot be larger are left out."""
     costs = []
-    for figure in (*_speeds(motion.problem), *_blends(motion.problem)):
-        value = figure.value
-        step = motion.step * value
+    for cost, change in (*_speeds(motion.problem), *_blends(motion.problem)):
+        step = motion.step * cost.figure
         try:
-            changed = figure.change(value + step)
+            changed = change(cost.figure + step)
         except InputError:
             continue
-        derivative = motion.change(changed) / step
-        cost = Sensitivity(figure.label, None, value, value, derivative, figure.s)
-        costs.append(cost)
+        costs.append(replace(cost, derivative=motion.change(changed) / step))
     return tuple(costs)
 
 
-def _speeds(problem: Problem) -> Iterator[_Figure]:
+def _speeds(problem: Problem) -> Iterator[Figure]:
     """List process speeds; parts of the path with the same speed have one figure."""
     limits = problem.task.tool_limits
 
@@ -217,30 +186,26 @@ def _speeds(problem: Problem) -> Iterator[_Figure]:
             for part in parts
         )
         label = label_of_speed(PROCESS_SPEED, speed, ", ".join(keys))
-        places = tuple(part.s for part in parts)
-        yield _Figure(label, speed, places, partial(change, speed))
+        s = tuple(part.s for part in parts)
+        yield Sensitivity(label, None, speed, speed, 0.0, s), partial(change, speed)
 
 
-def _blends(problem: Problem) -> Iterator[_Figure]:
+def _blends(problem: Problem) -> Iterator[Figure]:
     """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
-    path = problem.path
     segments = problem.task.path
-    places = {
-        before.segment: (float(begin), float(end))
-        for before, blend, (begin, end) in zip(
-            path.pieces, path.pieces[1:], pairwise(path.breaks[1:]), strict=False
-        )
-        if blend.segment is None and before.segment is not None
-    }
-    groups: defaultdict[tuple[str, float], list[int]] = defaultdict(list)
+    breaks = problem.path.breaks.tolist()
+    places: dict[int | None, tuple[float, float]] = {}
+    for number, (before, piece) in enumerate(pairwise(problem.path.pieces), 1):
+        if piece.segment is None:
+            places[before.segment] = (breaks[number], breaks[number + 1])
+    groups: defaultdict[str | float | None, list[int]] = defaultdict(list)
     source = ""
     for number, (segment, after) in enumerate(pairwise(segments)):
         if isinstance(segment, BSplineSegment) and segment.bspline.fit:
             source = segment.bspline.fit.source
         if number in places:
             is_of_file = isinstance(after, BSplineSegment) and not after.bspline.fit
-            size = 0.0 if is_of_file else segment.blend or 0.0
-            groups[source if is_of_file else "", size].append(number)
+            groups[source if is_of_file else segment.blend].append(number)
 
     def change(numbers: list[int], before: float, after: float) -> Problem:
         path = list(segments)
@@ -250,13 +215,17 @@ def _blends(problem: Problem) -> Iterator[_Figure]:
         task = problem.task.model_copy(update={"path": tuple(path)})
         return _with_task(problem, task)
 
-    for (source, _), numbers in groups.items():
-        largest = max(segments[number].blend or 0.0 for number in numbers)
-        cause = f"blend at the corners of {source}" if source else "blend"
-        key = "csv.tolerance.corner" if source else "path.blend"
-        label = Label("path", f"{cause}, {largest:.10g} m", "m", key, cause=cause)
+    for group, numbers in groups.items():
+        size = max(segments[number].blend or 0.0 for number in numbers)
+        cause = "blend"
+        key = "path.blend"
+        if isinstance(group, str):
+            cause = f"blend at the corners of {group}"
+            key = "csv.tolerance.corner"
+        label = Label("path", f"{cause}, {size:.10g} m", "m", key, cause=cause)
         s = tuple(places[number] for number in numbers)
-        yield _Figure(label, largest, s, partial(change, numbers, largest))
+        cost = Sensitivity(label, None, size, size, 0.0, s)
+        yield cost, partial(change, numbers, size)
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from brachis.kernel.library import compute
@@ -29,7 +31,7 @@ def bounds_of_pairs(
 
 
 def go_backwards(
-    steps: tuple[np.ndarray, np.ndarray, np.ndarray],
+    steps: Sequence[np.ndarray],
     levels: tuple[np.ndarray, np.ndarray],
     last: float,
     *,
@@ -40,7 +42,7 @@ def go_backwards(
 
     Parameters
     ----------
-    steps : tuple of (P - 1, c) ndarray
+    steps : three (P - 1, c) ndarrays
         Factor, least and most: the next x is ``factor x + least`` to ``factor x + most``.
     levels : tuple of (P - 1,) ndarray
         The least and the largest x at all stations but the last.

@@ -38,7 +38,9 @@ from brachis.search.verified import refine_and_verify
 
 LITTLE_TIME = 5.0
 """Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
-_NOT_COMPLETED = "there was time for a first motion alone, which may be far from the fastest"
+_NOT_COMPLETED = (
+    "there was time for a first motion alone, which may be far from the fastest"
+)
 _SLOWER = (1.1, 1.5, 2.5)
 """Factors on the times of the first splines, one tried after the other: with 1 most rows are at their bounds."""
 _CHANGES = 10

@@ -337,8 +337,8 @@ class PhasePlane:
     ) -> Timing | None:
         """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed.
 
-        Linearisations end when they change the time, or differ from the limits, by no more than a part of these,
-        `agreement`.
+        An infinite rate leaves it free: the fastest timing of all. Linearisations end when they change the time, or
+        differ from the limits, by no more than a part of these, `agreement`.
         """
         best: Timing | None = None
         error = np.inf
@@ -388,23 +388,32 @@ class PhasePlane:
     def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
         """Largest dp/dt at the stations, (P,), 1/s, within the rows as they are; see `solve`."""
         first, last = (rate**2 for rate in rates)
-        if last > self._ceiling[-1] * (1.0 + _ROUNDING):
+        rows = self._next
+        floor = self._floor
+        ceiling = self._ceiling
+        if math.isinf(last):
+            # One step more, from any x to any other one, leaves x at the end free.
+            last = 0.0
+            floor = np.append(floor, 0.0)
+            step = np.array([1.0, -np.inf, np.inf])[:, None, None]
+            added = np.broadcast_to(step, (3, 1, rows.shape[2]))
+            rows = np.concatenate([rows, added], axis=1)
+        elif last > ceiling[-1] * (1.0 + _ROUNDING):
             return None
         # The intervals of x from which the end can be reached.
-        factor, next_lower, next_upper = self._next
+        levels = (floor, ceiling[: len(floor)])
         reach = kernel.go_backwards(
-            (factor, next_lower, next_upper),
-            (self._floor, self._ceiling[:-1]),
-            last,
-            flat=_TINY,
-            rounding=_ROUNDING,
+            tuple(rows), levels, last, flat=_TINY, rounding=_ROUNDING
         )
         if reach is None:
             return None
-        low, high = reach
+        low, high = (bound[: len(ceiling)] for bound in reach)
+        if math.isinf(first):
+            first = float(high[0])
         if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
             return None
-        squares = kernel.go_forwards(factor, next_upper, reach, first)
+        factor, _, next_upper = self._next
+        squares = kernel.go_forwards(factor, next_upper, (low, high), first)
         if not squares.max() > 0.0:
             return None
         # Between stations nothing stops; a station where the grid says so is an artefact of its width.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.apps.bottleneck import limits_by_phase, saturations
+from brachis.apps.bottleneck import limit_ratios, limits_by_phase, saturations
 from brachis.explain import ActiveSet
 from support.effort import QUICK
 from support.gantry import gantry_motion
@@ -79,8 +80,9 @@ def test_a_saved_motion_is_solved_again_by_phase(stopping):
 
 def test_phases_are_named_for_a_motion_that_was_not_planned():
     motion = gantry_motion()
-    found = saturations(motion, threshold=0.29, ripple=0.2)
-    phases = limits_by_phase(motion, found)
+    ratios = limit_ratios(motion)
+    narrower = replace(ratios, values=ratios.values / 0.29)
+    phases = limits_by_phase(motion, saturations(narrower))
     (label, share) = phases[0].shares[0]
     assert (label.subject, label.kind) == ("j2", "velocity")
     assert 0.0 < share < 0.5

@@ -75,9 +75,10 @@ def test_both_directions_count(made):
 def test_the_threshold_is_met_between_grid_points(made):
     ramp = made([0.0, T], [0.0, LIMIT], [0.0, LIMIT])
     assert of(saturations(ramp), "j1", "force").share == pytest.approx(1e-2, rel=1e-6)
-    half = of(saturations(ramp, threshold=0.4321), "j1", "force")
-    assert half.share == pytest.approx(1.0 - 0.4321, rel=1e-9)
-    assert half.active[0].begin == pytest.approx(0.4321 * T)
+    steep = made([0.0, T], [0.0, 1.7 * LIMIT], [0.0, 1.7 * LIMIT])
+    entry = of(saturations(steep), "j1", "force")
+    assert entry.share == pytest.approx(1.0 - 0.99 / 1.7, rel=1e-9)
+    assert entry.active[0].begin == pytest.approx(0.99 / 1.7 * T)
 
 
 def test_below_the_threshold_nothing_is_active(made):

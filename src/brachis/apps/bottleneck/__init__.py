@@ -28,12 +28,11 @@ from brachis.apps.bottleneck.saturation import (
     limits_by_phase,
     saturations,
 )
-from brachis.explain import (
+from brachis.trajectory.sensitivities import (
     BranchBoundary,
     Sensitivities,
     Sensitivity,
     TaskSaving,
-    explain_motion,
 )
 
 __all__ = [
@@ -52,7 +51,6 @@ __all__ = [
     "SensitivityCheck",
     "TaskSaving",
     "check_sensitivities",
-    "explain_motion",
     "find_reference",
     "limit_ratios",
     "limits_by_phase",

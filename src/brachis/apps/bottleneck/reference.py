@@ -22,6 +22,8 @@ from brachis.search.stages import FinishedCandidate
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _JUMPING = 2
 """Highest derivative that is bounded if accelerations jump: limits on a higher one are left out."""
+_TIME_LIMIT = 8.0
+"""s of wall time for the reference."""
 _TOLERANCE = 1e-4
 """Part of the time that the knots of the reference may lose."""
 
@@ -65,7 +67,6 @@ def find_reference(
     candidate: FinishedCandidate,
     *,
     families: Sequence[Family] = (),
-    time_limit: float = 8.0,
     listener: Listener = ignore,
 ) -> Reference | None:
     """Plan again with rest: velocity and as many intervals as it takes, from the motion.
@@ -76,8 +77,6 @@ def find_reference(
         ``result.candidate``.
     families : sequence, optional
         Those with which the motion was planned.
-    time_limit : float, optional
-        s.
     listener : callable, optional
         Is told of every iteration.
 
@@ -102,7 +101,7 @@ def find_reference(
         task=task.model_copy(update=changes),
         limits=tuple(limits),
     )
-    deadline = Deadline.after(time_limit)
+    deadline = Deadline.after(_TIME_LIMIT)
     try:
         best = search_from(candidate.trajectory, problem, families, deadline, listener)
     except PlanningError:

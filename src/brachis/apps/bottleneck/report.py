@@ -19,6 +19,7 @@ from brachis.apps.bottleneck.saturation import (
     THRESHOLD,
     PhaseLimits,
     Saturation,
+    limit_ratios,
     limits_by_phase,
     limits_in,
     saturations,
@@ -187,18 +188,18 @@ def report(
     if isinstance(motion, str | os.PathLike):
         motion = Trajectory.load(motion)
     trajectory = motion_of(motion, "motion")
-    if trajectory.recovered is not None:
-        if check or reference:
-            raise InputError(
-                "this motion was not planned, so the cost of its limits cannot be computed",
-                where=trajectory.recovered.source,
-                hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
-            )
-        active = saturations(trajectory)
-        phases = limits_by_phase(trajectory, active)
-        return BottleneckReport(trajectory.t_end, None, active, phases)
+    recovered = trajectory.recovered
+    if recovered is None:
+        trajectory = narrow_motion(trajectory)
+    elif check or reference:
+        raise InputError(
+            "this motion was not planned, so the cost of its limits cannot be computed",
+            where=recovered.source,
+            hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
+        )
+    else:
+        solve = False
     costs = motion.sensitivities
-    trajectory = narrow_motion(trajectory)
     checked = None
     best = None
     listener("looking for what is active, and when")
@@ -208,7 +209,7 @@ def report(
         candidate = motion.candidate
         limits = limits_in(candidate.refined.program)
     began = time.perf_counter()
-    active = saturations(trajectory, limits)
+    active = saturations(limit_ratios(trajectory, limits))
     seconds = _LOOKS * (time.perf_counter() - began)
     if candidate is None and ((costs is None and solve) or check or reference):
         longest = trajectory.task.search.time_limit
@@ -229,7 +230,7 @@ def report(
         sensitivities=costs,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
-        timing=find_timing_gap(trajectory, limits),
+        timing=None if recovered else find_timing_gap(trajectory, limits),
         check=checked,
         reference=best,
         reference_sought=reference,

@@ -108,17 +108,12 @@ def limit_ratios(
     values = [limit.ratios(moments, t) for limit in limits]
     labels = [label for limit in limits for label in limit.labels]
     for speed in sorted({phase.speed or 0.0 for phase in trajectory.phases} - {0.0}):
-        labels.append(_label_of_held_speed(speed))
+        label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
+        text = f"the tool is held at its {label.kind}"
+        labels.append(replace(label, active_text=text, share="tool speed / limit"))
         values.append(_has_speed(trajectory, speed, t)[:, None])
     together = np.hstack([np.empty((len(t), 0)), *values])
     return LimitRatios(t, tuple(labels), together)
-
-
-def _label_of_held_speed(speed: float) -> Label:
-    """Name a process speed, m/s, as what holds the tool back."""
-    label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
-    text = f"the tool is held at its {label.kind}"
-    return replace(label, active_text=text, share="tool speed / limit")
 
 
 def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarray:
@@ -193,40 +188,26 @@ class Saturation(Summary):
         }
 
 
-def saturations(
-    motion: Trajectory | LimitRatios,
-    limits: Sequence[Limit] | None = None,
-    *,
-    threshold: float = THRESHOLD,
-    ripple: float = RIPPLE,
-) -> tuple[Saturation, ...]:
+def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
     """Find when every limit is active.
 
     Parameters
     ----------
     motion : Trajectory or LimitRatios
         Any trajectory, a saved one for example, or its ratios.
-    limits : sequence of Limit, optional
-        Those of the trajectory's task if left out.
-    threshold : float, optional
-        Part of the limit from which on it counts as active.
-    ripple : float, optional
-        Part of the limit above which dips below the threshold count as ripple, which does not end an interval.
 
     Returns
     -------
     tuple of Saturation
         Of all limits, those active longest first.
     """
-    ratios = motion
-    if isinstance(ratios, Trajectory):
-        ratios = limit_ratios(ratios, limits)
+    ratios = limit_ratios(motion) if isinstance(motion, Trajectory) else motion
     found = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
             ActiveInterval(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
-            for begin, end in _find_active(ratios.t, sign * column, threshold, ripple)
+            for begin, end in _find_active(ratios.t, sign * column)
         ]
         active.sort(key=lambda interval: interval.begin)
         duration = sum(interval.end - interval.begin for interval in active)
@@ -287,20 +268,12 @@ def limits_by_phase(
     return tuple(phases)
 
 
-def _find_active(
-    t: np.ndarray, values: np.ndarray, threshold: float, ripple: float
-) -> list[tuple[float, float]]:
+def _find_active(t: np.ndarray, values: np.ndarray) -> list[tuple[float, float]]:
     """Find the intervals in which values, linear between the times (K,), keep to the threshold but for ripple."""
-    found: list[list[int]] = []  # first and last sample at the limit
-    is_active = False
-    for k in np.flatnonzero((values >= threshold) | (values < ripple)).tolist():
-        if values[k] < threshold:
-            is_active = False
-        elif is_active:
-            found[-1][1] = k
-        else:
-            found.append([k, k])
-            is_active = True
+    samples = np.flatnonzero((values >= THRESHOLD) | (values < RIPPLE))
+    is_active = np.pad(values[samples] >= THRESHOLD, 1)
+    firsts = samples[is_active[1:-1] & ~is_active[:-2]]
+    lasts = samples[is_active[1:-1] & ~is_active[2:]]
 
     def crossing(before: int) -> float:
         """Time between two samples at which the line between them meets the threshold, s; an end of the motion."""
@@ -308,6 +281,7 @@ def _find_active(
             return float(t[max(before, 0)])
         low, high = values[before : before + 2]
         step = t[before + 1] - t[before]
-        return float(t[before] + step * (threshold - low) / (high - low))
+        return float(t[before] + step * (THRESHOLD - low) / (high - low))
 
-    return [(crossing(first - 1), crossing(last)) for first, last in found]
+    pairs = zip(firsts.tolist(), lasts.tolist(), strict=True)
+    return [(crossing(first - 1), crossing(last)) for first, last in pairs]
