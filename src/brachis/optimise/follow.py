@@ -244,10 +244,7 @@ def _knots(
     shortest: float,
     max_intervals: int = _MOST_INTERVALS + 1,
 ) -> np.ndarray:
-    """Choose knots, (N + 1,), over which splines follow a timing, the first and last intervals short; see `breaks_for`.
-
-    The timing waits as long where accelerations vanish.
-    """
+    """Choose knots, (N + 1,), as `breaks_for`; where accelerations vanish the intervals at the ends are short."""
     breaks = breaks_for(phase_timing.course, timing, lost, max_intervals)
     if max(_vanishing(phase)) > 0:
         breaks = even_out(np.union1d(breaks, [shortest, 1.0 - shortest]))
@@ -313,9 +310,7 @@ def _look_at_postures(phase: Phase, fit: SplineFit) -> SplineFit:
 
 
 class _Violations:
-    """Largest violations of limits between knots, from one timing of a joint path to the next.
-
-    Knots and stations stay at their places on the path. What is known stays where the timing does.
+    """Largest violations of limits between knots; what is known of them stays where the timing of the path stays.
 
     Parameters
     ----------
@@ -374,7 +369,7 @@ class _Violations:
         self._raise(laid, t.ravel(), np.repeat(interval[number], looks + 1))
         at_stations = is_new[self._interval]
         self._raise(laid, laid.times[at_stations], self._interval[at_stations])
-        largest = [violations.max(axis=1) for violations in self.by_limit.values()]
+        largest = (violations.max(axis=1) for violations in self.by_limit.values())
         self.worst = np.max([np.zeros(len(is_new)), *largest], axis=0)
 
     def find_excess(self, least: float) -> Iterator[tuple[Limit, np.ndarray]]:

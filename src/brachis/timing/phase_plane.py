@@ -191,10 +191,8 @@ class PhasePlane:
             for limit in self._limits
         ]
         self._motion = motion
-        has_new_levels = any(
-            block.by_u is None for block in rows if block not in agreeing
-        )
-        if has_new_levels or not agreeing:
+        new_rows = [block for block in rows if block not in agreeing]
+        if not agreeing or any(block.by_u is None for block in new_rows):
             rates = np.pad(halfway(motion.rate), 1, mode="edge")
             rates[[0, -1]] = motion.rate[[0, -1]]
             at_stations = Passage(self.path, rates, np.zeros_like(rates))
@@ -216,17 +214,10 @@ class PhasePlane:
     def _set_bounds(
         self, rows: Sequence[_Rows], changed: np.ndarray | None = None
     ) -> None:
-        """Find the bounds on u and x that rows with and without acceleration set, `_levels` known.
-
-        Parts without steps that have changed, (P - 1,) bool, stay.
-        """
+        """Find the bounds on u and x that rows set; they stay where no step beside is `changed`, (P - 1,) bool."""
         self._sloped = [block for block in rows if block.by_u is not None]
-        levels = [block for block in rows if block.by_u is None]
-        labels = [
-            str(label)
-            for block in (*self._sloped, *levels)
-            for label in block.limit.labels
-        ]
+        ordered = self._sloped + [block for block in rows if block.by_u is None]
+        labels = [str(label) for block in ordered for label in block.limit.labels]
         count = len(self._steps)
         if changed is None or labels != self._labels:
             changed = np.ones(count, dtype=bool)
@@ -470,9 +461,8 @@ class PhasePlane:
     def largest_rate(self, end: int) -> tuple[float, str]:
         """Find the largest dp/dt, 1/s, that the limits allow beside an end (0 or -1), and which one allows no more."""
         for _ in range(_LOOKS_AT_END):
-            slope, lower, upper = (
-                line[end] for line in _as_lines(*self._stack(slice(None)))
-            )
+            lines = _as_lines(*self._stack(slice(None)))
+            slope, lower, upper = (line[end] for line in lines)
             tilt = slope[:, None] - slope
             clearance = upper[:, None] - lower
             falls = tilt < -_TINY
