@@ -153,7 +153,8 @@ def set_clocks() -> None:
     child_process.time = types.SimpleNamespace(monotonic=clock)
     timers = vars(signal) | {"ITIMER_REAL": signal.ITIMER_PROF}
     child_process.signal = types.SimpleNamespace(**timers)
-    receive = child_process._receive
+    functions = vars(child_process)
+    receive = functions["_receive"]
 
     def receive_until(receiver: Any, until: float, *more: Any) -> tuple[Any, Any]:
         """Receive until this time is over by the clock."""
@@ -164,7 +165,7 @@ def set_clocks() -> None:
             if answer is not SolveStatus.STALLED or clock() >= until:
                 return answer, best
 
-    child_process._receive = receive_until
+    functions["_receive"] = receive_until
 
 
 def planned(task: Any, limit: float, jobs: int) -> str:

@@ -513,17 +513,21 @@ def test_a_lattice_ends_between_its_layers(robot, clock):
     assert len(calls) == 5
 
 
-def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
-    honest = pipeline.finish_candidate
-    monkeypatch.setattr(
-        pipeline,
-        "finish_candidate",
-        lambda *given: Candidate(**facts_of(honest(*given))),
-    )
+def test_only_a_moment_of_grace_for_what_fails(robot, monkeypatch, clock):
+    for module, name in (
+        (pipeline, "finish_candidate"),
+        (portfolio, "find_first_motion"),
+    ):
+        honest = getattr(module, name)
+        monkeypatch.setattr(
+            module,
+            name,
+            lambda *given, honest=honest: Candidate(**facts_of(honest(*given))),
+        )
     calls = clock.jump(pipeline, "finish_candidate", at=1, by=0.6)
     with pytest.raises(PlanningError, match="within the time limit"):
         brachis.plan(robot, task(search={"time_limit": 1.5}))
-    assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, (
+    assert sum(calls) <= math.ceil((1.5 + 0.2) / 0.6) + 3, (
         "three more are only verified at last"
     )
 

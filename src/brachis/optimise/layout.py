@@ -166,7 +166,8 @@ class VariableLayout:
             self.progress = Progress.of(splines[0])
             constant, *by_powers = splines[0].fixed_terms
             if not np.any(by_powers):
-                self.x_lower[self.slices[0]] = constant.min()
+                # Free control points have zeros there.
+                self.x_lower[self.slices[0]] = constant[0]
                 self.x_upper[self.slices[0]] = constant.max()
 
         points = len(grid.breaks) - 1 + grid.degree

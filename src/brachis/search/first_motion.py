@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from brachis.common.deadline import Deadline
+from brachis.common.progress import ignore
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import (
     FEASIBLE,
@@ -26,14 +27,24 @@ from brachis.optimise.backends import (
     SolveStatus,
     objective_at,
     residual,
+    solvers_for,
 )
+from brachis.optimise.improve import Solve, SolverSession
 from brachis.optimise.mesh import coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.transcription import program_of
 from brachis.search.least_motion import least_acceleration
 from brachis.search.phase_plane import initial_guess
-from brachis.search.stages import Candidate, InitialGuess, begin_candidate, fail, rank
+from brachis.search.stages import (
+    Candidate,
+    FinishedCandidate,
+    InitialGuess,
+    RankedCandidate,
+    begin_candidate,
+    fail,
+    rank,
+)
 from brachis.search.verified import refine_and_verify
 
 LITTLE_TIME = 5.0
@@ -41,6 +52,14 @@ LITTLE_TIME = 5.0
 _NOT_COMPLETED = (
     "there was time for a first motion alone, which may be far from the fastest"
 )
+_SOLVE_SHARE = 0.6
+"""Part of the time left in which a first motion is improved by a solve."""
+_LONGEST_SOLVE = 0.5
+"""Longest time of this solve, s: in 0.4 s motions of process speeds got 15 to 35 % faster."""
+_NEARLY = 0.05
+"""Violation up to which its last iterate counts."""
+_ROOM = 1.03
+"""Factor on the time of this iterate: at their bounds rows are not held between the collocation points."""
 _SLOWER = (1.1, 1.5, 2.5)
 """Factors on the times of the first splines, one tried after the other: with 1 most rows are at their bounds."""
 _CHANGES = 10
@@ -79,17 +98,55 @@ def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
             phase.restrict_to(curves) for phase, curves in pairs
         )
         x = initial_guess(program, guess)
+        if x is None:
+            return outcome
     except UnreachableError as error:
         return fail(outcome, str(error))
     options = RefinementOptions.of(guess.problem.task.refinement, deadline)
     solve = partial(_find_nearest, deadline=deadline)
-    for factor in _SLOWER if x is not None else ():
+    for factor in _SLOWER:
         report = solve(program, program.scale_time(x, factor))
         if report.status.usable:
             outcome = refine_and_verify(candidate, program, (report,), solve, options)
-        if outcome.is_settled or deadline.passed:
+        if isinstance(outcome, FinishedCandidate) and outcome.is_settled:
+            return _improve(candidate, outcome, solve, options)
+        if deadline.passed:
             break
     return outcome
+
+
+def _improve(
+    candidate: RankedCandidate,
+    first: FinishedCandidate,
+    solve: Solve,
+    options: RefinementOptions,
+) -> FinishedCandidate:
+    """Solve for a short time from a first motion, and keep what is nearest to the last iterate if it is faster.
+
+    An interior-point method comes far in a dozen iterations from such a motion, which no limit holds.
+    """
+    task = candidate.problem.task
+    backends = [
+        solver for solver in solvers_for(task.solver.name) if solver.is_interior
+    ]
+    for backend in backends[:1]:
+        program = first.refined.program
+        session = SolverSession.for_task(
+            backend,
+            task.solver,
+            candidate.guess.joint_map,
+            options.deadline.part(_SOLVE_SHARE).within(_LONGEST_SOLVE),
+            ignore,
+            has_time_law=any(candidate.problem.time_laws),
+        )
+        report = session(program, first.refined.x)
+        if report.violation < _NEARLY and _ROOM * report.objective < first.t_end:
+            nearest = solve(program, program.scale_time(report.x, _ROOM))
+            better = refine_and_verify(candidate, program, (nearest,), solve, options)
+            is_better = better.is_settled and better.t_end < first.t_end
+            if isinstance(better, FinishedCandidate) and is_better:
+                return better
+    return first
 
 
 def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> SolverReport:

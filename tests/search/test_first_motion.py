@@ -1,0 +1,74 @@
+"""A first motion, where there is little time: near a joint path, and within all limits."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import pytest
+
+import brachis
+from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise.transcription import program_of
+from brachis.problem.problem import Problem, decompositions_of
+from brachis.robot.from_task import robot_for
+from brachis.search.first_motion import find_first_motion
+from brachis.search.guesses import first_guess
+from brachis.search.stages import InitialGuess
+
+EXTRAS: dict[str, dict[str, Any]] = {
+    "nothing else": {},
+    "a process speed": {
+        "tool_limits": {"process_speed": {"speed": 0.2, "s": [0.3, 0.7]}}
+    },
+    "a stop": {
+        "path": [
+            {"line": {"by": [0.0, 0.5]}, "stop": True},
+            {"line": {"by": [0.0, 0.3]}},
+        ]
+    },
+}
+
+
+def guess_with(extras: dict[str, Any]) -> InitialGuess:
+    task = brachis.load_task(
+        {
+            "brachis": 1,
+            "robot": {
+                "urdf": str(brachis.robots.path_of("scara3")),
+                "tool_frame": "tool",
+                "gravity": [0.0, 0.0, 0.0],
+                "limits": {"torque": 10.0},
+            },
+            "start": {"joints": [0.5236, -2.0944, 2.0944]},
+            "task_space": ["x", "y"],
+            "path": [{"line": {"by": [0.0, 0.8]}}],
+            **extras,
+        }
+    )
+    problem = Problem.of(robot_for(None, task.robot), task)
+    return first_guess(problem, decompositions_of(problem, ()))
+
+
+@pytest.mark.parametrize("extras", EXTRAS.values(), ids=EXTRAS)
+def test_a_first_motion_keeps_all_limits(extras: dict[str, Any]) -> None:
+    outcome = find_first_motion(guess_with(extras), NEVER)
+    assert outcome.status == "verified"
+    assert outcome.t_end < 20.0
+
+
+def test_without_time_there_is_no_first_motion() -> None:
+    guess = guess_with(EXTRAS["a process speed"])
+    assert not find_first_motion(guess, Deadline(0.0)).verified
+
+
+def test_a_leg_does_not_go_back_beyond_its_beginning() -> None:
+    guess = guess_with(EXTRAS["a stop"])
+    program = program_of(guess.problem, guess.maps_by_leg())
+    begins = [leg.begin for leg in guess.problem.legs]
+    assert begins[1] > 0.0
+    for phase, begin, last in zip(
+        program.phases, begins, itertools.repeat(1.0), strict=False
+    ):
+        assert phase.x_lower[1] == begin
+        assert phase.x_upper[1] <= last
