@@ -115,16 +115,18 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
         before = least_time(course)
         if course is None or np.isnan(before):
             continue
-        evaluation = phase.evaluate(x)
-        for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
+        motion = phase.state(x)
+        for limit in phase.limits:
             if is_safeguard(limit):
                 continue
-            nearest = limit.violation(values).max(axis=0)
-            is_relieved = limit.longer_time == "relieves"
+            is_near = np.zeros(len(limit.labels), dtype=bool)
+            if limit.longer_time == "relieves":
+                violation = limit.violation(limit.values(motion))
+                is_near = violation.max(axis=0) > -_NEAR
             for bound in limit.bounds:
                 figure = _figure(limit, bound)
                 bounds[figure] = bound
-                if is_relieved and nearest[bound.column] > -_NEAR:
+                if is_near[bound.column]:
                     sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]
                     nearer = np.zeros((2, len(course.path.p) - 1, len(limit.labels)))
                     amount = _RAISED * bound.full_scale * bound.per_unit

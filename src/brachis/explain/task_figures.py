@@ -47,22 +47,33 @@ PROCESS_SPEED_KEY = "tool_limits.process_speed"
 
 
 def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
-    """Return the Lagrangian, of rows of limits and links: where the tool moves at an end, others are not the same."""
+    """Return the Lagrangian, of rows of limits and links: where the tool moves at an end, others are not the same.
+
+    Limits without active rows are left out: distances of bodies take long.
+    """
     active = multipliers.active_set
     of_rows = multipliers.weights[: len(active.rows)]
     weights = np.zeros(len(program.lower))
     np.add.at(weights, active.rows, active.signs * of_rows)
 
-    def choose(program: Program, values: np.ndarray) -> np.ndarray:
-        of_limits = [program.rows_of(limit).ravel() for limit in program.limits]
-        links = sum(link.size for link in program.links)
-        of_links = np.arange(len(values) - links, len(values))
-        return values[np.concatenate([*of_limits, of_links])]
+    limits = dict.fromkeys(
+        limit for limit in program.limits if weights[program.rows_of(limit)].any()
+    )
+    links = sum(link.size for link in program.links)
 
-    weights = choose(program, weights)
+    def find_rows(program: Program) -> np.ndarray:
+        of_limits = [program.rows_of(limit).ravel() for limit in limits]
+        end = len(program.lower)
+        return np.concatenate([*of_limits, np.arange(end - links, end)])
+
+    weights = weights[find_rows(program)]
 
     def value(program: Program, x: np.ndarray) -> float:
-        rows = choose(program, program.rows(x))
+        program = program.with_phases(
+            phase.with_limits([limit for limit in phase.limits if limit in limits])
+            for phase in program.phases
+        )
+        rows = program.rows(x)[find_rows(program)]
         return program.end_time(x) - float(weights @ rows)
 
     return value
