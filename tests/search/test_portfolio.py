@@ -23,7 +23,14 @@ from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import guesses, over_time, pipeline, portfolio, schedule
+from brachis.search import (
+    first_motion,
+    guesses,
+    over_time,
+    pipeline,
+    portfolio,
+    schedule,
+)
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.guesses import SEARCH_LEVELS
@@ -516,7 +523,7 @@ def test_a_lattice_ends_between_its_layers(robot, clock):
 def test_only_a_moment_of_grace_for_what_fails(robot, monkeypatch, clock):
     for module, name in (
         (pipeline, "finish_candidate"),
-        (portfolio, "find_first_motion"),
+        (first_motion, "find_first_motion"),
     ):
         honest = getattr(module, name)
         monkeypatch.setattr(

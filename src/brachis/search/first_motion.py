@@ -12,14 +12,14 @@ is made again and again. That takes hundredths of a second, where a solve takes 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import scipy.sparse as sp
 
 from brachis.common.deadline import Deadline
-from brachis.common.progress import ignore
+from brachis.common.progress import Listener, ignore
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import (
     FEASIBLE,
@@ -49,6 +49,8 @@ from brachis.search.verified import refine_and_verify
 
 LITTLE_TIME = 5.0
 """Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
+_FIRST_SHARE = 0.6
+"""Part of the time left in which it is looked for."""
 _NOT_COMPLETED = (
     "there was time for a first motion alone, which may be far from the fastest"
 )
@@ -74,6 +76,21 @@ _ENOUGH = 1e-10
 """Violation that is small enough: with 1e-8 the tool went back on its path between knots that are close together."""
 _DAMPING = 1e-8
 """Part of the largest entry that is added to a diagonal: some joints do not count, and rows may depend on others."""
+
+
+def find_first_motion_of(
+    guesses: Sequence[InitialGuess], deadline: Deadline, listener: Listener
+) -> FinishedCandidate | None:
+    """Find a verified motion near the joint path of one of the guesses; None where that takes too long."""
+    until = deadline.part(_FIRST_SHARE)
+    for guess in sorted(guesses, key=lambda guess: guess.estimate):
+        if until.passed:
+            break
+        outcome = find_first_motion(guess, until)
+        listener(outcome.describe())
+        if isinstance(outcome, FinishedCandidate) and outcome.is_settled:
+            return outcome
+    return None
 
 
 def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
@@ -184,6 +201,8 @@ def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> Solver
 
 def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
     """Find the smoothest change of x, (v,), after which the linearised rows hold; see the module."""
+    import scipy.sparse as sp
+
     values = program.rows(x)
     places = (program.jacobian_rows, program.jacobian_columns)
     entries = sp.coo_array((program.jacobian(x), places), (len(values), len(x)))

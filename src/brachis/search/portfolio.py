@@ -5,8 +5,7 @@
 3. In the order of these times candidates are solved over time, refined and verified, as long as they may beat the best
    verified one. Refinement slows all motions by about as much. So a motion that does not beat the best one before its
    refinement is not refined.
-4. Where there is little time, the first guesses lead to a motion near a joint path before all else (`first_motion`). It
-   is the plan unless a faster one is verified in time.
+4. Where there is little time, a motion near a joint path is found before all else (see `first_motion`).
 5. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
@@ -32,7 +31,7 @@ from brachis.optimise.backends import SolveStatus
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import pipeline
 from brachis.search.failure import explain_first_failures, explain_no_motion
-from brachis.search.first_motion import LITTLE_TIME, find_first_motion
+from brachis.search.first_motion import LITTLE_TIME, find_first_motion_of
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.holding import explain_holding, explain_postures
 from brachis.search.hopeless import explain_speeds
@@ -48,6 +47,7 @@ from brachis.search.stages import (
     InitialGuess,
     RankedCandidate,
     begin_candidate,
+    round_end_time,
 )
 from brachis.trajectory import Trajectory
 
@@ -56,8 +56,6 @@ _LEAST_COST = 0.5
 of the smallest cost so far. With 10 intervals they cost joint paths of a planar arm 17 to 20 % of the time."""
 _RANKING_SHARE = 0.6
 """Part of the time left after which no joint path is improved while nothing is verified."""
-_FIRST_SHARE = 0.6
-"""Part of the time left in which it is looked for."""
 _LATER = 0.2
 """Seconds after its end that the search goes on while nothing is verified."""
 _REFINED = 5e-3
@@ -178,11 +176,13 @@ class Search:
         """
         guess_batches = self._find_guesses(motion, exact)
         for batch in itertools.islice(guess_batches, max_batches):
-            self._find_first_motion(batch)
+            if not self._has_motion and self._deadline.left < LITTLE_TIME:
+                self._first_motion = find_first_motion_of(
+                    batch.guesses, self._deadline, self._listener
+                )
             self._rank(batch)
             self._refine_and_verify(batch)
-        # The last solves may have been cut short.
-        self.interrupted |= self._deadline.passed
+        self.interrupted |= self._deadline.passed  # the last solves may be cut short
 
     def _find_guesses(
         self, motion: Trajectory | None, exact: FinishedCandidate | None
@@ -225,28 +225,6 @@ class Search:
             outcome = str(error)
         if origin == GIVEN:
             self._given_motion = outcome
-
-    def _find_first_motion(self, batch: Batch) -> None:
-        """Find a verified motion soon, where there is little time and none is known."""
-        until = self._deadline.part(_FIRST_SHARE)
-        for guess in sorted(batch.guesses, key=lambda guess: guess.estimate):
-            has_motion = self.is_satisfied or self._first_motion is not None
-            if has_motion or self._deadline.left > LITTLE_TIME or until.passed:
-                return
-            outcome = find_first_motion(guess, until)
-            if isinstance(outcome, FinishedCandidate) and outcome.is_settled:
-                self._first_motion = outcome
-            self._listener(outcome.describe())
-
-    def _take_first_motion(self) -> None:
-        """Take the first motion if no verified one is faster."""
-        first = self._first_motion
-        self._first_motion = None
-        if first is None:
-            return
-        self.candidates.append(first)
-        if self.best is None or self._merit(first) < self._merit(self.best):
-            self._keep(first)
 
     def _rank(self, batch: Batch) -> None:
         """Improve the joint paths of a batch, and rank them by their times."""
@@ -317,9 +295,13 @@ class Search:
             yield
         except KeyboardInterrupt:
             interrupts.clear()
-            is_pressed = True
-            self.interrupted = True
-        self._take_first_motion()
+            is_pressed = self.interrupted = True
+        first = self._first_motion
+        self._first_motion = None
+        if first is not None:
+            self.candidates.append(first)
+            if self.best is None or self._merit(first) < self._merit(self.best):
+                self._keep(first)
         if self.interrupted:
             # One of the fastest three that did not fail becomes the unverified motion.
             hopeful = [
@@ -406,8 +388,12 @@ class Search:
     @property
     def _latest(self) -> Deadline:
         """When the last work ends: a little later while nothing is verified."""
-        has_motion = self.is_satisfied or self._first_motion is not None
-        return self._deadline if has_motion else self._deadline.extend(_LATER)
+        return self._deadline if self._has_motion else self._deadline.extend(_LATER)
+
+    @property
+    def _has_motion(self) -> bool:
+        """Whether a verified motion is known, the first one included."""
+        return self.is_satisfied or self._first_motion is not None
 
     def _by_time(self, first: int = 0) -> list[int]:
         """Numbers, from `first` on, of the ranked candidates, that with the least time along its joint path first."""
@@ -512,8 +498,3 @@ class Search:
             return ""
         over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)
         return f"the best motion so far takes {self.best.t_end:.4f} s, and exceeds a limit by {over:.2g} % (unverified)"
-
-
-def round_end_time(time: float) -> float:
-    """Leave out the digits in which processes differ, so that these do not choose."""
-    return float(f"{time:.6g}")

@@ -204,6 +204,11 @@ class Candidate(Summary):
         return Candidate(**facts_of(self))
 
 
+def round_end_time(time: float) -> float:
+    """Leave out the digits in which processes differ, so that these do not choose."""
+    return float(f"{time:.6g}")
+
+
 def facts_of(candidate: Candidate) -> dict[str, Any]:
     """Return the fields that all candidates have, to be carried over from stage to stage."""
     names = (field.name for field in fields(Candidate))
