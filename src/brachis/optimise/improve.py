@@ -384,8 +384,12 @@ class SolverSession:
         return self._accept(report)
 
     def _goes_on(self, program: Program | PathProgram, x: np.ndarray) -> bool:
-        """Tell whether a point, (v,), is about as fast as the answer of the last solve, which gave a motion."""
-        if not self._last or not self._last[0].status.usable:
+        """Tell whether a point, (v,), is about as fast as the answer of the last solve, which gave a motion.
+
+        Not over the path, and not where the knots move: these solves end elsewhere without some values.
+        """
+        is_fixed = isinstance(program, Program) and not program.has_free_knots
+        if not (is_fixed and self._last and self._last[0].status.usable):
             return False
         return bool(np.isclose(program.objective(x), self._last[0].objective, _SAME))
 

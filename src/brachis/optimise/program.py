@@ -263,6 +263,11 @@ class Program(PhaseSequence[Phase], Summary):
         return sum(phase.intervals for phase in self.phases)
 
     @property
+    def has_free_knots(self) -> bool:
+        """Whether interval lengths are variables."""
+        return any(len(phase.grid.lower) for phase in self.phases)
+
+    @property
     def collocation_points(self) -> int:
         """Number of collocation points of all phases."""
         return sum(len(phase.t_norm) for phase in self.phases)

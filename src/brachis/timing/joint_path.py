@@ -35,6 +35,14 @@ def halfway(values: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * (values[1:] + values[:-1]))
 
 
+def to_stations(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Interpolate values known half-way between stations, (P - 1, c), at these, (P, c); steps are (P - 1, 1)."""
+    share = steps[1:] / (steps[1:] + steps[:-1])
+    with np.errstate(invalid="ignore"):
+        between = share * values[:-1] + (1.0 - share) * values[1:]
+    return np.concatenate([values[:1], between, values[-1:]])
+
+
 def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
     """Divide the steps between stations p, (P,), in which a joint path turns, by its derivatives there, (P, n).
 

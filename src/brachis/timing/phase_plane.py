@@ -31,7 +31,7 @@ import numpy as np
 from brachis import kernel
 from brachis.common.arrays import apply_each
 from brachis.limits import Limit
-from brachis.timing.joint_path import JointPath, Passage, Timing, halfway
+from brachis.timing.joint_path import JointPath, Passage, Timing, halfway, to_stations
 
 _TINY = 1e-9
 """Coefficients and slopes below this are taken for zero."""
@@ -257,7 +257,7 @@ class PhasePlane:
         floor, ceiling = kernel.bounds_of_pairs(*lines, _TINY)
         self._floor[own] = floor[inside]
         # The rows at the stations themselves keep u from swinging between its neighbours.
-        lines = _as_lines(*(_at_stations(part, steps) for part in (a, b, low, high)))
+        lines = _as_lines(*(to_stations(part, steps) for part in (a, b, low, high)))
         at_stations = kernel.bounds_of_pairs(*lines, _TINY)[1]
         last = end + 1 if end == len(self._steps) else end
         stations = slice(begin, last)
@@ -478,14 +478,6 @@ class PhasePlane:
             rates = np.full(len(self._steps), rate)
             self._linearise(Passage(self._middles, rates, np.zeros_like(rates)))
         return rate, label
-
-
-def _at_stations(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Interpolate values known half-way between stations, (P - 1, c), at these, (P, c); steps are (P - 1, 1)."""
-    share = steps[1:] / (steps[1:] + steps[:-1])
-    with np.errstate(invalid="ignore"):
-        between = share * values[:-1] + (1.0 - share) * values[1:]
-    return np.concatenate([values[:1], between, values[-1:]])
 
 
 def _not_too_slow(rate: np.ndarray) -> np.ndarray:
