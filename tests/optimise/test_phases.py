@@ -15,6 +15,7 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import BoundarySpline, EndCondition, sum_powers
 from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.path.time_law import TimeLaw
@@ -344,3 +345,15 @@ def test_a_motion_with_another_start(orders):
         other.control_points[:, orders:], motion.control_points[:, orders:]
     )
     assert np.abs(found[0][0] - motion.at(np.zeros(1))[0][0]).max() > 0.01
+
+
+def test_a_start_at_rest_has_equal_points_to_the_last_digit():
+    rng = np.random.default_rng(0)
+    for values in rng.uniform(-3.0, 3.0, (50, 2)):
+        breaks = np.union1d([0.0, 5e-5, 1.0], rng.uniform(1e-4, 1.0, 6))
+        knots = clamped_knots(3, breaks)
+        points = rng.uniform(-1.0, 1.0, (2, len(knots) - 4))
+        motion = Motion(0.25, knots, 3, points)
+        started = motion.with_start(np.array([values, [0.0, 0.0], [0.0, 0.0]]), [0, 1])
+        first = started.control_points[:, :3]
+        np.testing.assert_array_equal(first, np.repeat(values[:, None], 3, axis=1))

@@ -69,6 +69,7 @@ def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
     weights = weights[find_rows(program)]
 
     def value(program: Program, x: np.ndarray) -> float:
+        """Return the Lagrangian of a program at x, (v,), s."""
         program = program.with_phases(
             phase.with_limits([limit for limit in phase.limits if limit in limits])
             for phase in program.phases
@@ -182,6 +183,7 @@ def _speeds(problem: Problem) -> Iterator[Figure]:
     limits = problem.task.tool_limits
 
     def change(before: float, after: float) -> Problem:
+        """Pass the parts with one speed, m/s, at another one."""
         parts = tuple(
             part.model_copy(update={"speed": after}) if part.speed == before else part
             for part in limits.process_speed
@@ -219,6 +221,7 @@ def _blends(problem: Problem) -> Iterator[Figure]:
             groups[source if is_of_file else segment.blend].append(number)
 
     def change(numbers: list[int], before: float, after: float) -> Problem:
+        """Make the blends after some segments larger, as from one size to another, m."""
         path = list(segments)
         for number in numbers:
             size = (path[number].blend or 0.0) * after / before

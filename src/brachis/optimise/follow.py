@@ -29,8 +29,7 @@ from brachis.timing import Timing
 from brachis.timing.joint_path import halfway
 
 _FIRST_LOSS = 5.0
-"""What the intervals may lose together at first, as a multiple of what splines may lose: where accelerations are smooth
-their loss is overrated by this factor."""
+"""What intervals may lose together at first, over what splines may lose: smooth accelerations overrate it so much."""
 _SHARE = 0.5
 """Part of the tolerance that splines may lose; joint paths lose more."""
 _AIM = 0.7
@@ -232,8 +231,8 @@ def begin(
     x : (v,) ndarray
     """
     breaks = _knots(phase, phase_timing, timing, lost, _FIRST_WAIT, intervals)
-    laid = _lay_splines(phase, phase_timing, timing, breaks)
-    return _as_phase(phase, laid.motion, points)
+    motion = _lay_splines(phase, phase_timing, timing, breaks).motion
+    return _as_phase(phase, motion, points)
 
 
 def _knots(

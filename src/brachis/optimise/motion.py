@@ -106,7 +106,9 @@ class Motion(PhaseSpline):
         _, basis = local_basis(self.knots, self.degree, np.zeros(1))
         matrix = basis[: len(values), 0, : len(values)]
         points = self.control_points.copy()
-        first = np.linalg.solve(matrix, values * self.t_end**orders)
+        # Basis functions add up to 1: so derivatives of zero give points that are equal to the last digit.
+        slopes = np.concatenate([0.0 * values[:1], (values * self.t_end**orders)[1:]])
+        first = values[0] + np.linalg.solve(matrix, slopes)
         points[curves, : len(values)] = first.T
         return replace(self, control_points=points)
 
