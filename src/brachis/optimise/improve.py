@@ -374,7 +374,8 @@ class SolverSession:
         if isinstance(program, PathProgram) and is_large and self.for_large:
             solve = partial(solve_with, self.for_large)
             report = self._accept(solve_near_values(program, x, solve))
-            if report.status.usable:
+            # Its joint path is timed anew; an active-set method would work for ten times as long.
+            if report.status.usable or report.status is SolveStatus.ITERATION_LIMIT:
                 return report
         solve = partial(solve_with, self.backend)
         if self.backend.is_interior:
