@@ -67,7 +67,7 @@ def test_a_saved_motion_is_solved_again_by_phase(stopping):
         stopping.trajectory, reference=True, listener=lines.append
     )
     words = r"planning the motion again from itself: about (\S+) s, no more than 60 s"
-    assert 0.0 < float(re.match(words, lines[1])[1]) < 10.0
+    assert int(re.match(words, lines[1])[1]) >= 1
     assert any("iteration 1," in line for line in lines)
     assert "planning again with discontinuous torque" in lines
     now = brachis.bottleneck.report(stopping)

@@ -213,7 +213,7 @@ def report(
     seconds = _LOOKS * (time.perf_counter() - began)
     if candidate is None and ((costs is None and solve) or check or reference):
         longest = trajectory.task.search.time_limit
-        words = f"about {round(seconds, 1):g} s, no more than {longest:g} s"
+        words = f"about {math.ceil(seconds)} s, no more than {longest:g} s"
         listener(f"planning the motion again from itself: {words} (search.time_limit)")
         candidate = plan_again(
             trajectory, listener, families=families, own_limits=own_limits
