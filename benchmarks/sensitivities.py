@@ -7,7 +7,7 @@ Usage: python benchmarks/sensitivities.py [--only PART ...] [--first 0] [--count
 The paper's eight lines with every decomposition, the TX90L on its rail with every closed form, two examples more, and
 every kind of limit on three of the lines and on the TX90L. The derivative from the multipliers is compared with central
 differences, every limit 0.03 % wider and narrower, and what it promises for +1 % with solving again at +1 %. The latter
-differs by what is of second order, and by limits that take over within the step: the linearised problem knows these.
+differs by what is of second order, and by limits that take over within the step.
 
 The part ``seeded`` plans the tasks of `process_tasks`, all of them or `--count` from the number `--first` on. Of each
 it takes the costliest figures of three kinds, and a dwell, and changes them in the task by +1 %. It builds the program
@@ -248,7 +248,7 @@ class Compared:
         return (
             f"{limit} | {1e3 * entry.predicted:.4f} | {1e3 * self.central:.4f} | {100 * self.off:.2f} % "
             f"| {100 * self.nearer.deviation:.2f} % "
-            f"| {1e3 * entry.re_solved:.4f} | {100 * entry.deviation:.2f} % | {100 * entry.linearised_deviation:.2f} % "
+            f"| {1e3 * entry.re_solved:.4f} | {100 * entry.deviation:.2f} % "
             f"| {', '.join(marks)}"
         )
 
@@ -281,7 +281,6 @@ def worst(title: str, limits: list[Compared]) -> tuple[str, ...]:
     further = (
         ("nearer", "deviation"),
         ("at_step", "deviation"),
-        ("at_step", "linearised_deviation"),
     )
     solved = [
         [getattr(getattr(each, check), figure) for each in large]
@@ -664,7 +663,7 @@ def compare_parts(parts: Iterable[Any]) -> None:
         "off at +0.1 %",
         "at +1 % [ms]",
     )
-    columns += "off at +1 %", "linearised, off at +1 %", "marks", "residual"
+    columns += "off at +1 %", "marks", "residual"
     print(f"| {' | '.join(columns)} |\n{'|---' * len(columns)}|")
     began, by_kind = processor_time(), defaultdict[str, list[Compared]](list)
     for case in parts:
@@ -681,7 +680,6 @@ def compare_parts(parts: Iterable[Any]) -> None:
         "worst",
         "worst at +0.1 %",
         "worst at +1 %",
-        "worst linearised at +1 %",
     )
     print("\n" + "\n".join(" | ".join(row) for row in (columns, *rows)))
     print(
@@ -691,7 +689,7 @@ def compare_parts(parts: Iterable[Any]) -> None:
     about = (
         "Changes of the end time by more than 0.1 ms for a limit that is 1 % wider: the derivative from the "
         "multipliers beside central differences over 0.03 % either way, then beside solving again with the limit 0.1 % "
-        "and 1 % wider, and what the linearised problem says at 1 %."
+        "and 1 % wider."
     )
     save("What limits cost, beside solving again", columns, rows, about)
 

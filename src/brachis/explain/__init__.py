@@ -4,7 +4,6 @@ from brachis.explain.motion import explain_motion
 from brachis.explain.multipliers import (
     ActiveSet,
     Multipliers,
-    jacobian_matrix,
     multipliers_of,
 )
 from brachis.explain.sensitivities import LimitBound, figures_of, sensitivities_at
@@ -19,7 +18,6 @@ __all__ = [
     "Sensitivity",
     "explain_motion",
     "figures_of",
-    "jacobian_matrix",
     "multipliers_of",
     "sensitivities_at",
 ]

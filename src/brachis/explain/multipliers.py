@@ -16,33 +16,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.optimise.program import Program
 
-if TYPE_CHECKING:
-    from scipy import sparse
-
-
 _INDEPENDENT = 1e-9
 """Length of a slope, or of what is left of it without those before it, below which it is rounding."""
-
-
-def jacobian_matrix(program: Program, x: np.ndarray) -> sparse.csr_array:
-    """Differentiate the rows of a program at x, (v,): a matrix, (c, v).
-
-    Raises
-    ------
-    UnreachableError
-        A collocation point is out of the branch's reach.
-    """
-    from scipy import sparse
-
-    places = (program.jacobian_rows, program.jacobian_columns)
-    shape = (len(program.lower), len(x))
-    return sparse.coo_array((program.jacobian(x), places), shape=shape).tocsr()
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +57,13 @@ class ActiveSet:
         UnreachableError
             A collocation point is out of the branch's reach.
         """
+        from scipy import sparse
+
         values = program.rows(x)
-        jacobian = jacobian_matrix(program, x)
+        places = (program.jacobian_rows, program.jacobian_columns)
+        shape = (len(values), len(x))
+        entries = (program.jacobian(x), places)
+        jacobian = sparse.coo_array(entries, shape=shape).tocsr()
         low = np.flatnonzero(values <= program.lower + near)
         high = np.flatnonzero(values >= program.upper - near)
         rows = np.concatenate([low, high])

@@ -5,13 +5,7 @@ answer is an optimum if least squares find multipliers for it, whatever status t
 predicted, the unchanged problem is solved again from the new answer: the step may have led to another local optimum,
 which is not an effect of the limit.
 
-Multipliers are derivatives: they hold for steps so small that the same rows stay active. For a finite step, the problem
-linearised at its answer is solved with the raised limit, so that other rows can take over within the step:
-
-    minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
-
-Its optimum is not lower than what the multipliers promise, since they are feasible for its dual. The difference is the
-part of the promise that other limits take back.
+Multipliers are derivatives: within a finite step other limits may take over, and take back part of what they promise.
 """
 
 from __future__ import annotations
@@ -30,7 +24,6 @@ from brachis.explain import (
     Sensitivities,
     Sensitivity,
     figures_of,
-    jacobian_matrix,
     multipliers_of,
 )
 from brachis.limits.tool import PROCESS_SPEED
@@ -53,8 +46,6 @@ class CheckedSensitivity:
     sensitivity : Sensitivity
     predicted : float
         Change of t_E that the multipliers promise, s.
-    linearised : float
-        Change by `linearised_change`, which lets other limits take over within the step, s.
     re_solved : float
         Change found by solving again, s.
     other_optimum : float
@@ -66,7 +57,6 @@ class CheckedSensitivity:
 
     sensitivity: Sensitivity
     predicted: float
-    linearised: float
     re_solved: float
     other_optimum: float
     optimal: bool
@@ -74,12 +64,10 @@ class CheckedSensitivity:
     @property
     def deviation(self) -> float:
         """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 if neither changes."""
-        return _deviation(self.predicted, self.re_solved)
-
-    @property
-    def linearised_deviation(self) -> float:
-        """Deviation of `linearised`, likewise."""
-        return _deviation(self.linearised, self.re_solved)
+        if self.predicted == self.re_solved:
+            return 0.0
+        off = abs(self.predicted - self.re_solved)
+        return off / abs(self.re_solved) if self.re_solved else np.inf
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -89,21 +77,12 @@ class CheckedSensitivity:
             "kind": label.kind,
             "end": self.sensitivity.side,
             "predicted_s": self.predicted,
-            "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
             "other_optimum_s": self.other_optimum,
             "difference_s": self.predicted - self.re_solved,
             "deviation": self.deviation,
-            "linearised_deviation": self.linearised_deviation,
             "optimal": self.optimal,
         }
-
-
-def _deviation(predicted: float, found: float) -> float:
-    """How far a prediction is off, as a fraction of what was found; 0 if both are equal."""
-    if found == predicted:
-        return 0.0
-    return abs(predicted - found) / abs(found) if found else np.inf
 
 
 @dataclass(frozen=True, repr=False)
@@ -192,7 +171,7 @@ def check_sensitivities(
                 continue  # s(t) follows from the speed: no row of the program stands for it
             # If a limit changes nothing, the answer stays an optimum.
             if abs(entry.change(step)) <= 1e-9 * t_end(base):
-                same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True)
+                same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, optimal=True)
                 checked.append(same)
             else:
                 checked.append(_check_limit(entry, step, program, base, bounds))
@@ -212,9 +191,6 @@ def _check_limit(
     raised = program
     for limit, bound in bounds:
         raised = raised.relax(limit, bound, step * entry.full_scale)
-    linearised = linearised_change(raised, base)
-    if linearised is None:
-        linearised = predicted
     answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
     same = 1e-6 * t_end(base)  # end times of one optimum differ by less
@@ -228,45 +204,10 @@ def _check_limit(
     return CheckedSensitivity(
         sensitivity=entry,
         predicted=predicted,
-        linearised=linearised,
         re_solved=t_end(answer) - t_end(before),
         other_optimum=t_end(before) - t_end(base),
         optimal=optimal,
     )
-
-
-def linearised_change(program: Program, x: np.ndarray) -> float | None:
-    """Predict the change of t_E from the answer to a problem with less strict limits.
-
-    Parameters
-    ----------
-    program : Program
-        With the raised limit.
-    x : (v,) ndarray
-        Answer to the problem before.
-
-    Returns
-    -------
-    float or None
-        s; None if the linear program has no answer.
-
-    Raises
-    ------
-    UnreachableError
-        A collocation point is out of the branch's reach.
-    """
-    from scipy.optimize import Bounds, LinearConstraint, milp
-
-    rows = program.rows(x)
-    jacobian = jacobian_matrix(program, x)
-    limits = LinearConstraint(jacobian, program.lower - rows, program.upper - rows)
-    # Directions that change nothing to first order are not followed without end.
-    lowest = np.clip(program.x_lower - x, -1.0, 0.0)
-    highest = np.clip(program.x_upper - x, 0.0, 1.0)
-    bounds = Bounds(lowest, highest)
-    # SciPy's solver for sparse rows with two bounds; no variable is an integer.
-    step = milp(program.gradient(x), bounds=bounds, constraints=limits)
-    return float(step.fun) if step.success else None
 
 
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:

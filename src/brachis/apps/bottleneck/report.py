@@ -360,9 +360,6 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
             f"checked, {what} +{100.0 * check.step:g} %: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
         )
-        taken_back = abs(entry.linearised - entry.predicted)
-        if taken_back > 0.02 * abs(entry.predicted):
-            line += f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
         if entry.other_optimum:
             which = "faster" if entry.other_optimum < 0.0 else "slower"
             line += f"; from another local optimum, {1e3 * abs(entry.other_optimum):.2g} ms {which}"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.cells import cell_len
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
@@ -54,14 +54,13 @@ def print_table(
     console = result_console()
     cells = [[str(cell) for cell in row] for row in rows]
     least = []
-    most = []
     for i, name in enumerate(columns):
         texts = [row[i] for row in cells]
-        words = " ".join([name] if name in numbers else [name, *texts]).split()
-        whole = texts if name in numbers else []
-        shortened = (min(cell_len(word), 24) for word in words)  # longer ones break
-        least.append(max((1, *shortened, *map(cell_len, whole))))
-        most.append(max(map(cell_len, (name, *texts))))
+        is_number = name in numbers
+        words = " ".join([name] if is_number else [name, *texts]).split()
+        shortened = [min(cell_len(word), 24) for word in words]  # longer ones break
+        uncut = map(cell_len, texts if is_number else ())
+        least.append(max((1, *shortened, *uncut)))
     is_lined = sum(width + 3 for width in least) + 1 <= console.width
     parts = [[*range(len(columns))]]
     if not is_lined:
@@ -76,19 +75,16 @@ def print_table(
             padding=(0, 1),
             pad_edge=is_lined,
         )
-        free = console.width - (3 * len(part) + 1 if is_lined else 2 * len(part) - 2)
-        widths = _widths([least[i] for i in part], [most[i] for i in part], free)
-        for i, width in zip(part, widths, strict=True):
+        for i in part:
             is_number = columns[i] in numbers
-            table.add_column(
-                columns[i],
-                justify="right" if is_number else "left",
-                overflow="fold",
-                width=width if is_number else None,
-                max_width=width,
-            )
+            side: JustifyMethod = "right" if is_number else "left"
+            table.add_column(columns[i], justify=side, overflow="fold")
         for row in cells:
             table.add_row(*(row[i] for i in part))
+        unlimited = console.options.update_width(10_000)
+        if console.measure(table, options=unlimited).maximum > console.width:
+            for i, column in zip(part, table.columns, strict=True):
+                column.width = least[i] if columns[i] in numbers else None
         console.print(table)
 
 
@@ -102,17 +98,6 @@ def _split_columns(least: Sequence[int], width: int) -> list[list[int]]:
         else:
             parts[-1] = part
     return parts
-
-
-def _widths(least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
-    """Return a width for each column between what it needs and what it can use, the widest ones as narrow as needed."""
-    for widest in range(free, 0, -1):
-        widths = [
-            max(low, min(high, widest)) for low, high in zip(least, most, strict=True)
-        ]
-        if sum(widths) <= free:
-            return widths
-    return list(least)
 
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
