@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.common.arrays import spread
-from brachis.kinematics import DirectJointMap, JointState
+from brachis.kinematics import JointMap, JointState
 from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern, greville
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
@@ -29,7 +29,7 @@ from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
 
 
-class AllJointsMap(DirectJointMap):
+class AllJointsMap(JointMap):
     """y = (s, q) as a `JointMap`: the joints do not know of s.
 
     Parameters
@@ -38,7 +38,10 @@ class AllJointsMap(DirectJointMap):
     """
 
     def __init__(self, problem: Problem) -> None:
-        super().__init__(problem.robot, np.zeros(problem.robot.n))
+        self.robot = problem.robot
+        self.start = np.zeros(self.robot.n)
+        self.r = self.robot.n
+        self.redundant_joints = self.robot.joint_names
         self.path = problem.path
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:

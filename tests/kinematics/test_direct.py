@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kinematics import DirectJointMap
 from brachis.limits.safeguards import build_branch_margins
 from support.chains import planar_robot
+from support.direct_map import DirectJointMap
 
 
 def test_every_joint_is_a_curve():

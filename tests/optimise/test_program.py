@@ -13,7 +13,6 @@ import pytest
 from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER
 from brachis.explain import figures_of, multipliers_of, sensitivities_at
-from brachis.kinematics import DirectJointMap
 from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import Boundary, EndCondition
@@ -33,6 +32,7 @@ from brachis.optimise.refine import RefinementOptions, refine
 from brachis.robot import Robot
 from brachis.task import SplineSettings
 from support.chains import INERTIAL, Joint, chain_urdf
+from support.direct_map import DirectJointMap
 from support.jacobians import dense
 from support.phases import phase_of, reachable_points
 from support.solvers import INSTALLED

@@ -12,7 +12,6 @@ from brachis.kinematics.chart import (
 from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.kinematics.interpolation import Nodes, interpolate, join_nodes
 from brachis.kinematics.joint_map import (
-    DirectJointMap,
     JointDerivatives,
     JointMap,
     JointSpaceMap,
@@ -24,7 +23,6 @@ __all__ = [
     "ChartMap",
     "ChartRows",
     "ClosedFormMap",
-    "DirectJointMap",
     "JointDerivatives",
     "JointMap",
     "JointSpaceMap",
