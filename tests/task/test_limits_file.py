@@ -299,23 +299,13 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
     assert (
         robot_from_settings(loaded({**ur, "locked_joints": {"rail": 0.0}}).robot).n == 6
     )
-    with pytest.raises(
-        TaskError,
-        match=r"ur\.yaml: joint_limits: no entry for 'rail', by which the tool moves",
-    ):
-        loaded(ur)
+    robot = robot_from_settings(loaded(ur).robot)
+    assert robot.limits.velocity[0] == robot.urdf_limits[0].velocity
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (
-            ("  j2:", "  j4:"),
-            [
-                "joint_limits.yaml: joint_limits: there is no URDF joint named 'j4'",
-                "j1, j2, j3",
-            ],
-        ),
         (("  j2:", "  j1:"), ["line 14, column 3", "the key 'j1' occurs twice"]),
         (
             ("max_velocity: 2", "max_velocity: -2"),
@@ -411,12 +401,17 @@ def test_a_task_is_not_a_limits_file(loaded):
         loaded({"limits_file": "task.yaml"})
 
 
-def test_all_joints_that_a_file_leaves_out_are_named(loaded, tmp_path):
-    text = "joint_limits:\n  j2: {max_acceleration: 5}\n"
+def test_joints_that_a_file_of_moveit_leaves_out_have_the_limits_of_the_urdf(
+    loaded, tmp_path
+):
+    text = "joint_limits:\n  j2: {max_velocity: 5}\n"
     (tmp_path / "joint_limits.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(TaskError, match="no entry for 'j1', 'j3', by which the tool"):
-        loaded({"limits_file": "joint_limits.yaml"})
+    robot = robot_from_settings(loaded({"limits_file": "joint_limits.yaml"}).robot)
+    ours, _, theirs = robot.urdf_limits
+    expected = [ours.velocity, 5.0, theirs.velocity]
+    np.testing.assert_array_equal(robot.limits.velocity, expected)
     more = text + "".join(f"  {name}: {{max_velocity: 5}}\n" for name in ("j7", "j9"))
     (tmp_path / "joint_limits.yaml").write_text(more, encoding="utf-8")
-    with pytest.raises(UnknownNameError, match="no URDF joint named 'j7' or 'j9'"):
-        loaded({"limits_file": "joint_limits.yaml"})
+    task = loaded({"limits_file": "joint_limits.yaml"})
+    with pytest.raises(UnknownNameError, match="no joint named 'j7' or 'j9'"):
+        robot_from_settings(task.robot)

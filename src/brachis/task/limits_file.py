@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
-from brachis.common.files import check_kind, locate_urdf, read_text
-from brachis.errors import TaskError, check_names
+from brachis.common.files import check_kind, read_text
+from brachis.errors import TaskError
 from brachis.task.fields import (
     CheckedModel,
     Flag,
@@ -24,7 +24,7 @@ from brachis.task.fields import (
     merge,
     plain,
 )
-from brachis.task.limit_kinds import LIMIT_KINDS, LimitScale
+from brachis.task.limit_kinds import LimitScale
 from brachis.task.limit_models import (
     FROM_URDF,
     LimitSpec,
@@ -209,8 +209,6 @@ def with_limits_of_file(
     name = str(settings.limits_file)
     path = folder / name
     file = _read_file(path, f"{source}: robot.limits_file", folder, name)
-    if isinstance(file, RosLimitsFile) and settings.urdf is not None:
-        _check_joints(file, settings, folder, str(path))
     rest = {key: value for key, value in robot.items() if key != "limits_file"}
     limits = merge(file.by_kind(str(path)), own)
     return {**content, "robot": {**rest, "limits": limits}}
@@ -225,66 +223,3 @@ def _read_file(
     if isinstance(content, Mapping) and "joint_limits" in content:
         return validate(RosLimitsFile, content, str(path))
     return validate(LimitsFile, content, str(path))
-
-
-def _check_joints(
-    file: RosLimitsFile,
-    robot: RobotSettings,
-    folder: Path,
-    where: str,
-) -> None:
-    """Refuse joints that the URDF does not have, and joints that move the tool and have no limits there or in the task.
-
-    Raises
-    ------
-    UnknownNameError, TaskError
-    """
-    limited = sorted(file.joints)
-    urdf = Path(locate_urdf(str(robot.urdf), folder))
-    names, moving = _joints_of(urdf, robot.tool_frame, robot.base_frame)
-    if names:
-        check_names("URDF joint", limited, names, f"{where}: joint_limits")
-    stated = {*limited, *robot.locked_joints}
-    for kind in LIMIT_KINDS:
-        limits = getattr(robot.limits, kind)
-        if isinstance(limits, float | tuple):
-            return  # of all joints
-        if isinstance(limits, Mapping):
-            stated |= set(limits)
-    missing = [name for name in moving if name not in stated]
-    if missing:
-        raise TaskError(
-            f"no entry for {', '.join(map(repr, missing))}, by which the tool moves",
-            found=", ".join(limited),
-            where=f"{where}: joint_limits",
-            hint=f"Add what is missing, or state it in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
-        )
-
-
-def _joints_of(
-    urdf: Path, tool: str | None, base: str | None
-) -> tuple[list[str], list[str]]:
-    """Return the joints of a URDF, and those that move the tool.
-
-    Both are empty where the URDF cannot be read, which the robot says when it is made; the latter where the tool is
-    left open.
-    """
-    from lxml import etree
-
-    try:
-        tree = etree.parse(
-            str(urdf), etree.XMLParser(resolve_entities=False, recover=True)
-        )
-    except (OSError, ValueError, etree.XMLSyntaxError):
-        return [], []
-    joints = tree.getroot().findall("joint")
-    above = {joint.xpath("string(child/@link)"): joint for joint in joints}
-    leaves = set(above) - {joint.xpath("string(parent/@link)") for joint in joints}
-    link = leaves.pop() if tool is None and len(leaves) == 1 else tool
-    moving: list[str] = []
-    while link in above and link != base:
-        joint = above.pop(link)
-        link = joint.xpath("string(parent/@link)")
-        if joint.get("type") != "fixed":
-            moving.append(joint.get("name"))
-    return [joint.get("name") for joint in joints], moving[::-1]
