@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.common.arrays import spread
-from brachis.kinematics import JointMap, JointState
+from brachis.kinematics import JointDerivatives, JointMap, JointState
 from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern, greville
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
@@ -67,6 +67,11 @@ class AllJointsMap(JointMap):
         return JointState(
             self, y, ydot, yddot, ydddot, y[:, 1:], ydot[:, 1:], yddot[:, 1:], gradient
         )
+
+    def derivatives(self, state: JointState) -> JointDerivatives:
+        """See `JointMap`: all derivatives but the gradient vanish."""
+        zeros = np.zeros_like(state.gradient)
+        return JointDerivatives(zeros, zeros, zeros)
 
 
 class FullSpace:
