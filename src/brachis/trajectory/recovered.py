@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.common.arguments import number
+from brachis.common.arguments import number, numbers
 from brachis.common.arrays import freeze
 from brachis.errors import InputError
 from brachis.task.fields import Model
@@ -94,14 +94,22 @@ class Recovered:
         return {**self.to_dict(), **arrays}
 
     @classmethod
-    def of_file(cls, stored: StoredRecovery) -> Recovered:
-        """Take what `to_file` wrote.
+    def of_file(cls, stored: StoredRecovery, n: int) -> Recovered:
+        """Take what `to_file` wrote of a motion of `n` joints.
 
         Raises
         ------
         InputError
-            The tolerance is out of range.
+            The rows are not those of such a motion.
         """
-        rows = np.array(stored.rows)
+        rows = numbers(stored.rows, "recovered.rows", "s, then rad or m")
         error = np.array(stored.error)
+        fits = rows.shape == (len(rows), 1 + n) and len(rows) > 1
+        if not (fits and error.shape == (n,) and (np.diff(rows[:, 0]) > 0.0).all()):
+            raise InputError(
+                "not the rows of a file",
+                where="recovered",
+                found=f"rows {rows.shape}, error {error.shape}",
+                allowed=f"rows (K, {1 + n}) with ascending times, error ({n},)",
+            )
         return cls(stored.source, stored.tolerance, tuple(stored.told), rows, error)

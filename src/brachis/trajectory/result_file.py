@@ -212,7 +212,7 @@ def _build_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         "redundant_joints": tuple(meta.redundant_joints),
         "branch": meta.branch,
         "degree": meta.degree,
-        "recovered": recovered and Recovered.of_file(recovered),
+        "recovered": recovered and Recovered.of_file(recovered, robot.n),
         "own_limits": tuple(meta.own_limits),
         "sensitivities": meta.sensitivities
         and Sensitivities.of_file(meta.sensitivities),

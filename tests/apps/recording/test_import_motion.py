@@ -69,6 +69,8 @@ def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
     own = imported.recovered.to_file()
     wrong = {
         "the tolerance of a path is out of range": {"tolerance": 0.1},
+        "not the rows of a file; found rows ": {"rows": [[0.0, 1.0, 2.0, 3.0]]},
+        "error .4,.; allowed: rows .K, 4. with ascending times": {"error": [0.0] * 4},
         "recovered.rows: .*found 'none'": {"rows": "none"},
         "not a finite number": {
             "rows": [[0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 2.0, float("nan")]]
