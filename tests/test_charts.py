@@ -15,6 +15,7 @@ import brachis
 from brachis.errors import (
     DecompositionError,
     InputError,
+    ResultFileError,
     StartError,
 )
 from brachis.kinematics import ChartRows
@@ -22,7 +23,6 @@ from brachis.robot import task_map_of
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 from support.charts import jacobian
-from support.result_files import with_parts
 
 ROOT = Path(__file__).parents[1]
 START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
@@ -151,10 +151,66 @@ def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(
         assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-2, abs=1e-5)
 
 
+def with_arrays(path: Path, **changed: Any) -> None:
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    arrays |= {
+        name: change(arrays[name]) if callable(change) else change
+        for name, change in changed.items()
+    }
+    np.savez(path, **arrays)
+
+
+BROKEN = {
+    "rows NaN": {"chart_rows": lambda a: a * np.nan},
+    "rows of fewer joints": {"chart_rows": lambda a: a[:, :, 1:]},
+    "rows flat": {"chart_rows": lambda a: a.ravel()},
+    "rows a number": {"chart_rows": np.array(3.0)},
+    "rows text": {"chart_rows": np.array([[["a", "b", "c", "d"]]])},
+    "rows complex": {"chart_rows": lambda a: a + 1j},
+    "more rows": {"chart_rows": lambda a: np.repeat(a, 2, axis=1)},
+    "no rows": {"chart_rows": lambda a: a[:0]},
+    "several rows without knots": {"chart_rows": lambda a: np.repeat(a, 8, axis=0)},
+    "knots of constant rows": {"chart_knots": np.linspace(0.0, 1.0, 7)},
+    "knots without rows": {
+        "chart_rows": np.empty((0, 0, 0)),
+        "chart_knots": np.linspace(0.0, 1.0, 7),
+    },
+    "knots a number": {"chart_knots": np.array(0.5)},
+    "knots text": {"chart_knots": np.array(["a", "b"])},
+    "knots descending": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.linspace(1.0, 0.0, 14),
+    },
+    "knots infinite": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(5), [np.inf]]),
+    },
+    "splines with knots of text": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.array(["a"] * 14),
+    },
+    "knots all the same": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.zeros(14),
+    },
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_chart_is_refused(case, saved):
+    with_arrays(saved, **BROKEN[case])
+    with pytest.raises(
+        ResultFileError, match=r"the result file is broken|not a brachis result"
+    ) as caught:
+        Trajectory.load(saved)
+    assert caught.value.where == str(saved)
+
+
 def test_a_chart_that_is_not_broken_is_read(saved):
     """The same rows as splines."""
     knots = np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(6)])
-    with_parts(saved, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots)
+    with_arrays(saved, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots)
     assert len(Trajectory.load(saved).chart_knots) == 14
 
 

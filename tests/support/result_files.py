@@ -6,14 +6,9 @@ import json
 
 import numpy as np
 
-from brachis.trajectory.result_file import ARRAYS, digest_of
 
-
-def with_parts(path, *, is_signed=True, **parts):
-    """Rewrite a result file with other parts; where it is signed with their digest.
-
-    ``task__robot__urdf`` is meta["task"]["robot"]["urdf"].
-    """
+def with_parts(path, **parts):
+    """Rewrite a result file with other parts; ``task__robot__urdf`` is meta["task"]["robot"]["urdf"]."""
     with np.load(path) as archive:
         contents = dict(archive)
     meta = json.loads(str(contents["meta"]))
@@ -29,9 +24,6 @@ def with_parts(path, *, is_signed=True, **parts):
         place[last] = change(place.get(last))
     if "meta" not in parts:
         contents["meta"] = np.array(json.dumps(meta))
-    if is_signed and contents["meta"] is not None:
-        arrays = {name: contents[name] for name in ARRAYS}
-        contents["digest"] = np.array(digest_of(contents["meta"], arrays))
     np.savez(
         path, **{name: value for name, value in contents.items() if value is not None}
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from brachis.errors import ResultFileError
 from brachis.trajectory import (
     PHASE_COLUMNS,
     PhaseSpline,
@@ -15,6 +16,7 @@ from brachis.trajectory import (
     phase_rows,
 )
 from support.gantry import DWELL, SPEED, SPLINES, gantry_motion
+from support.result_files import with_parts
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +110,26 @@ def test_a_file_has_the_phases(motion, tmp_path):
     again = Trajectory.load(tmp_path / "result.npz")
     np.testing.assert_array_equal(again.phase_ends, motion.phase_ends)
     assert again.phases == motion.phases
+
+
+WRONG = {
+    "an end fewer": {"phase_ends": lambda ends: ends[1:]},
+    "an end moved": {"phase_ends": lambda ends: ends + 1e-6 * (ends < 1.2)},
+    "ends descending": {"phase_ends": lambda ends: ends[[1, 0, 2, 3, 4]]},
+    "knots once less": {
+        "knots": lambda knots: np.sort(np.append(np.delete(knots, 6), 0.1))
+    },
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_file_with_other_phases_than_knots(case, motion, tmp_path):
+    motion.save(tmp_path / "result.npz")
+    with_parts(tmp_path / "result.npz", **WRONG[case])
+    with pytest.raises(
+        ResultFileError, match=r"phase_ends: not the ends|internal knots are repeated"
+    ):
+        Trajectory.load(tmp_path / "result.npz")
 
 
 def test_one_phase_has_its_own_knots():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import os
@@ -16,6 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from pydantic import Field, ValidationError
 
+from brachis.common import tolerances
 from brachis.common.files import (
     BEGINNINGS,
     Kind,
@@ -28,12 +28,13 @@ from brachis.errors import InputError, ResultFileError
 from brachis.robot import bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import load_task
-from brachis.task.fields import Model
+from brachis.task.fields import LARGEST, Model
 from brachis.task.messages import task_error
+from brachis.trajectory.phases import find_phase_knots
 from brachis.trajectory.recovered import Recovered, StoredRecovery
 from brachis.trajectory.sensitivities import Sensitivities
 
-SCHEMA = 5
+SCHEMA = 4
 ARRAYS = (
     "times",
     "q",
@@ -51,6 +52,8 @@ _MOST_BYTES = 128_000_000
 """Largest size of a result file, and of what it holds unpacked."""
 _MOST_NODES = 500_000
 """Largest number of nodes of a motion: they bound the time that its verification takes."""
+_HIGHEST_DEGREE = 7
+"""Highest degree of splines, as in tasks."""
 _BROKEN = (
     OSError,
     ValueError,
@@ -98,32 +101,17 @@ def write_result(
     check_suffix(
         path, ".npz", "brachis.export.write writes tables and formats of controllers"
     )
-    count = arrays["times"].size
-    if count > _MOST_NODES:
-        raise InputError(
-            "the motion has too many nodes",
-            where="times",
-            found=count,
-            allowed=f"at most {_MOST_NODES}; import fewer rows, or a part of them",
-        )
-    text = np.array(json.dumps({"schema": SCHEMA, **meta}))
-    digest = np.array(digest_of(text, arrays))
-    contents: dict[str, Any] = {"meta": text, **arrays, "digest": digest}
+    _check_nodes(arrays["times"])
+    contents: dict[str, Any] = {
+        "meta": np.array(json.dumps({"schema": SCHEMA, **meta})),
+        **arrays,
+    }
     with atomic_write(path, BEGINNINGS[".npz"]) as stream:
         np.savez(stream, **contents)
 
 
-def digest_of(text: np.ndarray, arrays: Mapping[str, np.ndarray]) -> str:
-    """Return the SHA-256 of the metadata as text and of the arrays, by which a file is known that was changed."""
-    digest = hashlib.sha256()
-    for name, part in {"meta": text, **arrays}.items():
-        digest.update(f"{name} {part.dtype} {part.shape} ".encode())
-        digest.update(part.tobytes())
-    return digest.hexdigest()
-
-
 def read_result(path: Path) -> dict[str, Any]:
-    """Read a result file; return the arguments of a `Trajectory`.
+    """Read and check a result file; return the arguments of a `Trajectory`.
 
     Raises
     ------
@@ -154,7 +142,7 @@ def read_result(path: Path) -> dict[str, Any]:
             hint="Plan again, or load the file with the release that wrote it",
         )
     try:
-        return _build_parts(_Meta.model_validate(meta), arrays)
+        return _check_parts(_Meta.model_validate(meta), arrays)
     except (ValidationError, InputError) as error:
         found: Exception = error
         if isinstance(error, ValidationError):
@@ -180,36 +168,59 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
         )
     stream.seek(0)
     with np.load(stream, allow_pickle=False) as archive:
-        text = archive["meta"]
-        meta = json.loads(str(text))
+        meta = json.loads(str(archive["meta"]))
         if not isinstance(meta, dict):
             raise TypeError("the metadata are not a mapping")
-        if meta.get("schema") != SCHEMA:
-            return meta, {}
-        arrays = {name: np.asarray(archive[name]) for name in ARRAYS}
-        if str(archive["digest"]) != digest_of(text, arrays):
-            raise ValueError("the content is not what was saved")
+        ours = meta.get("schema") == SCHEMA
+        arrays = {name: archive[name] for name in ARRAYS if ours}
+    for name, array in arrays.items():
+        if not isinstance(array, np.ndarray):  # of a member without the suffix .npy
+            raise TypeError(f"{name} is not an array")
     return meta, arrays
 
 
-def _build_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Make the robot and the task; return the arguments of a `Trajectory`."""
+def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Check that the parts fit each other; return the arguments of a `Trajectory`."""
     task = load_task(meta.task)
     robot = robot_from_settings(task.robot, urdf_text=meta.urdf)
     robot, _ = bind(robot, task.task_space, task.tolerances)
-    if meta.joint_names != list(robot.joint_names):
-        raise InputError(
-            "the joints are not those of the URDF",
-            where="joint_names",
-            found=meta.joint_names,
-            allowed=robot.joint_names,
+    _refuse_unless(
+        meta.joint_names == list(robot.joint_names),
+        "joint_names",
+        "the joints are not those of the URDF",
+        meta.joint_names,
+        robot.joint_names,
+    )
+    for given in (task.joints_at("start"), task.joints_at("end")):
+        if given:
+            robot.posture(given[0], f"task.{given[1]}")
+    redundant = [name for name in robot.joint_names if name in meta.redundant_joints]
+    _refuse_unless(
+        meta.redundant_joints == redundant,
+        "redundant_joints",
+        "unknown joints",
+        meta.redundant_joints,
+        f"some of {', '.join(robot.joint_names)}, in this order",
+    )
+    for name, array in arrays.items():
+        _refuse_unless(
+            array.dtype.kind in "fiu" and (np.abs(array) <= LARGEST).all(),
+            name,
+            "some numbers are not finite or are too large",
+            array,
+            f"numbers between -{LARGEST:g} and {LARGEST:g}",
         )
+    arrays = {name: array.astype(float) for name, array in arrays.items()}
+    r = _redundancy(
+        arrays["chart_rows"], arrays["chart_knots"], robot.n, len(redundant)
+    )
+    _check_arrays(arrays, robot.n, r, meta.degree)
     recovered = meta.recovered
     return {
         "task": task,
         "urdf": meta.urdf,
         "robot": robot,
-        "redundant_joints": tuple(meta.redundant_joints),
+        "redundant_joints": tuple(redundant),
         "branch": meta.branch,
         "degree": meta.degree,
         "recovered": recovered and Recovered.of_file(recovered, robot.n),
@@ -218,3 +229,109 @@ def _build_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         and Sensitivities.of_file(meta.sensitivities),
         **arrays,
     }
+
+
+def _refuse_unless(
+    fits: bool | np.bool_, where: str, problem: str, found: object, allowed: object
+) -> None:
+    if fits:
+        return
+    if isinstance(found, np.ndarray):
+        found = f"an array of {found.dtype}, {found.shape}, that begins with {found.ravel()[:4].tolist()}"
+    raise InputError(problem, where=where, found=found, allowed=allowed)
+
+
+def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
+    """Degree of redundancy, from a checked chart or else from the joints that are named."""
+    if rows.shape[:1] == (0,) and not knots.size:
+        return named
+    degree = 5
+    fits = rows.ndim == 3 and rows.shape[2] == n + 1
+    if fits:  # the chart's reference begins at s = 0 and ends at 1 to rounding
+        count = len(rows) + degree + 1 if len(rows) != 1 else 0
+        rounded = np.round(knots, 9)
+        fits = knots.shape == (count,) and (not count or _are_knots(rounded, degree))
+    _refuse_unless(
+        fits,
+        "chart_rows",
+        "the rows and knots of the chart do not fit each other or the robot",
+        f"{rows.shape}, knots {knots.shape}",
+        f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 if B is not 1",
+    )
+    _refuse_unless(
+        named in (0, rows.shape[1]),
+        "redundant_joints",
+        "the joints are not those of the chart",
+        named,
+        rows.shape[1],
+    )
+    return int(rows.shape[1])
+
+
+def _are_knots(knots: np.ndarray, degree: int) -> bool:
+    """Return whether these are the knots of splines of a degree over [0, 1]."""
+    outer = degree + 1
+    if not 1 <= degree <= _HIGHEST_DEGREE or knots.ndim != 1 or len(knots) < 2 * outer:
+        return False
+    ends = not knots[:outer].any() and (knots[-outer:] == 1.0).all()
+    return bool(ends and (np.diff(knots) >= 0.0).all())
+
+
+def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
+    """Check shapes and order; pieces and intervals that are too short are lost in rounding."""
+    times = arrays["times"]
+    knots = arrays["knots"]
+    shortest = tolerances.TIME
+    _check_nodes(times)
+    begins = times.ndim == 1 and len(times) > 1 and times[0] == 0.0
+    _refuse_unless(
+        begins and (np.diff(times) >= shortest).all(),
+        "times",
+        "not times",
+        times,
+        f"ascending numbers from 0, at least {shortest:g} s apart",
+    )
+    _refuse_unless(
+        _are_knots(knots, degree),
+        "knots",
+        f"not the knots of a spline of degree {degree}",
+        knots,
+        f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_HIGHEST_DEGREE}",
+    )
+    inner = knots[degree : len(knots) - degree]
+    ends = knots[find_phase_knots(knots, degree)]
+    gaps = np.diff(inner)
+    _refuse_unless(
+        ((gaps >= shortest) | np.isin(inner[1:], ends) & (gaps == 0.0)).all(),
+        "knots",
+        "internal knots are repeated",
+        knots,
+        f"every internal knot once, at least {shortest:g} apart, or degree + 1 times where phases meet",
+    )
+    phase_ends = arrays["phase_ends"]
+    fits = phase_ends.shape == (len(ends) - 1,) and phase_ends[-1] == times[-1]
+    _refuse_unless(
+        fits
+        and np.isin(phase_ends, times).all()
+        and (np.abs(phase_ends / times[-1] - ends[1:]) <= shortest).all(),
+        "phase_ends",
+        "not the ends of the phases",
+        phase_ends,
+        "times of nodes, where knots are repeated; the last one is the end time",
+    )
+    shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
+    shapes["control_points"] = (1 + r, len(knots) - degree - 1)
+    for name, shape in shapes.items():
+        found = arrays[name].shape
+        _refuse_unless(found == shape, name, "wrong shape", found, shape)
+
+
+def _check_nodes(times: np.ndarray) -> None:
+    """Refuse motions of so many nodes that they are not verified."""
+    _refuse_unless(
+        times.size <= _MOST_NODES,
+        "times",
+        "the motion has too many nodes",
+        times.size,
+        f"at most {_MOST_NODES}; import fewer rows, or a part of them",
+    )
