@@ -37,7 +37,7 @@ from brachis.robot.from_task import robot_for
 from brachis.search import guesses, pipeline, screening
 from brachis.search.joint_path import JointPath, sampling_box
 from brachis.search.over_path import CHARTS
-from brachis.search.stages import RankedCandidate
+from brachis.search.stages import Marks, RankedCandidate
 from brachis.search.stations import spread_stations
 from brachis.task import Task, load_task
 from committed import processor_time, save
@@ -167,7 +167,7 @@ def restart(content: Any) -> tuple[float, list[float]]:
         guess = replace(improved_guess, solver=solver)
         candidate = pipeline.rank_candidate(guess, NEVER, ignore)
         if isinstance(candidate, RankedCandidate):
-            outcome = pipeline.finish_candidate(candidate, np.inf, NEVER, ignore)
+            outcome = pipeline.finish_candidate(candidate, Marks(), NEVER, ignore)
             if outcome.is_settled:
                 best = min(best, outcome.t_end)
     return best, [improved_guess.estimate for improved_guess in improved]

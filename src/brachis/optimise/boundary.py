@@ -13,7 +13,7 @@ linear in the control points too (see `periodic`). Boundary conditions therefore
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -308,17 +308,6 @@ class Boundary:
             for values in (start, end)
         ]
         return cls(sides[0], sides[1], periodic)
-
-    def up_to_velocity(self) -> Boundary:
-        """Return the conditions without derivatives above the first."""
-        sides = [
-            tuple(
-                replace(condition, derivatives=condition.derivatives[:1])
-                for condition in side
-            )
-            for side in (self.start, self.end)
-        ]
-        return replace(self, start=sides[0], end=sides[1])
 
     @property
     def law_curves(self) -> int:

@@ -263,8 +263,8 @@ _PROGRESS = 1e-4
 equally fast."""
 
 _NEARLY = 0.05
-"""Violation that an answer over the path may have: its joint path is timed anew. With 0.01 active sets worked for 11 s on
-a program that an interior-point method had left at 0.03."""
+"""Violation that an answer over the path may have: its joint path is timed anew. With 0.01 active sets worked for 11 s
+on a program that an interior-point method had left at 0.03."""
 _SAME = 1e-3
 """Part of the time by which an answer may get longer over other knots or points."""
 

@@ -130,12 +130,6 @@ class VariableLayout:
         Of all curves, by all variables; see `stack_splines`.
     fixed_terms : (1 + p, c (N + d)) ndarray
         Fixed terms of all control points, by powers of the duration.
-    sparsity : SparsityPattern
-        Where the variables of the curves matter.
-    point, variable : (z,) int ndarray
-        Where variables matter at all, by T, by each curve, then by h.
-    pattern : CurvePattern
-        Point and curve of each entry between those of T and h.
     progress : Progress
         Differences of control points of s; empty without a path.
     x_lower, x_upper : (v,) ndarray
@@ -173,17 +167,36 @@ class VariableLayout:
         points = len(grid.breaks) - 1 + grid.degree
         stacked = stack_splines(splines, self.slices, points, len(self.x_lower))
         self.free_matrix, self.fixed_terms = stacked
+        self._grid = grid
+        self._law_curves = boundary.law_curves
+
+    @cached_property
+    def sparsity(self) -> SparsityPattern:
+        """Where the variables of the curves matter; of splines along a timing nobody asks."""
+        grid = self._grid
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
-        sparsity = SparsityPattern(columns, self.free_matrix, len(splines))
-        self.sparsity = sparsity
-        count = len(grid.t_norm)
-        of_time = np.zeros(count, dtype=int)
-        of_lengths = grid.variable + self.lengths.start
-        self.point = np.concatenate([np.arange(count), sparsity.point, grid.point])
-        self.variable = np.concatenate([of_time, sparsity.variable, of_lengths])
-        curve = boundary.law_curves + sparsity.curve
-        width = boundary.law_curves + len(splines)
-        self.pattern = CurvePattern(sparsity.point, curve, count, width)
+        return SparsityPattern(columns, self.free_matrix, len(self.splines))
+
+    @cached_property
+    def point(self) -> np.ndarray:
+        """Points, (z,), at which variables matter: T, those of each curve, then h."""
+        own = np.arange(len(self._grid.t_norm))
+        return np.concatenate([own, self.sparsity.point, self._grid.point])
+
+    @cached_property
+    def variable(self) -> np.ndarray:
+        """Variables, (z,), that matter at these."""
+        of_time = np.zeros(len(self._grid.t_norm), dtype=int)
+        of_lengths = self._grid.variable + self.lengths.start
+        return np.concatenate([of_time, self.sparsity.variable, of_lengths])
+
+    @cached_property
+    def pattern(self) -> CurvePattern:
+        """Point and curve of each entry between those of T and h."""
+        curve = self._law_curves + self.sparsity.curve
+        width = self._law_curves + len(self.splines)
+        count = len(self._grid.t_norm)
+        return CurvePattern(self.sparsity.point, curve, count, width)
 
     def names(self, curves: Sequence[str]) -> list[str]:
         """Name the variables: ``t_end`` is the duration, ``s[3]`` control point 3 of s, ``h[0]`` a length.
@@ -215,8 +228,6 @@ class RowLayout:
 
     Attributes
     ----------
-    of_limits : list of (K, c) int ndarray
-        Numbers of the rows of each limit; none, (0, c), where its means are held.
     lower, upper : (c,) ndarray
         Bounds of the rows.
     """
@@ -225,20 +236,26 @@ class RowLayout:
         self, limits: Sequence[Limit], grid: FixedGrid, variables: VariableLayout
     ) -> None:
         self._variables = variables
-        self.of_limits = []
+        self._shapes = []
         lower = []
         upper = []
-        first = 0
         for limit in limits:
             times = 0 if limit.guarantee.is_mean else len(grid.t_norm)
             lower.append(np.tile(limit.lower, times))
             upper.append(np.tile(limit.upper, times))
-            rows = first + np.arange(len(lower[-1]))
-            self.of_limits.append(rows.reshape(times, len(limit.lower)))
-            first += len(rows)
+            self._shapes.append((times, len(limit.lower)))
         steps = variables.progress.fixed_terms.shape[1]
         self.lower = np.concatenate([*lower, np.zeros(steps), grid.total])
         self.upper = np.concatenate([*upper, np.full(steps, np.inf), grid.total])
+
+    @cached_property
+    def of_limits(self) -> list[np.ndarray]:
+        """Numbers of the rows of each limit, (K, c) each; none, (0, c), where its means are held."""
+        ends = np.cumsum([times * count for times, count in self._shapes])
+        return [
+            np.arange(end - times * count, end).reshape(times, count)
+            for end, (times, count) in zip(ends, self._shapes, strict=True)
+        ]
 
     @cached_property
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:

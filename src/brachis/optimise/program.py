@@ -442,13 +442,6 @@ class Program(PhaseSequence[Phase], Summary):
         )
         return fixed, fixed.variables_from(self.motions(x))
 
-    def without_orders_above(self, order: int) -> Program:
-        """Return the same program without limits that ask for a higher derivative; x keeps its meaning."""
-        return self.with_phases(
-            phase.with_limits([limit for limit in phase.limits if limit.order <= order])
-            for phase in self.phases
-        )
-
     def with_margin(self, margin: float) -> Program:
         """Return the same program with another least branch margin; x keeps its meaning."""
         return self.with_phases(phase.with_margin(margin) for phase in self.phases)

@@ -52,6 +52,7 @@ from brachis.search.stages import (
     Candidate,
     FinishedCandidate,
     InitialGuess,
+    Marks,
     RankedCandidate,
     begin_candidate,
     fail,
@@ -65,7 +66,7 @@ _IF_SHORT = 0.2
 """The same where splines are laid in little time, which takes half a second. With 0.5 they were laid too late."""
 
 _MOST_GAINED = 0.05
-"""Part of the time that more knots gain at most: 4.6 % on a path with jerk limits, 0.03 to 2.6 % on thirteen others."""
+"""Part of the time that more knots, or other coordinates, gain at most: 4.6 % on a path with jerk limits."""
 
 
 def rank_candidate(
@@ -100,15 +101,15 @@ def rank_candidate(
 
 
 def finish_candidate(
-    candidate: RankedCandidate, to_beat: float, deadline: Deadline, listener: Listener
+    candidate: RankedCandidate, to_beat: Marks, deadline: Deadline, listener: Listener
 ) -> Candidate:
     """Improve a candidate as far as the time allows, and verify it.
 
     Parameters
     ----------
     candidate : RankedCandidate
-    to_beat : float
-        End time over all knots, s, from which on it is not refined: another motion is as fast.
+    to_beat : Marks
+        Of the fastest motion so far.
     deadline : Deadline
     listener : callable
 
@@ -134,7 +135,7 @@ def _finish_over_time(
     candidate: RankedCandidate,
     session: SolverSession,
     options: RefinementOptions,
-    to_beat: float,
+    to_beat: Marks,
 ) -> Candidate:
     """Solve over time, choose coordinates and knots, refine and verify."""
     guess = candidate.guess
@@ -148,9 +149,11 @@ def _finish_over_time(
     if not solved.usable:
         words = solved.report.status.name.lower().replace("_", " ")
         return fail(candidate, words, solved.reports)
-    if solved.t_end >= to_beat * (1.0 + _MOST_GAINED):
+    if spline.intervals == "auto":
+        candidate = replace(candidate, begun=solved.t_end)
+    if solved.t_end >= min(to_beat.begun, to_beat.adapted * (1.0 + _MOST_GAINED)):
         reports = (*candidate.reports, *solved.reports)
-        return replace(candidate, status=SLOW, adapted=solved.t_end, reports=reports)
+        return replace(candidate, status=SLOW, reports=reports)
     # Many knots are reached from few.
     target = solved.program if spline.intervals == "auto" else program
     has_given_knots = spline.intervals != "auto" and spline.knots != "free"
@@ -167,7 +170,7 @@ def _finish_over_time(
     candidate = replace(candidate, not_completed="; ".join(undone))
     if adapted.usable:
         candidate = replace(candidate, adapted=adapted.t_end)
-        if adapted.t_end >= to_beat:
+        if adapted.t_end >= to_beat.adapted:
             return replace(candidate, status=SLOW, reports=adapted.reports)
     return _refine(candidate, adapted, session, options)
 
@@ -176,7 +179,7 @@ def _finish_over_path(
     candidate: RankedCandidate,
     session: SolverSession,
     options: RefinementOptions,
-    to_beat: float,
+    to_beat: Marks,
 ) -> Candidate:
     """Improve joint paths further over the path, then over time, and follow the faster one's timing.
 
@@ -193,7 +196,7 @@ def _finish_over_path(
     reports = (*reports, *retimed.reports)
     least = retimed.t_end + guess.problem.dwell_time
     candidate = replace(candidate, adapted=least, reports=reports)
-    if to_beat <= least < np.inf:
+    if to_beat.adapted <= least < np.inf:
         return replace(candidate, status=SLOW)
     longest = least + tolerance * retimed.t_end
     motions = []

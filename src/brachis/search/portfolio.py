@@ -45,8 +45,10 @@ from brachis.search.stages import (
     Candidate,
     FinishedCandidate,
     InitialGuess,
+    Marks,
     RankedCandidate,
     begin_candidate,
+    fail,
     round_end_time,
 )
 from brachis.trajectory import Trajectory
@@ -129,7 +131,7 @@ class Search:
         self._finished: list[RankedCandidate] = []
         self._first_motion: FinishedCandidate | None = None
         self._least_ratio = 0.0
-        self._to_beat = np.inf
+        self._to_beat = Marks()
 
     @property
     def is_satisfied(self) -> bool:
@@ -270,14 +272,10 @@ class Search:
                         return
                     budget -= 1
                     candidate = outcome
-                    if self._to_beat <= outcome.adapted < np.inf:
-                        # Over all knots it is slower than what was verified meanwhile.
-                        candidate = replace(
-                            self._ranked[number],
-                            adapted=outcome.adapted,
-                            reports=outcome.reports,
-                            status=SLOW,
-                        )
+                    if self._to_beat.beat(outcome):
+                        slow = fail(outcome, SLOW)
+                        joints = self._ranked[number].redundant_joints
+                        candidate = replace(slow, redundant_joints=joints)
                     self._finish(number, candidate)
                     self._listener(candidate.describe())
 
@@ -313,7 +311,7 @@ class Search:
                 if self.best is None:
                     ranked = self._ranked[number]
                     candidate = pipeline.finish_candidate(
-                        ranked, np.inf, Deadline(0.0), ignore
+                        ranked, Marks(), Deadline(0.0), ignore
                     )
                     self._finish(number, candidate)
         if is_pressed and not self.is_satisfied:
@@ -456,7 +454,7 @@ class Search:
         """Tell whether a candidate may be faster than the best motion."""
         if self.best is None or not self.is_satisfied:
             return True
-        is_fast = candidate.estimate * self._least_ratio < self._to_beat
+        is_fast = candidate.estimate * self._least_ratio < self._to_beat.adapted
         return is_fast and not self._is_known(candidate)
 
     def _keep(self, candidate: FinishedCandidate) -> None:
@@ -466,7 +464,9 @@ class Search:
             is_patient = self._problem.task.search.effort == "exhaustive"
             usual = (1.0 - (0.0 if is_patient else _REFINED)) * candidate.t_end
             least = min(max(candidate.adapted, usual), candidate.t_end)
-            self._to_beat = min(self._to_beat, (1.0 - tolerances.GAIN) * least)
+            least = min(self._to_beat.adapted, (1.0 - tolerances.GAIN) * least)
+            begun = np.inf if is_patient else min(self._to_beat.begun, candidate.begun)
+            self._to_beat = Marks(begun, least)
 
     def _is_known(self, candidate: RankedCandidate) -> bool:
         """Tell whether a motion along the same joint path is known, in the same coordinates."""

@@ -143,6 +143,8 @@ class Candidate(Summary):
         See `InitialGuess`. It ranks candidates.
     status : str
         In plain words.
+    begun : float
+        End time over the first knots of a mesh, s; infinite where there was none.
     adapted : float
         End time over all knots, before refinement, s; infinite where there was no such program.
     reports : tuple of SolverReport
@@ -162,6 +164,7 @@ class Candidate(Summary):
     solver: str
     estimate: float
     status: str
+    begun: float = np.inf
     adapted: float = np.inf
     reports: tuple[SolverReport, ...] = ()
 
@@ -202,6 +205,27 @@ class Candidate(Summary):
     def without_program(self) -> Candidate:
         """Return what is said of it, without what only the search needs."""
         return Candidate(**facts_of(self))
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What a candidate has to beat, s; infinite while no motion is verified.
+
+    Attributes
+    ----------
+    begun : float
+        End time over the first knots. More knots gain about as much of every motion.
+    adapted : float
+        End time over all knots, from which on a motion is not refined.
+    """
+
+    begun: float = np.inf
+    adapted: float = np.inf
+
+    def beat(self, candidate: Candidate) -> bool:
+        """Tell whether a candidate is no faster over the same knots."""
+        is_slow = self.begun <= candidate.begun < np.inf
+        return is_slow or self.adapted <= candidate.adapted < np.inf
 
 
 def round_end_time(time: float) -> float:

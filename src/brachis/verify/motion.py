@@ -12,6 +12,7 @@ does.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -196,10 +197,10 @@ class MotionStates:
         piece = np.concatenate([part.piece for part in parts])
         return cls(parts[0].pieces, piece, np.concatenate([part.u for part in parts]))
 
-    def split(self) -> list[MotionStates]:
-        """Divide the states into parts that take little memory."""
-        begins = range(0, max(len(self.u), 1), _AT_ONCE)
-        return [self.only(slice(begin, begin + _AT_ONCE)) for begin in begins]
+    def split(self) -> Iterator[MotionStates]:
+        """Yield the states in parts that take little memory."""
+        for begin in range(0, max(len(self.u), 1), _AT_ONCE):
+            yield self.only(slice(begin, begin + _AT_ONCE))
 
     @cached_property
     def t(self) -> np.ndarray:

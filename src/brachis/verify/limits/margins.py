@@ -84,7 +84,7 @@ def _worst_singularity(given: Given) -> Worst | None:
 def _worst_joint_end(given: Given) -> Worst | None:
     """Find the largest ratio of how far a joint is from the middle of its range to what is wanted."""
     share = given.task.margins.joint_ends
-    names = _parts_of_ranges(given, given.states)[1]
+    _, names = _parts_of_ranges(given, given.states.only([0]))
     if share is None or not names:
         return None
 
