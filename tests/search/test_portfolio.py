@@ -36,7 +36,14 @@ from brachis.search.failure import explain_reach
 from brachis.search.guesses import SEARCH_LEVELS
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.stages import NOT_TRIED, RANKED, SLOW, Candidate, facts_of
+from brachis.search.stages import (
+    NOT_TRIED,
+    RANKED,
+    SLOW,
+    Candidate,
+    Marks,
+    facts_of,
+)
 from brachis.task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -635,6 +642,39 @@ def test_a_motion_no_faster_over_all_knots_is_not_refined(robot, monkeypatch):
     begun = f"best so far: t_E = {best.t_end:.4f} s, "
     assert [line for line in map(str, said) if line.startswith(begun)]
     assert f"uno: t_E = {best.t_end:.4f} s, verified" in map(str, said)
+
+
+def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
+    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
+    robot = brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=jerks
+    )
+    finish = pipeline.finish_candidate
+    meshes: list[int] = []
+    tried: list[Candidate] = []
+    adapt = pipeline.adapt_mesh
+
+    def noted(*arguments: Any, **settings: Any) -> Any:
+        meshes.append(len(tried))
+        return adapt(*arguments, **settings)
+
+    def against_faster(candidate: Any, to_beat: Marks, *arguments: Any) -> Candidate:
+        given = dataclasses.replace(to_beat, begun=0.0) if tried else to_beat
+        tried.append(finish(candidate, given, *arguments))
+        return tried[-1]
+
+    monkeypatch.setattr(portfolio.Search, "_may_win", lambda *_: True)
+    monkeypatch.setattr(pipeline, "adapt_mesh", noted)
+    monkeypatch.setattr(pipeline, "finish_candidate", against_faster)
+    asked = task(start="free", path_start=HERE, spline={"intervals": "auto"})
+    result = brachis.plan(robot, asked)
+    assert result.verified
+    assert meshes == [0]
+    first, *rest = tried
+    assert first.adapted < first.begun
+    assert rest
+    assert {each.status for each in rest} == {SLOW}
+    assert all(math.isinf(each.adapted) for each in rest)
 
 
 def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
