@@ -152,6 +152,14 @@ def test_never_fewer_than_a_fifth_of_the_rows(solve, monkeypatch):
     assert report.objective == pytest.approx(-1.0, abs=1e-8)
 
 
+def test_rows_that_are_kept_whatever_their_distance(solve):
+    start = 0.999 * np.array([np.cos(-1.3), np.sin(-1.3), 0.0])
+    far = int(np.argmax(1.0 - Disc().rows(start)))
+    solve_near_rows(Disc(), start, solve)
+    solve_near_rows(Disc(), start, solve, kept=[far])
+    assert solve.rows[-1] == solve.rows[0] + 1
+
+
 def test_all_iterations_are_not_used_up_again():
     solves = []
 

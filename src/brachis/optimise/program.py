@@ -411,6 +411,18 @@ class Program(PhaseSequence[Phase], Summary):
                 numbers[rows] = rows[:1]
         return numbers
 
+    @cached_property
+    def third_order_rows(self) -> list[int]:
+        """Numbers of the rows of limits on third derivatives, such as jerks."""
+        pairs = zip(self.phases, self._first_rows, strict=False)
+        return [
+            int(first + row)
+            for phase, first in pairs
+            for limit in phase.limits
+            if limit.order > 2
+            for row in phase.rows_of(limit).ravel()
+        ]
+
     def motions(self, x: np.ndarray) -> list[Motion]:
         """Curves of every phase that belong to x."""
         return [phase.motion(x_of_phase) for phase, x_of_phase in self.split(x)]

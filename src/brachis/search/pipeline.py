@@ -65,9 +65,6 @@ _BEFORE_REFINEMENT = 0.5
 _IF_SHORT = 0.2
 """The same where splines are laid in little time, which takes half a second. With 0.5 they were laid too late."""
 
-_MOST_GAINED = 0.05
-"""Part of the time that more knots, or other coordinates, gain at most: 4.6 % on a path with jerk limits."""
-
 
 def rank_candidate(
     guess: InitialGuess, deadline: Deadline, _listener: Listener
@@ -149,18 +146,18 @@ def _finish_over_time(
     if not solved.usable:
         words = solved.report.status.name.lower().replace("_", " ")
         return fail(candidate, words, solved.reports)
-    if spline.intervals == "auto":
-        candidate = replace(candidate, begun=solved.t_end)
-    if solved.t_end >= min(to_beat.begun, to_beat.adapted * (1.0 + _MOST_GAINED)):
-        reports = (*candidate.reports, *solved.reports)
-        return replace(candidate, status=SLOW, reports=reports)
     # Many knots are reached from few.
     target = solved.program if spline.intervals == "auto" else program
     has_given_knots = spline.intervals != "auto" and spline.knots != "free"
     has_all_knots = solved.program.intervals == target.intervals
     # The chart around a given motion is kept, and so is a joint that the task names.
     is_free = guess.in_chart and guess.durations is None
-    if has_given_knots and has_all_knots and is_free and not session.deadline.passed:
+    if not (has_given_knots and has_all_knots):
+        candidate = replace(candidate, begun=solved.t_end)
+        if solved.t_end >= to_beat.begun:
+            reports = (*candidate.reports, *solved.reports)
+            return replace(candidate, status=SLOW, reports=reports)
+    elif is_free and not session.deadline.passed:
         solved = best_of_joints(guess.problem, solved, session)
         target = solved.program
     soon = replace(options, deadline=session.deadline)

@@ -144,7 +144,7 @@ class Candidate(Summary):
     status : str
         In plain words.
     begun : float
-        End time over the first knots of a mesh, s; infinite where there was none.
+        End time over the first knots, s; infinite where no others follow.
     adapted : float
         End time over all knots, before refinement, s; infinite where there was no such program.
     reports : tuple of SolverReport
