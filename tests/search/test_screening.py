@@ -105,6 +105,22 @@ def test_those_for_which_there_was_no_time_come_after_the_others(guesses, monkey
     assert others == [], "what was not solved is slower for all that is known"
 
 
+def test_few_guesses_are_improved_where_most_of_the_time_is_given(guesses, monkeypatch):
+    tried = []
+
+    def improve(guess: object, *_arguments: object) -> object:
+        tried.append(guess)
+        time = 10.0 + int(guess.origin.split(",")[0].split()[-1]) / 10.0
+        return dataclasses.replace(guess, estimate=time, is_improved=True)
+
+    monkeypatch.setattr(screening, "improve_quickly", improve)
+    monkeypatch.setattr(type(guesses[0].problem), "dwell_time", 9.9)
+    untimed = [dataclasses.replace(guess, estimate=np.inf) for guess in guesses]
+    kept = screening.screen(3 * untimed, 6, NEVER, quiet)
+    assert len(kept) == screening._FEWEST
+    assert len(tried) <= (screening._MOST + 2) * screening._FEWEST < len(3 * untimed)
+
+
 def test_guesses_say_whose_closed_form_they_begin_with(guesses):
     names = {
         decomposition.name for decomposition in decompositions_of(guesses[0].problem)

@@ -34,6 +34,8 @@ _SAME_POSTURE = 0.15
 """Distance of joints along the same joint path, rad or m, no more."""
 _FEWEST = 2
 """Guesses that are kept, no fewer, however little of the time is free."""
+_MOST = 8
+"""Guesses that are improved for each one that is kept, no more: four of a lattice, and four at random."""
 _PLACES = np.linspace(0.0, 1.0, 49)
 """Places at which joint paths are compared."""
 
@@ -58,12 +60,19 @@ def screen(
         With the better joint paths, and their least times as estimates; the fastest first.
     """
     listener(f"improving {len(guesses)} joint paths")
-    count = max(min(count, _FEWEST), round(count * _free_share(guesses)))
-    improve = partial(_improve_in_parallel, deadline=deadline, listener=listener)
-    if len(guesses) > count:
-        coarse = improve(_spread_out(guesses), COARSE, 1, 2 * count)
-        guesses = _choose_distinct(coarse, 2 * count)
-    return _choose_distinct(improve(guesses, ROUGH, CHARTS, count), count)
+    improve = partial(
+        _improve_in_parallel, count=count, deadline=deadline, listener=listener
+    )
+    if len(guesses) > _count_worthwhile(count, guesses):
+        coarse = improve(_spread_out(guesses), COARSE, 1, 2)
+        guesses = _choose_distinct(coarse, 2 * _count_worthwhile(count, coarse))
+    better = improve(guesses, ROUGH, CHARTS, 1)
+    return _choose_distinct(better, _count_worthwhile(count, better))
+
+
+def _count_worthwhile(count: int, guesses: Sequence[InitialGuess]) -> int:
+    """Tell how many of `count` guesses are worth keeping where a part of the least time known is given."""
+    return max(min(count, _FEWEST), round(count * _free_share(guesses)))
 
 
 def _free_share(guesses: Sequence[InitialGuess]) -> float:
@@ -105,12 +114,13 @@ def _improve_in_parallel(
     guesses: Sequence[InitialGuess],
     effort: PathEffort,
     charts: int,
-    alike: int,
+    spare: int,
     *,
+    count: int,
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until `alike` of them end near the least end time: others are unlikely to end below it."""
+    """Improve guesses until, for each one that is kept, `spare` end near the least time: others are hardly faster."""
     work = run_in_processes(
         improve_quickly,
         guesses,
@@ -128,7 +138,9 @@ def _improve_in_parallel(
             is_near = [
                 guess.estimate <= _NEAR_LEAST * least < np.inf for guess in solved
             ]
-            if sum(is_near) >= alike:
+            kept = _count_worthwhile(count, solved)
+            is_enough = sum(is_near) >= spare * kept
+            if is_enough or len(solved) >= _MOST * kept:
                 break
     return solved
 
