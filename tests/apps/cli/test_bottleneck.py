@@ -40,17 +40,6 @@ def test_in_plain_words(run, task, write):
     assert "checked" not in outcome.out
 
 
-def test_of_a_planned_file_nothing_is_solved_again(run, task, write, tmp_path):
-    task["spline"]["intervals"] = 10
-    assert run("plan", write(task), "--out", tmp_path / "out", "--no-figures").code == 0
-    file = tmp_path / "out/result.npz"
-    assert brachis.Trajectory.load(file).sensitivities.reliable
-    outcome = run("bottleneck", file, "--verbose")
-    assert outcome.code == 0, outcome.err
-    assert "more torque at j1" in outcome.out
-    assert "solving the problem" not in outcome.err
-
-
 def test_check_and_reference(run, task, write):
     task["spline"]["intervals"] = 10
     outcome = run("bottleneck", write(task), "--check", "--reference")
@@ -148,47 +137,24 @@ def test_figures_survive_a_drawing_that_cannot_be_written(
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["bottleneck.json"]
 
 
-def test_a_saved_motion(run, task, write, tmp_path):
+def test_a_saved_motion_is_explained_without_solving_again(run, task, write, tmp_path):
     out = tmp_path / "out"
-    assert run("plan", write(task), "--out", out).code == 0
-    fresh = json.loads(run("bottleneck", write(task), "--json").out)
-    outcome = run("bottleneck", out / "result.npz", "--json", "--out", out)
+    task["spline"]["intervals"] = 10
+    assert run("plan", write(task), "--out", out, "--no-figures").code == 0
+    motion = out / "result.npz"
+    t_end = brachis.Trajectory.load(motion).t_end
+    outcome = run("bottleneck", motion, "--verbose", "--out", out)
     assert outcome.code == 0, outcome.err
-    saved = json.loads(outcome.out)
-    assert saved["verified"] is True
-    assert saved["t_end"] == pytest.approx(fresh["t_end"], rel=1e-6)
-    for one, other in zip(
-        *(d["bottleneck"]["saturations"] for d in (saved, fresh)), strict=True
-    ):
-        assert (one["subject"], one["kind"]) == (other["subject"], other["kind"])
-        assert one["share"] == pytest.approx(other["share"], abs=1e-3)
-    for one, other in zip(
-        *(d["bottleneck"]["sensitivities"]["limits"] for d in (saved, fresh)),
-        strict=True,
-    ):
-        assert one["subject"] == other["subject"]
-        assert one["change_for_10_percent_s"] == pytest.approx(
-            other["change_for_10_percent_s"], rel=1e-3, abs=1e-6
-        )
-    assert {path.name for path in out.iterdir()} >= {
-        "result.npz",
-        "bottleneck.json",
-        "timeline.png",
-    }
-    assert run("bottleneck", out / "result.npz").out.startswith(
-        f"end time t_E: {fresh['t_end']:.4f} s"
-    )
+    assert outcome.out.startswith(f"end time t_E: {t_end:.4f} s")
+    assert "more torque at j1" in outcome.out
+    assert "solving the problem" not in outcome.err
+    data = json.loads((out / "bottleneck.json").read_text())
+    assert data["verified"] is True
+    assert data["t_end"] == pytest.approx(t_end, rel=1e-6)
+    assert {path.name for path in out.iterdir()} >= {"result.npz", "timeline.png"}
 
 
 def test_a_saved_motion_keeps_its_urdf(run, tmp_path):
     outcome = run("bottleneck", tmp_path / "result.npz", "--urdf", SCARA)
     assert outcome.code == 2
     assert "this option cannot be used with a saved motion" in outcome.err
-
-
-def test_wrong_input(run, task, write, tmp_path):
-    assert run("bottleneck", tmp_path / "gone.yaml").code == 2
-    task["robot"]["limits"]["torque"] = -1
-    outcome = run("bottleneck", write(task), "--json")
-    assert outcome.code == 2
-    assert "torque" in json.loads(outcome.out)["error"]

@@ -52,6 +52,14 @@ OVER = {
     "the task": ("export", "result.npz", "--out", "task.yaml"),
     "the waypoints": ("export", "result.npz", "--out", "points.csv"),
     "the motion": ("export", "result.npz", "--out", "result.npz"),
+    "a table over the motion": (
+        "export",
+        "result.npz",
+        "--out",
+        "result.npz",
+        "--format",
+        "csv",
+    ),
     "a figure over the task": ("plot", "result.npz", "--out", "task.yaml"),
     "a figure that is none": ("plot", "result.npz", "--out", "notes.png"),
     "the schema over the task": ("schema", "--out", "task.yaml"),
@@ -88,7 +96,7 @@ def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
     assert contents(saved) == before
 
 
-@pytest.mark.parametrize("name", ["overview.png", "result.npz"])
+@pytest.mark.parametrize("name", ["overview.png", "result.npz", "result.json"])
 def test_a_folder_with_the_name_of_an_output_is_refused_before_planning(
     name, run, saved, tmp_path, monkeypatch
 ):
@@ -107,6 +115,10 @@ REFUSED_AT_ONCE = {
     "a file where a folder is needed": (
         ("bottleneck", "--out", "mine"),
         "into a folder",
+    ),
+    "an unknown figure": (
+        ("plot", "--out", "x.png", "--kind", "torque"),
+        "Did you mean 'torques'?",
     ),
     "a joint given twice": (
         ("export", "--out", "x.csv", "--joints", "j1,j1"),
@@ -158,43 +170,15 @@ def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
 def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
     (tmp_path / "empty.csv").touch()  # as mktemp makes it
     for _ in range(2):
-        for command in (
-            (
-                "export",
-                saved / "result.npz",
-                "--out",
-                tmp_path / "motion.csv",
-                "--dt",
-                0.1,
-            ),
-            (
-                "export",
-                saved / "result.npz",
-                "--out",
-                tmp_path / "empty.csv",
-                "--dt",
-                0.1,
-            ),
-            (
-                "plot",
-                saved / "result.npz",
-                "--kind",
-                "torques",
-                "--out",
-                tmp_path / "figure.svg",
-            ),
-            (
-                "plot",
-                saved / "result.npz",
-                "--kind",
-                "torques",
-                "--out",
-                tmp_path / "figure.pdf",
-            ),
-            ("schema", "--out", tmp_path / "schema.json"),
-            ("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "cell.urdf"),
+        for words, name in (
+            (("export", saved / "result.npz", "--dt", 0.1), "motion.csv"),
+            (("export", saved / "result.npz", "--dt", 0.1), "empty.csv"),
+            (("plot", saved / "result.npz", "--kind", "torques"), "figure.svg"),
+            (("plot", saved / "result.npz", "--kind", "torques"), "figure.pdf"),
+            (("schema",), "schema.json"),
+            (("compose", saved / "robot.urdf", *RAIL), "cell.urdf"),
         ):
-            outcome = run(*command)
+            outcome = run(*words, "--out", tmp_path / name)
             assert outcome.code == 0, outcome.err
 
 

@@ -75,15 +75,6 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
         assert _read_candidates(tmp_path / "result.npz", trajectory) == []
 
 
-def test_a_folder_without_a_motion_is_refused(run, tmp_path):
-    refused = run("view", tmp_path)
-    assert refused.code == 2
-    assert (
-        "this folder contains no motion; allowed: result.npz or unverified.npz"
-        in refused.err
-    )
-
-
 def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):
     def second(viewer):
         looked_at.append(run("view", saved, "--port", viewer.url.rpartition(":")[2]))

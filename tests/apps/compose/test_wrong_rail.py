@@ -83,42 +83,20 @@ def test_wrong_figure(arm, tmp_path, case):
     assert not output.exists()
 
 
-@pytest.mark.parametrize("figure", RAIL)
-def test_no_figure_of_the_rail_is_guessed(figure):
-    with pytest.raises(
-        TypeError, match=f"missing 1 required keyword-only argument: '{figure}'"
-    ):
-        Rail(**{key: value for key, value in RAIL.items() if key != figure})
-
-
 BASE = "<robot name='x'><link name='base'><inertial><mass value='1'/>{}</inertial></link></robot>"
 URDFS = {
     "not XML": ("<robot name='x'><link", ["not well-formed XML"]),
-    "empty": ("", ["not a URDF"]),
-    "not a URDF": (
-        "<sdf/>",
-        ["the file is not a URDF", "root element <sdf>", "<robot>"],
-    ),
-    "no links": ("<robot name='x'/>", ["the URDF has no links"]),
-    "nameless link": (
-        "<robot name='x'>\n<link/></robot>",
-        ["line 2", "a <link> has no name"],
-    ),
-    "links of one name": (
-        "<robot name='x'><link name='a'/><link name='a'/></robot>",
-        ["links have the same name", "found a"],
-    ),
     "two roots": (
         "<robot name='x'><link name='a'/><link name='b'/></robot>",
         ["one tree", "root links: a, b"],
     ),
-    "loop": (
+    "a loop": (
         arm_text()
         .replace("<link name='world'/>", "")
         .replace("link='world'", "link='tool'"),
         ["none"],
     ),
-    "loop beside a tree": (
+    "a loop beside a tree": (
         arm_text(
             more="<link name='p'/><link name='q'/>"
             "<joint name='pq' type='fixed'><parent link='p'/><child link='q'/></joint>"
@@ -126,47 +104,17 @@ URDFS = {
         ),
         ["do not form one tree", "a loop of links: p, q"],
     ),
-    "closed chain": (
-        arm_text(
-            more="<joint name='z' type='fixed'><parent link='base'/><child link='tool'/></joint>"
-        ),
-        ["do not form one tree", "link 'tool' is the child of two joints"],
-    ),
-    "joint to nowhere": (
-        arm_text().replace("<child link='tool'/>", "<child link='tol'/>"),
-        [
-            "the child of joint 'tool_mount' is not a link",
-            "found tol",
-            "world, base, tool",
-        ],
-    ),
-    "joint without a parent": (
-        arm_text().replace("<parent link='link3'/>", ""),
-        ["the parent of joint 'tool_mount' is not a link", "found no name"],
-    ),
-    "xacro macro": (
+    "an xacro macro": (
         arm_text(more="<xacro:arm xmlns:xacro='http://www.ros.org/wiki/xacro'/>"),
         ["xacro macros", "<xacro:arm>", "Expand the file with xacro first"],
     ),
-    "xacro property": (
-        arm_text().replace("'tool'", "'${prefix}tool'"),
-        ["xacro macros", "line"],
-    ),
-    "figure that is no number": (
+    "a word in the place of a figure": (
         arm_text().replace('mass value="2.0"', "mass value='heavy'"),
         ["link 'link1': <mass value> is wrong", 'value="heavy"'],
     ),
-    "vector too short": (
-        arm_text().replace("xyz='0.0 0.1 0.4'", "xyz='0.0 0.1'"),
-        ["3 finite numbers"],
-    ),
-    "base without inertia": (
+    "a base without an inertia": (
         BASE.format(""),
         ["link 'base' has a mass but no <inertia>"],
-    ),
-    "base that cannot be": (
-        BASE.format("<inertia ixx='-1' iyy='1' izz='1'/>"),
-        ["link 'base' has a non-physical inertia"],
     ),
 }
 
