@@ -1,20 +1,14 @@
 """Curves given by knots and control points, as fits make them: moved to their start, joined, with speeds along them."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError, TaskError
 from brachis.path import build_path
 from brachis.path.from_curve import feed_tables
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import Task, ToolPose, fit_path, load_task
-from brachis.task.segments import BSplineCurve
+from brachis.task import Task, fit_path, load_task
 from support.poses import pose
 from support.seams import bent, brute_distances, wave
 
@@ -22,7 +16,7 @@ MM = 1e-3
 S = np.linspace(0.0, 1.0, 2_001)
 
 
-def test_the_path_is_within_the_tolerance_of_all_points_blends_included() -> None:
+def test_the_path_is_within_the_tolerance_of_all_points_blends_included():
     position, _ = bent(900, 0.01 * MM)
     segments = fit_path(position, tolerance={"position": "0.1 mm", "corner": "0.5 mm"})
     path = build_path(segments, position[0], ["x", "y", "z"])
@@ -38,40 +32,26 @@ def test_the_path_is_within_the_tolerance_of_all_points_blends_included() -> Non
     assert distances[~beside].max() > 0.2 * MM
 
 
-@pytest.mark.parametrize("rows", [["x", "y", "z"], ["x", "y"]])
-def test_derivatives_are_those_of_the_path(rows: list[str]) -> None:
-    position = wave(500)[:, : len(rows)]
-    path = build_path(
-        fit_path(position, tolerance={"position": 1e-5}), position[0], rows
-    )
-    step = 1e-5
-    sample, before, after = (path.sample(S[1:-1] + off) for off in (0.0, -step, step))
-    for name, of in (("target", "xi"), ("xi", "xi_ds"), ("xi_ds", "xi_dds")):
-        slope = (getattr(after, name) - getattr(before, name)) / (2.0 * step)
-        scale = np.abs(getattr(sample, of)).max()
-        np.testing.assert_allclose(getattr(sample, of), slope, atol=1e-6 * scale)
-
-
-def poses(count: int = 300) -> tuple[np.ndarray, Rotation]:
+def poses(count=300):
     t = np.linspace(0.0, 1.0, count)
     return wave(count), Rotation.from_rotvec(
         np.column_stack([0.4 * t, np.sin(t), 3.0 - 0.0 * t])
     )
 
 
-def matrices(position: np.ndarray, turns: Rotation) -> np.ndarray:
+def matrices(position, turns):
     result = np.tile(np.eye(4), (len(position), 1, 1))
     result[:, :3, :3], result[:, :3, 3] = turns.as_matrix(), position
     return result
 
 
-def test_all_forms_of_poses_give_the_same_path() -> None:
+def test_all_forms_of_poses_give_the_same_path():
     import pinocchio as pin
 
     position, turns = poses()
     allowed = {"position": "0.02 mm", "orientation": "0.05 deg"}
     homogeneous = matrices(position, turns)
-    forms: list[dict[str, Any]] = [
+    forms = [
         {"points": homogeneous},
         {"points": [pin.SE3(one) for one in homogeneous]},
         {"points": position, "orientations": turns.as_matrix()},
@@ -90,7 +70,7 @@ def test_all_forms_of_poses_give_the_same_path() -> None:
     )
 
 
-def test_a_relative_curve_is_moved_and_turned() -> None:
+def test_a_relative_curve_is_moved_and_turned():
     position, turns = poses()
     segments = fit_path(
         matrices(position, turns), tolerance={"position": "0.02 mm"}, relative=True
@@ -111,7 +91,7 @@ def test_a_relative_curve_is_moved_and_turned() -> None:
     )
 
 
-def test_a_start_elsewhere_is_refused() -> None:
+def test_a_start_elsewhere_is_refused():
     position, turns = poses()
     segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"})
     with pytest.raises(
@@ -127,7 +107,7 @@ def test_a_start_elsewhere_is_refused() -> None:
         )
 
 
-def test_speeds_follow_the_path_over_its_blends() -> None:
+def test_speeds_follow_the_path_over_its_blends():
     position, _ = bent(900)
     speed = np.where(np.arange(900) < 450, 0.1, 0.2)
     segments = fit_path(
@@ -147,7 +127,7 @@ def test_speeds_follow_the_path_over_its_blends() -> None:
     )
 
 
-def test_stretches_without_speed_have_no_table() -> None:
+def test_stretches_without_speed_have_no_table():
     position = wave(100)
     speed = np.full(100, 0.1)
     speed[40:60] = np.nan
@@ -156,33 +136,9 @@ def test_stretches_without_speed_have_no_table() -> None:
     first, second = feed_tables(segments, path)
     assert first.s[-1] == pytest.approx(39 / 99, abs=0.01)
     assert second.s[0] == pytest.approx(59 / 99, abs=0.01)
-    assert (
-        feed_tables(
-            fit_path(position),
-            build_path(fit_path(position), position[0], ["x", "y", "z"]),
-        )
-        == ()
-    )
 
 
-def test_the_first_point_is_where_a_free_start_begins() -> None:
-    position, turns = poses()
-    base = {"brachis": 1, "start": "free", "task_space": "pose"}
-    for allowed in (None, {"position": "0.02 mm"}):
-        made = load_task(
-            {**base, "path": fit_path(matrices(position, turns), tolerance=allowed)}
-        )
-        assert isinstance(made.path_start, ToolPose)
-        np.testing.assert_allclose(made.path_start.position, position[0])
-    with pytest.raises(TaskError, match="path_start"):
-        load_task(
-            {**base, "path": fit_path(position, tolerance={"position": "0.02 mm"})}
-        )
-    with pytest.raises(TaskError, match="path_start"):
-        load_task({**base, "path": fit_path(position, relative=True)})
-
-
-def test_a_quaternion_of_length_zero_at_the_start_is_no_crash() -> None:
+def test_a_quaternion_of_length_zero_at_the_start_is_no_crash():
     curve = {
         "knots": [0.0] * 6 + [1.0] * 6,
         "control_points": [[0.1 * i, 0, 0, 0, 0, 0, 0] for i in range(6)],
@@ -198,7 +154,7 @@ def test_a_quaternion_of_length_zero_at_the_start_is_no_crash() -> None:
         )
 
 
-def test_a_fitted_task_survives_being_saved() -> None:
+def test_a_fitted_task_survives_being_saved():
     position, turns = poses()
     segments = fit_path(
         matrices(position, turns),
@@ -213,7 +169,7 @@ def test_a_fitted_task_survives_being_saved() -> None:
     assert made.fits[0].points == 300
 
 
-WRONG: list[tuple[dict[str, Any], str]] = [
+WRONG = [
     (
         {"points": np.zeros((5, 4, 3))},
         r"the points have the wrong shape; found \(5, 4, 3\)",
@@ -236,7 +192,21 @@ WRONG: list[tuple[dict[str, Any], str]] = [
         {"points": wave(5), "orientations": np.ones(4)},
         r"the numbers of points and of rows of orientations differ; found 4; allowed: 5",
     ),
-    ({"points": wave(5), "speed": np.zeros(5)}, r"row 0: a speed must be positive"),
+    ({"points": np.empty((0, 3))}, r"wrong shape; found \(0, 3\)"),
+    (
+        {"points": wave(5), "speed": np.full(5, np.inf)},
+        r"row 0: a speed must be positive and finite",
+    ),
+    ({"points": wave(5), "speed": -np.ones(5)}, r"row 0: a speed must be positive"),
+    (
+        {"points": wave(5), "speed": np.ones((5, 3))},
+        r"the speeds have the wrong shape; found \(5, 3\)",
+    ),
+    (
+        {"points": wave(5), "speed": np.ones(4)},
+        r"the numbers of points and of rows of speed differ",
+    ),
+    ({"points": wave(5), "speed": np.ones(5)}, "feed rates need a fitted path"),
     (
         {"points": wave(5), "tolerance": {"position": "5 kg"}},
         r"tolerance.position: this is not a number with a unit; found '5 kg'.*0.05 mm",
@@ -254,22 +224,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("given", "message"), WRONG)
-def test_wrong_arrays_are_named(given: dict[str, Any], message: str) -> None:
+@pytest.mark.parametrize(("keywords", "message"), WRONG)
+def test_the_error_names_what_is_wrong_with_arrays(keywords, message):
     with pytest.raises(TaskError, match=message):
-        fit_path(**given)
-
-
-def test_knots_that_are_not_smooth_are_refused() -> None:
-    points = [[float(i), 0.0] for i in range(6)]
-    ends = [0.0] * 6, [5.0] * 6
-    BSplineCurve(
-        knots=tuple(ends[0] + ends[1]), control_points=tuple(map(tuple, points))
-    )
-    with pytest.raises(ValidationError, match="not clamped"):
-        BSplineCurve(
-            knots=(0.0,) * 5 + (0.1,) + (5.0,) * 6,
-            control_points=tuple(map(tuple, points)),
-        )
-    with pytest.raises(ValidationError, match="wrong number of knots"):
-        BSplineCurve(knots=(0.0, 1.0), control_points=tuple(map(tuple, points)))
+        fit_path(**keywords)

@@ -1,17 +1,13 @@
 """Paths in the frame of a workpiece: where the tool is, by Pinocchio, and what is refused."""
 
-from __future__ import annotations
-
 import itertools
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import PathError, StartError, TaskError
+from brachis.errors import PathError, TaskError
 from brachis.path import build_path
 from brachis.path.sequence import PathFrame
 from brachis.robot.task_map.protocol import POSE_ROWS
@@ -25,7 +21,7 @@ WORKPIECE = pin.SE3(
 )
 FLAT = {"xyz": [0.3, 0.4, 0.7], "rpy_deg": [0.0, 0.0, 30.0]}
 S = np.linspace(0.0, 1.0, 30)
-SEGMENTS: list[dict[str, Any]] = [
+SEGMENTS = [
     {
         "line": {"by": [0.3, 0, 0]},
         "orientation": {"rotate": {"axis": [0, 0, 1], "angle_deg": 50}},
@@ -55,7 +51,7 @@ SEGMENTS: list[dict[str, Any]] = [
 ]
 
 
-def written(path: list[dict[str, Any]], **keys: Any) -> brachis.Task:
+def written(path, **keys):
     content = {
         "brachis": 1,
         "start": {"joints": [0.0]},
@@ -67,15 +63,15 @@ def written(path: list[dict[str, Any]], **keys: Any) -> brachis.Task:
     )
 
 
-def coordinates(placement: pin.SE3) -> np.ndarray:
+def coordinates(placement):
     return np.concatenate([placement.translation, placement.rotation.ravel()])
 
 
-def placements(targets: np.ndarray) -> list[pin.SE3]:
+def placements(targets):
     return [pin.SE3(target[3:].reshape(3, 3), target[:3]) for target in targets]
 
 
-def test_every_kind_of_segment_and_orientation_is_in_the_frame() -> None:
+def test_every_kind_of_segment_and_orientation_is_in_the_frame():
     here = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.2, -0.4), np.array([0.1, 0.05, 0.0]))
     segments = written(SEGMENTS).path
     frame = PathFrame.of(Placement.model_validate(PLACE), POSE_ROWS)
@@ -102,7 +98,7 @@ def test_every_kind_of_segment_and_orientation_is_in_the_frame() -> None:
 @pytest.mark.parametrize(
     "rows", [["x", "y"], ["x", "y", "yaw"], "position", ["y", "z"]]
 )
-def test_rows_are_turned_and_moved(rows: Any) -> None:
+def test_rows_are_turned_and_moved(rows):
     names = ["x", "y", "z"] if rows == "position" else rows
     place = {"y": {"xyz": [0.3, 0.4, 0.7], "rpy_deg": [30.0, 0.0, 0.0]}}.get(
         names[0], FLAT
@@ -133,7 +129,7 @@ def test_rows_are_turned_and_moved(rows: Any) -> None:
     np.testing.assert_allclose(world.sample(S).xi, slopes, atol=1e-6)
 
 
-def tool_of(motion: Trajectory, frame: str) -> list[pin.SE3]:
+def tool_of(motion, frame):
     """Where Pinocchio has the tool, from the URDF and the positions of a motion alone."""
     model = pin.buildModelFromXML(motion.urdf)
     data = model.createData()
@@ -151,7 +147,7 @@ def tool_of(motion: Trajectory, frame: str) -> list[pin.SE3]:
     return found
 
 
-def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path: Path) -> None:
+def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path):
     robot = brachis.robots.iiwa14
     posture = np.array([0.3, 0.6, 0.2, -1.2, 0.1, 0.9, 0.4])
     tool = robot.tool_placement(posture)
@@ -191,53 +187,7 @@ def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path: Path) -> None
     )
 
 
-def test_files_of_points_and_free_starts_are_in_the_frame(tmp_path: Path) -> None:
-    rows = np.column_stack(
-        [np.linspace(0.0, 300.0, 40), 20.0 * np.sin(np.linspace(0.0, 3.0, 40))]
-    )
-    np.savetxt(
-        tmp_path / "seam.csv", rows, delimiter=",", header="x_mm,y_mm", comments=""
-    )
-    tolerance = {"position": "0.01 mm"}
-    place = {"xyz": [1.0, 0.6, 0.0], "rpy_deg": [0.0, 0.0, 120.0]}
-    task = {
-        "brachis": 1,
-        "frames": {"table": place},
-        "path_frame": "table",
-        "start": "free",
-        "task_space": ["x", "y"],
-        "path": [{"csv": {"file": str(tmp_path / "seam.csv"), "tolerance": tolerance}}],
-        "search": {"effort": "single"},
-        "spline": {"intervals": 8},
-    }
-    result = brachis.plan(brachis.robots.scara3, task)
-    assert result.verified
-    table = pin.SE3(
-        pin.rpy.rpyToMatrix(0.0, 0.0, np.radians(120.0)), np.array(place["xyz"])
-    )
-    points = np.array(
-        [table.actInv(each.translation) for each in tool_of(result.trajectory, "tool")]
-    )
-    away = [
-        np.abs(np.interp(x, rows[:, 0] / 1e3, rows[:, 1] / 1e3) - y)
-        for x, y in points[:, :2]
-    ]
-    assert np.max(away) < 1e-4  # of the polyline through the points
-    np.testing.assert_allclose(points[[0, -1], :2], rows[[0, -1]] / 1e3, atol=1e-6)
-
-
-def test_a_start_that_is_elsewhere_in_the_frame_is_refused() -> None:
-    task = written(
-        [{"line": {"by": [0.1, 0.0]}}],
-        task_space=["x", "y"],
-        frames={"workpiece": FLAT},
-        path_start=[0, 0],
-    )
-    with pytest.raises(StartError, match="off the path"):
-        brachis.plan(brachis.robots.scara3, task, start=[0.5, -2.0, 2.0])
-
-
-def test_a_path_says_its_frame() -> None:
+def test_a_path_says_its_frame():
     apart = written(SEGMENTS)
     together = load_task(
         {
@@ -250,7 +200,7 @@ def test_a_path_says_its_frame() -> None:
     assert together == apart
 
 
-def test_frames_may_be_nested_as_deep_as_one_likes() -> None:
+def test_frames_may_be_nested_as_deep_as_one_likes():
     count = 1500
     place = pin.SE3(pin.rpy.rpyToMatrix(0.1, -0.2, 0.3), np.array([0.1, 0.2, 0.3]))
     inner = {"xyz": [0.1, 0.2, 0.3], "rpy_deg": np.degrees([0.1, -0.2, 0.3]).tolist()}
@@ -268,40 +218,51 @@ def test_frames_may_be_nested_as_deep_as_one_likes() -> None:
     )
 
 
-def test_frames_that_do_not_fit() -> None:
-    with pytest.raises(
-        TaskError,
-        match=r"path_frame: this frame is not defined in frames; found 'table' .*allowed: workpiece",
-    ):
-        written(SEGMENTS, path_frame="table")
-    with pytest.raises(
-        TaskError,
-        match=r"allowed: frames: \{table: \.\.\.\} in the task",
-    ):
-        written(SEGMENTS, frames={}, path_frame="table")
-    with pytest.raises(
-        TaskError,
-        match=r"frames\.workpiece\.xy: unknown key; found xy; allowed: xyz, rpy_deg",
-    ):
-        written(SEGMENTS, frames={"workpiece": {"xy": [0, 0]}})
-    with pytest.raises(
-        TaskError,
-        match=r"path_frame: this frame differs from path.frame; found 'workpiece' "
-        r".*allowed: table, or only one of the two keys",
-    ):
-        written(
-            {"frame": "table", "segments": SEGMENTS},
-            frames={"workpiece": PLACE, "table": PLACE},
-        )  # type: ignore[arg-type]
-    with pytest.raises(
-        TaskError, match="path_frame: a path of joints cannot be in a frame"
-    ):
-        written([{"line": {"by": [0.1]}}], task_space="joints")
-    with pytest.raises(
-        TaskError,
-        match=r"path: a path in a frame is .*allowed: \{frame: NAME, segments",
-    ):
-        written({"frame": "workpiece", "path": SEGMENTS})  # type: ignore[arg-type]
+TABLE = {"frame": "table", "segments": SEGMENTS}
+TWO_FRAMES = {"workpiece": PLACE, "table": PLACE}
+
+
+@pytest.mark.parametrize(
+    ("path", "keys", "message"),
+    [
+        (
+            SEGMENTS,
+            {"path_frame": "table"},
+            r"path_frame: this frame is not defined in frames; found 'table' .*allowed: workpiece",
+        ),
+        (
+            SEGMENTS,
+            {"frames": {}, "path_frame": "table"},
+            r"allowed: frames: \{table: \.\.\.\} in the task",
+        ),
+        (
+            SEGMENTS,
+            {"frames": {"workpiece": {"xy": [0, 0]}}},
+            r"frames\.workpiece\.xy: unknown key; found xy; allowed: xyz, rpy_deg",
+        ),
+        (
+            TABLE,
+            {"frames": TWO_FRAMES},
+            r"path_frame: this frame differs from path.frame; found 'workpiece' .*allowed: table, or only one",
+        ),
+        (
+            [{"line": {"by": [0.1]}}],
+            {"task_space": "joints"},
+            "path_frame: a path of joints cannot be in a frame",
+        ),
+        (
+            {"frame": "workpiece", "path": SEGMENTS},
+            {},
+            r"path: a path in a frame is .*allowed: \{frame: NAME, segments",
+        ),
+    ],
+)
+def test_the_error_names_the_key_of_a_frame_that_does_not_fit(path, keys, message):
+    with pytest.raises(TaskError, match=message):
+        written(path, **keys)
+
+
+def test_a_frame_cannot_turn_the_path_out_of_its_rows():
     tilted = written([{"line": {"by": [0.1, 0.0]}}], task_space=["x", "y"])
     with pytest.raises(
         PathError,
@@ -314,7 +275,7 @@ def test_frames_that_do_not_fit() -> None:
     "angles",
     [(0.3, -0.7, 1.1), (0.4, np.pi / 2, 0.2), (0.4, -np.pi / 2, 0.2), (3.0, 0.1, -3.0)],
 )
-def test_a_placement_may_be_a_transform(angles: tuple[float, float, float]) -> None:
+def test_a_placement_may_be_a_transform(angles):
     given = pin.SE3(pin.rpy.rpyToMatrix(*angles), np.array([1.0, 2.0, 3.0]))
     placement = Placement.model_validate(given)
     assert placement.xyz == (1.0, 2.0, 3.0)

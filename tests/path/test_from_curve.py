@@ -1,7 +1,5 @@
 """Curves of SciPy's and functions as segments: exact or within the tolerance, and refused where they are not smooth."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline

@@ -1,7 +1,5 @@
 """The examples of the guide to task files."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -30,12 +28,12 @@ OF_ROWS = [text for text in EXAMPLES if "task_space: [" in text]
 OF_POSES = [text for text in EXAMPLES if text not in OF_ROWS]
 
 
-def test_there_are_examples() -> None:
+def test_there_are_examples():
     assert (len(OF_ROWS), len(OF_POSES)) == (2, 4)
 
 
 @pytest.mark.parametrize("example", OF_ROWS)
-def test_examples_of_rows_are_paths(example: str) -> None:
+def test_examples_of_rows_are_paths(example):
     content = yaml.safe_load(example)
     start = {"joints": [0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.1]}
     usual = {"brachis": 1, "robot": {"urdf": "iiwa14"}, "start": start}
@@ -49,7 +47,7 @@ def test_examples_of_rows_are_paths(example: str) -> None:
     assert np.abs(path.sample([0.0, 0.5, 1.0]).xi[:, 3:]).max() > 0.1
 
 
-def test_the_curve_of_a_data_sheet_is_taken() -> None:
+def test_the_curve_of_a_data_sheet_is_taken():
     (curve,) = (yaml.safe_load(text) for text in SNIPPETS if "torque_speed" in text)
     robot = brachis.robots.scara3.with_limits(**curve["robot"]["limits"])
     to_joint, torque = 2.0 * np.pi / 60.0 / 50.0, 1.27 * 50 * 0.8
@@ -57,7 +55,7 @@ def test_the_curve_of_a_data_sheet_is_taken() -> None:
     np.testing.assert_allclose(robot.limits.torque_speed[0], expected, rtol=1e-3)
 
 
-def test_the_limits_of_ros_are_read(tmp_path: Path) -> None:
+def test_the_limits_of_ros_are_read(tmp_path):
     (text,) = (text for text in SNIPPETS if "joint_limits" in text)
     (tmp_path / "joint_limits.yaml").write_text(text, encoding="utf-8")
     limits = brachis.read_limits(tmp_path / "joint_limits.yaml")
@@ -65,9 +63,7 @@ def test_the_limits_of_ros_are_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("example", OF_POSES)
-def test_examples_are_paths(
-    example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_examples_are_paths(example, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     content = yaml.safe_load(example)
     start = np.zeros(3)

@@ -1,7 +1,5 @@
 """Derivatives of products, unit vectors and sines; rotations; and the search for the smallest value."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -17,7 +15,6 @@ from brachis.path.rotations import (
     sine_cosine,
     unit,
 )
-from brachis.task.orientation import Attitude
 from brachis.task.points.units import quaternions_of
 
 ORDER = 4
@@ -93,10 +90,6 @@ def test_values():
     )
 
 
-def test_a_product_has_the_derivatives_that_both_factors_have():
-    assert len(product(np.ones((4, 2)), np.ones((3, 2)), "...,...->...")) == 3
-
-
 def test_quaternions_have_the_scalar_first():
     rotations = Rotation.random(50, rng=6)
     quaternions = quaternions_of(rotation_of(rotations.as_matrix()))
@@ -104,24 +97,6 @@ def test_quaternions_have_the_scalar_first():
         rotation_derivatives(quaternions[None])[0], rotations.as_matrix(), atol=1e-14
     )
     np.testing.assert_array_equal(quaternions_of(Rotation.identity()), [1, 0, 0, 0])
-
-
-def test_orientations_of_a_task():
-    expected = Rotation.from_rotvec([0, 0, np.deg2rad(30)]) * Rotation.from_rotvec(
-        [0, np.deg2rad(20), 0]
-    )
-    expected = expected * Rotation.from_rotvec([np.deg2rad(10), 0, 0])
-    quaternion = quaternions_of(expected)
-    for attitude, tolerance in (
-        (Attitude(rpy_deg=(10, 20, 30)), 1e-15),
-        (Attitude(rotation_vector=tuple(expected.as_rotvec())), 1e-15),
-        (Attitude(quaternion_wxyz=tuple(quaternion)), 1e-15),
-        (Attitude(quaternion_wxyz=tuple(np.round(quaternion, 3))), 2e-3),
-    ):
-        assert (attitude.rotation.inv() * expected).magnitude() < tolerance
-        assert np.linalg.norm(quaternions_of(attitude.rotation)) == pytest.approx(
-            1.0, abs=1e-15
-        )
 
 
 def test_quaternion_derivatives_give_the_matrix_back():

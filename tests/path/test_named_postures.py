@@ -1,9 +1,5 @@
 """Postures by name: at both ends of a task, and lines that lead to the tool's place in one."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,7 +8,6 @@ import brachis
 from brachis.errors import InputError, PathError, StartError, TaskError
 from brachis.problem.feasibility import check_regular
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.robot import Robot
 from brachis.task import load_task, task_with
 from brachis.task.units import unit_of
 
@@ -22,12 +17,12 @@ FRAME = pin.SE3(pin.rpy.rpyToMatrix(0.2, -0.4, 1.0), np.array([0.2, 0.1, 0.3]))
 
 
 def problem(
-    space: Any,
-    robot: Robot | None = None,
-    home: Any = HOME,
-    away: Any = AWAY,
-    **keys: Any,
-) -> Problem:
+    space,
+    robot=None,
+    home=HOME,
+    away=AWAY,
+    **keys,
+):
     """A path from one posture to another one."""
     content = {
         "path": [brachis.Line(to_posture="home")],
@@ -38,7 +33,7 @@ def problem(
     return Problem.of(robot or brachis.robots.iiwa14, task_with(**content | keys))
 
 
-def end_of(given: Problem) -> np.ndarray:
+def end_of(given):
     return given.path.sample([1.0]).target[0]
 
 
@@ -46,7 +41,7 @@ def end_of(given: Problem) -> np.ndarray:
     "frame", [{}, {"frames": {"user1": FRAME}, "path_frame": "user1"}]
 )
 @pytest.mark.parametrize("space", ["position", "pose", "pose_free_roll"])
-def test_a_line_ends_at_the_tool_s_place(space: str, frame: dict[str, Any]) -> None:
+def test_a_line_ends_at_the_tool_s_place(space, frame):
     robot = brachis.robots.iiwa14
     place = robot.tool_placement(HOME)
     names = dict(zip(robot.joint_names, HOME, strict=True))
@@ -57,12 +52,12 @@ def test_a_line_ends_at_the_tool_s_place(space: str, frame: dict[str, Any]) -> N
             np.testing.assert_allclose(end[3:], place.rotation.ravel(), atol=1e-12)
 
 
-def test_of_joints_it_ends_in_the_posture() -> None:
+def test_of_joints_it_ends_in_the_posture():
     np.testing.assert_allclose(end_of(problem("joints")), HOME, atol=1e-14)
 
 
 @pytest.mark.parametrize("turn", [0.5, 3.0, -3.0])
-def test_yaw_turns_the_shorter_way(turn: float) -> None:
+def test_yaw_turns_the_shorter_way(turn):
     away = [0.5, -2.1, 2.1]
     home = [0.5 + turn, -2.0, 2.1]
     given = problem(["x", "y", "yaw"], brachis.robots.scara3, home, away)
@@ -72,7 +67,7 @@ def test_yaw_turns_the_shorter_way(turn: float) -> None:
     assert np.cos(ends[1] - sum(home)) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_a_plan_begins_and_ends_in_named_postures() -> None:
+def test_a_plan_begins_and_ends_in_named_postures():
     result = brachis.plan(
         "scara3",
         path=brachis.Line(by=[0.0, 0.1], stop=True) + brachis.Line(to_posture="home"),
@@ -89,7 +84,7 @@ def test_a_plan_begins_and_ends_in_named_postures() -> None:
     assert result.trajectory.task.start == "home"
 
 
-def test_a_change_of_a_posture_moves_start_and_path() -> None:
+def test_a_change_of_a_posture_moves_start_and_path():
     task = problem("position").task
     moved = load_task(task, changes={"postures.home": AWAY, "postures.away": HOME})
     given = Problem.of(brachis.robots.iiwa14, moved)
@@ -117,7 +112,7 @@ def test_a_change_of_a_posture_moves_start_and_path() -> None:
         ),
     ],
 )  # fmt: skip
-def test_wrong_names(keys: dict[str, Any], message: str) -> None:
+def test_wrong_names(keys, message):
     with pytest.raises(TaskError, match=message):
         problem("pose", **keys)
 
@@ -140,12 +135,10 @@ ELSEWHERE = brachis.Line(by=[0.1, 0.0, 0.0])
         ({"end": {"joints": HOME}, "path": [ELSEWHERE]}, "end.joints", "the end posture is off"),
     ],
 )  # fmt: skip
-def test_errors_name_the_key_of_a_posture(
-    keys: dict[str, Any], key: str, message: str
-) -> None:
+def test_errors_name_the_key_of_a_posture(keys, key, message):
     """Singular ones are refused before the search."""
 
-    def check() -> None:
+    def check():
         given = problem("position", **keys)
         check_regular(given.task, given.task_map, given.given_postures)
 
@@ -154,7 +147,7 @@ def test_errors_name_the_key_of_a_posture(
     assert caught.value.where == key
 
 
-def test_the_branch_of_a_posture_is_refused_by_its_key() -> None:
+def test_the_branch_of_a_posture_is_refused_by_its_key():
     path = [brachis.Line(to_posture="home")]
     ends = {"start": "away", "end": "home", "path": path}
     robot = brachis.robots.scara3
@@ -165,7 +158,7 @@ def test_the_branch_of_a_posture_is_refused_by_its_key() -> None:
     assert caught.value.where == "postures.home"
 
 
-def test_postures_that_do_not_fit() -> None:
+def test_postures_that_do_not_fit():
     with pytest.raises(InputError, match=r"postures\.home"):
         problem("pose", home=HOME[:6])
     with pytest.raises(InputError, match=r"postures\.home.*joint_8"):

@@ -1,9 +1,5 @@
 """Every way in which a path of poses can be wrong, and what is said about it."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,28 +10,28 @@ from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import CsvSegment, PointFile
 from support.poses import pose, pose_path
 
-RIGHT: dict[str, Any] = {"line": {"by": [1, 0, 0]}}
-UP: dict[str, Any] = {"line": {"by": [0, 0, 1]}}
-TURN: dict[str, Any] = {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}
-TILT: dict[str, Any] = {"rotate": {"axis": [1, 0, 0], "angle_deg": 90}}
-HALF: dict[str, Any] = {"rpy_deg": [180, 0, 0]}
+RIGHT = {"line": {"by": [1, 0, 0]}}
+UP = {"line": {"by": [0, 0, 1]}}
+TURN = {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}
+TILT = {"rotate": {"axis": [1, 0, 0], "angle_deg": 90}}
+HALF = {"rpy_deg": [180, 0, 0]}
 
 
-def refused(segments: list[dict[str, Any]]) -> PathError:
+def refused(segments):
     with pytest.raises(PathError) as caught:
         pose_path(segments, np.zeros(3), Rotation.identity())
     return caught.value
 
 
-def spline(**keys: Any) -> dict[str, Any]:
+def spline(**keys):
     return {"spline": {"through": [[1, 0, 0], [1, 1, 0], [1, 1, 1]]} | keys}
 
 
-def along(*attitudes: Any, **keys: Any) -> dict[str, Any]:
+def along(*attitudes, **keys):
     return spline(orientations=[{"rpy_deg": one} for one in attitudes], **keys)
 
 
-SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
+SEGMENTS = [
     (
         {"line": {"to": [1, 2]}},
         ["path[0].line.to: wrong number of coordinates", "allowed: 3: [x, y, z]"],
@@ -177,13 +173,13 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
 @pytest.mark.parametrize(
     ("segment", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS]
 )
-def test_wrong_segments(segment: dict[str, Any], expected: list[str]) -> None:
+def test_wrong_segments(segment, expected):
     message = str(refused([segment]))
     for text in expected:
         assert any(one in message for one in text.split("|")), message
 
 
-def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
+def test_a_jump_of_the_turning_rate_is_told_in_words():
     error = refused([RIGHT | {"orientation": TURN}, RIGHT])
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0, z = 0: the path must be smooth to the third derivative; found "
@@ -240,21 +236,19 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
         ),
     ],
 )
-def test_what_jumps_at_a_join(
-    segments: list[dict[str, Any]], expected: list[str]
-) -> None:
+def test_what_jumps_at_a_join(segments, expected):
     message = str(refused(segments))
     for text in expected:
         assert text in message
 
 
-def test_a_blend_beside_a_turn_on_the_spot() -> None:
+def test_a_blend_beside_a_turn_on_the_spot():
     message = str(refused([RIGHT | {"blend": 0.1}, {"turn": TURN}]))
     assert "on one the tool turns on the spot" in message
     assert "Turn the tool along a line" in message
 
 
-def test_a_blend_in_which_the_tool_turns_too_much() -> None:
+def test_a_blend_in_which_the_tool_turns_too_much():
     fast = {"rotate": {"axis": [0, 0, 1], "angle_deg": 1500}}
     back = {"rotate": {"axis": [0, 0, 1], "angle_deg": -1500}}
     error = refused(
@@ -269,7 +263,7 @@ def test_a_blend_in_which_the_tool_turns_too_much() -> None:
 
 
 @pytest.mark.parametrize("rows", [POSE_ROWS, ("x", "y", "z")])
-def test_a_csv_file_is_read_before(rows: tuple[str, ...]) -> None:
+def test_a_csv_file_is_read_before(rows):
     start = pose(np.zeros(3), Rotation.identity())[: 12 if rows == POSE_ROWS else 3]
     with pytest.raises(
         PathError, match=r"path\[0\].csv.file: the file has not been read; found a.csv"

@@ -1,26 +1,20 @@
 """Stops of a path, where it may have corners, and the parts of a path between two places."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 
 from brachis.errors import PathError
-from brachis.path import Path, build_path
+from brachis.path import build_path
 from brachis.path.sequence import PathFrame
 from brachis.task import Placement, load_task
 
-RIGHT: dict[str, Any] = {"line": {"by": [0.3, 0.0, 0.0]}}
-UP: dict[str, Any] = {"line": {"by": [0.0, 0.0, 0.1]}}
-TURN: dict[str, Any] = {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}}
+RIGHT = {"line": {"by": [0.3, 0.0, 0.0]}}
+UP = {"line": {"by": [0.0, 0.0, 0.1]}}
+TURN = {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}}
 POSE = [0.5, 0.0, 0.4, *np.eye(3).ravel()]
 
 
-def path_of(
-    segments: list[dict[str, Any]], space: Any = "position", frame: Any = None
-) -> Path:
+def path_of(segments, space="position", frame=None):
     task = load_task(
         {
             "brachis": 1,
@@ -33,7 +27,7 @@ def path_of(
     return build_path(task.path, POSE if space == "pose" else POSE[:3], rows, frame)
 
 
-def test_a_path_has_corners_at_its_stops_alone() -> None:
+def test_a_path_has_corners_at_its_stops_alone():
     path = path_of([{**RIGHT, "stop": True}, {**UP, "dwell": 0.5}, RIGHT])
     np.testing.assert_allclose(path.stops, [3 / 7, 4 / 7], atol=1e-15)
     assert len(path_of([RIGHT, RIGHT]).stops) == 0
@@ -41,14 +35,7 @@ def test_a_path_has_corners_at_its_stops_alone() -> None:
         path_of([{**RIGHT, "stop": True}, UP, RIGHT])
 
 
-def test_blends_and_stops_follow_each_other() -> None:
-    path = path_of([{**RIGHT, "blend": 0.05}, {**UP, "stop": True}, RIGHT])
-    (stop,) = path.stops
-    assert stop == path.breaks[3]
-    np.testing.assert_allclose(path.sample([stop]).target, [[0.8, 0.0, 0.5]])
-
-
-def test_the_tool_turns_on_the_spot_at_a_stop() -> None:
+def test_the_tool_turns_on_the_spot_at_a_stop():
     with pytest.raises(PathError, match=r"a stop: .*set path\[0\].stop: true"):
         path_of([RIGHT, {**TURN, "stop": True}, UP], "pose")
     path = path_of([{**RIGHT, "stop": True}, {**TURN, "stop": True}, UP], "pose")
@@ -65,7 +52,7 @@ FRAME = PathFrame.of(
 
 
 @pytest.mark.parametrize(("space", "frame"), [("position", FRAME), ("pose", None)])
-def test_a_part_of_a_path_is_the_path(space: str, frame: Any) -> None:
+def test_a_part_of_a_path_is_the_path(space, frame):
     """Inside its ends to rounding, in the same s and frame, to all derivatives."""
     spline = {
         "spline": {"through": [[0.1, 0.1, 0.0], [0.2, 0.3, 0.1]], "relative": True}
@@ -87,7 +74,7 @@ def test_a_part_of_a_path_is_the_path(space: str, frame: Any) -> None:
         np.testing.assert_allclose(getattr(other, name), expected, atol=off)
 
 
-def test_a_part_goes_on_as_it_begins_and_ends() -> None:
+def test_a_part_goes_on_as_it_begins_and_ends():
     path = path_of([{**RIGHT, "stop": True}, {**UP, "stop": True}, RIGHT])
     first, last = path.stops
     middle = path.between(first, last)

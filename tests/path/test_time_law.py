@@ -1,33 +1,25 @@
 """The time law of a given speed: s(t) by hand on lines, the speed at all times elsewhere, its derivatives and ends."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 
 import brachis
 from brachis.errors import PathError
-from brachis.path import Leg, Path, TimeLaw, path_of, time_law_of
-from brachis.robot import TaskMap, bind, task_map_of
+from brachis.path import Leg, path_of, time_law_of
+from brachis.robot import bind, task_map_of
 from brachis.task import load_task
 
-LINE: dict[str, Any] = {"line": {"by": [0.2, 0.0, 0.0]}}
-UP: dict[str, Any] = {"line": {"by": [0.0, 0.0, 0.2]}}
+LINE = {"line": {"by": [0.2, 0.0, 0.0]}}
+UP = {"line": {"by": [0.0, 0.0, 0.2]}}
 WAVE = [[0.05, 0.05, 0.0], [0.15, -0.05, 0.05], [0.2, 0.1, 0.0], [0.3, 0.1, 0.1]]
-SPLINE: dict[str, Any] = {"spline": {"through": WAVE, "relative": True}}
-CIRCLE: dict[str, Any] = {
-    "circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1], "turns": 3}
-}
+SPLINE = {"spline": {"through": WAVE, "relative": True}}
+CIRCLE = {"circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1], "turns": 3}}
 POSE = {"position": [0.4, 0.0, 0.5], "rpy_deg": [180, 0, 0]}
 
 
-def path_and_map(
-    segments: list[dict[str, Any]], space: str = "position"
-) -> tuple[TaskMap, Path]:
+def path_and_map(segments, space="position"):
     start = POSE if space == "pose" else POSE["position"]
-    keys: dict[str, Any] = {"start": "free", "path_start": start}
+    keys = {"start": "free", "path_start": start}
     if space == "joints":
         keys = {"start": {"joints": [0.0, 0.5, 0.0, -1.0, 0.0, 0.5, 0.0]}}
     task = load_task({"brachis": 1, **keys, "task_space": space, "path": segments})
@@ -35,16 +27,14 @@ def path_and_map(
     return task_map, path_of(task_map, task)
 
 
-def law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw:
+def law_of(leg, task_map, path):
     law = time_law_of(leg, task_map, path)
     assert law is not None
     return law
 
 
 @pytest.mark.parametrize(("segment", "length"), [(LINE, 0.2), (CIRCLE, 0.6 * np.pi)])
-def test_it_is_linear_on_lines_and_circles(
-    segment: dict[str, Any], length: float
-) -> None:
+def test_it_is_linear_on_lines_and_circles(segment, length):
     task_map, path = path_and_map([segment])
     law = law_of(Leg(0.2, 0.7, speed=0.1), task_map, path)
     assert law.spline.k == 1
@@ -56,33 +46,12 @@ def test_it_is_linear_on_lines_and_circles(
     np.testing.assert_allclose(law.ends[-1], [0.7, 0.1 / length, 0, 0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_across_a_rounded_corner_the_speed_is_kept(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    first, second, blend = rng.uniform([0.2, 0.2, 0.02], [0.6, 0.5, 0.1])
-    angle = rng.uniform(-2.5, 2.5)
-    way = [0.0, second * np.cos(angle), second * np.sin(angle)]
-    segments = [
-        {"line": {"by": [0.0, first, 0.0]}, "blend": float(blend)},
-        {"line": {"by": way}},
-    ]
-    task_map, path = path_and_map(segments)
-    assert np.diff(path.knots).min() > 1e-9
-    _, begin, end, _ = path.breaks
-    leg = Leg(0.5 * begin, 0.5 * (end + 1.0), speed=0.1)
-    law = law_of(leg, task_map, path)
-    s, rate, _, _ = law.at(np.linspace(0.0, law.duration, 201))
-    slopes = path.derivatives(s, 1)[1]
-    speeds = rate * np.linalg.norm(slopes[:, :3], axis=1)
-    np.testing.assert_allclose(speeds, 0.1, rtol=1e-6)
-
-
-def test_a_free_leg_has_none() -> None:
+def test_a_free_leg_has_none():
     assert time_law_of(Leg(0.0, 1.0), *path_and_map([LINE])) is None
 
 
 WINDING = [[0.3, 0.7, 0.1, -1.2, 0.2, 0.7, 0.1], [0.6, 0.6, 0.3, -1.0, 0.4, 0.5, 0.5]]
-CASES: dict[str, tuple[list[dict[str, Any]], str]] = {
+CASES = {
     "blend": ([{**LINE, "blend": 0.05}, UP], "position"),
     "spline": ([SPLINE], "position"),
     "turning": ([{**SPLINE, "orientation": "tangent"}], "pose"),
@@ -91,14 +60,12 @@ CASES: dict[str, tuple[list[dict[str, Any]], str]] = {
 
 
 @pytest.fixture(scope="module", params=CASES)
-def case(request: pytest.FixtureRequest) -> tuple[TaskMap, Path, TimeLaw]:
+def case(request):
     task_map, path = path_and_map(*CASES[request.param])
     return task_map, path, law_of(Leg(0.1, 0.9, speed=0.3), task_map, path)
 
 
-def speeds(
-    task_map: TaskMap, path: Path, s: np.ndarray, rate: np.ndarray
-) -> np.ndarray:
+def speeds(task_map, path, s, rate):
     """Speed of the tool, (K,), m/s; of a path of joints by Jacobians."""
     sample = path.sample(s)
     velocity = sample.xi[:, :3]
@@ -109,7 +76,7 @@ def speeds(
     return np.linalg.norm(velocity, axis=1) * rate
 
 
-def test_the_speed_is_met_at_all_times(case: Any) -> None:
+def test_the_speed_is_met_at_all_times(case):
     task_map, path, law = case
     s, rate, *_ = law.at(np.linspace(0.0, law.duration, 5_001))
     steady = np.full(len(s), rate.mean())
@@ -119,15 +86,7 @@ def test_the_speed_is_met_at_all_times(case: Any) -> None:
     assert s[[0, -1]] == pytest.approx([0.1, 0.9], abs=1e-14)
 
 
-def test_the_tool_passes_its_length_in_the_duration(case: Any) -> None:
-    task_map, path, law = case
-    s = np.linspace(0.1, 0.9, 10_001)
-    per_s = speeds(task_map, path, s, np.ones(len(s)))
-    length = np.sum(0.5 * (per_s[1:] + per_s[:-1]) * np.diff(s))
-    assert law.duration == pytest.approx(length / 0.3, rel=1e-8)
-
-
-def test_derivatives_equal_differences_and_continue(case: Any) -> None:
+def test_derivatives_equal_differences_and_continue(case):
     *_, law = case
     t = np.linspace(0.01, 0.99, 301) * law.duration
     h = 1e-5 * law.duration
@@ -142,13 +101,13 @@ def test_derivatives_equal_differences_and_continue(case: Any) -> None:
     assert np.all(jump < 1e-6 * np.abs(now).max(axis=1))
 
 
-def turning_back(width: float) -> tuple[TaskMap, Path]:
+def turning_back(width):
     """A spline that turns back within a few widths, m."""
     through = [[0.1, 0.0, 0.0], [0.0, width, 0.0], [0.1, 2.0 * width, 0.0]]
     return path_and_map([{"spline": {"through": through, "relative": True}}])
 
 
-def test_a_narrow_turn_is_passed_to_the_rounding_of_times() -> None:
+def test_a_narrow_turn_is_passed_to_the_rounding_of_times():
     task_map, path = turning_back(1e-4)
     law = law_of(Leg(0.1, 0.9, speed=0.1), task_map, path)
     s, rate, *_ = law.at(np.linspace(0.0, law.duration, 5_001))
@@ -157,7 +116,7 @@ def test_a_narrow_turn_is_passed_to_the_rounding_of_times() -> None:
     assert np.quantile(off, 0.9) < 1e-9
 
 
-def test_a_cusp_has_no_constant_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cusp_has_no_constant_speed(monkeypatch):
     monkeypatch.setattr("brachis.path.time_law._MOST_INTERVALS", 1000)  # for time
     task_map, path = turning_back(0.0)
     with pytest.raises(PathError, match="bends too abruptly") as caught:
@@ -166,7 +125,7 @@ def test_a_cusp_has_no_constant_speed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert min(abs(caught.value.s_interval[0] - at) for at in (0.264, 0.736)) < 1e-2
 
 
-def test_its_ends_are_exact(case: Any) -> None:
+def test_its_ends_are_exact(case):
     """By differences of the exact rate: sddot = d(sdot^2 / 2)/ds, and so on."""
     task_map, path, law = case
     for end, s in ((0, 0.1), (-1, 0.9)):

@@ -1,7 +1,5 @@
 """Figures that are hardly meant: which are told, how, and that real robots are left in peace."""
 
-from __future__ import annotations
-
 import re
 import sys
 import warnings
@@ -39,7 +37,7 @@ FOREIGN = sorted(
 OWN = sorted((ROOT / "robots").rglob("*.urdf"))
 
 
-def task(**changes: object) -> dict:
+def task(**changes):
     base = {
         "brachis": 1,
         "robot": {
@@ -57,7 +55,7 @@ def task(**changes: object) -> dict:
     return {**base, **changes}
 
 
-def with_limits(**limits: object) -> dict:
+def with_limits(**limits):
     return task(
         robot={**task()["robot"], "limits": {"torque": 10, "velocity": None, **limits}}
     )
@@ -65,11 +63,11 @@ def with_limits(**limits: object) -> dict:
 
 def arm(
     *,
-    length: float = 0.4,
-    mass: float = 2.0,
-    inertia: float = 0.01,
-    slide: bool = False,
-) -> Robot:
+    length=0.4,
+    mass=2.0,
+    inertia=0.01,
+    slide=False,
+):
     matrix = " ".join(f'{key}="{inertia}"' for key in ("ixx", "iyy", "izz"))
     inertial = f'<inertial><mass value="{mass}"/><inertia {matrix} ixy="0" ixz="0" iyz="0"/></inertial>'
     kinds = ("prismatic" if slide else "revolute", "revolute", "revolute")
@@ -79,14 +77,14 @@ def arm(
     )
 
 
-def told(robot: Robot) -> list[tuple[str, str]]:
+def told(robot):
     return [(remark.where, remark.message) for remark in of_robot(robot)]
 
 
 UNLIMITED = LimitSpec(torque=None, velocity=None, acceleration=1.0)
 
 
-def with_stated_speeds(file: Path) -> Robot | None:
+def with_stated_speeds(file):
     """The robot with the URDF's limits but for torques; None for files that hold no arm."""
     try:
         limb = default_chain(read_file(file), file.name)
@@ -369,7 +367,7 @@ WAVE = np.linspace(0.0, 1.5, 50)[:, None]
         (0.004, None),
     ],
 )
-def test_the_tolerance_of_a_fit_in_mm(tolerance: float | str, remark: str | None):
+def test_the_tolerance_of_a_fit_in_mm(tolerance, remark):
     """The unit of bare numbers is m, whatever that of the points is."""
     circle = 200.0 * np.hstack([np.cos(WAVE), np.sin(WAVE)])
     path = brachis.fit_path(

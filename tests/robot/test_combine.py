@@ -1,7 +1,5 @@
 """A robot and a task that has a robot part: what is combined, what is refused, what is kept."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,16 +17,16 @@ SCARA = ROOT / "robots/scara3/robot.urdf"
 RAIL = ROOT / "robots/tx90l_rail/robot.urdf"
 
 
-def scara(torque: object = 10.0, **options: object) -> Robot:
+def scara(torque=10.0, **options):
     spec = brachis.LimitSpec(torque=torque, velocity=None)
     return Robot.from_urdf(SCARA, **{"gravity": [0, 0, 0], "limits": spec, **options})
 
 
-def asked(**settings: object) -> RobotSettings:
+def asked(**settings):
     return check_robot_settings(settings)
 
 
-def line(**robot: object) -> dict:
+def line(**robot):
     return {
         "brachis": 1,
         "robot": robot,

@@ -1,7 +1,5 @@
 """Torques and their derivatives: Lagrange's equations, the friction formula, central differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -18,9 +16,7 @@ FRICTION = {
 }
 
 
-def states(
-    n: int, count: int = 12, seed: int = 0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def states(n, count=12, seed=0):
     rng = np.random.default_rng(seed)
     return tuple(
         scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (3.0, 2.0, 5.0)
@@ -33,7 +29,7 @@ class RodArm:
     mass, length = 10.0, 1.0
 
     @classmethod
-    def mass_matrix(cls, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(cls, q):
         # In absolute angles theta_i: M_ij = c_ij l^2 cos(theta_i - theta_j), c from integrating along the rods.
         share = np.array(
             [[7.0 / 3.0, 1.5, 0.5], [1.5, 4.0 / 3.0, 0.5], [0.5, 0.5, 1.0 / 3.0]]
@@ -46,7 +42,7 @@ class RodArm:
         return to_absolute.T @ absolute @ to_absolute
 
     @classmethod
-    def potential(cls, q: np.ndarray, gravity: float) -> float:
+    def potential(cls, q, gravity):
         theta = np.cumsum(q)
         return (
             cls.mass
@@ -56,7 +52,7 @@ class RodArm:
         )
 
     @classmethod
-    def torque(cls, q, qdot, qddot, gravity: float) -> np.ndarray:
+    def torque(cls, q, qdot, qddot, gravity):
         """Return M qddot + Mdot qdot - d(kinetic)/dq + d(potential)/dq, with differences of closed formulas."""
         h = 1e-6
         slopes = [

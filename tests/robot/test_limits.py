@@ -1,7 +1,5 @@
 """Joint limits: where they come from, in which forms they are given, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -20,7 +18,7 @@ def limits_of(**spec):
     return planar_robot("RRR", limits=LimitSpec(**spec)).limits
 
 
-def with_limit(limits=None, **changes) -> Robot:
+def with_limit(limits=None, **changes):
     limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 1.0, **changes}
     limit = {key: value for key, value in limit.items() if value is not None}
     joints = [Joint("revolute"), Joint("revolute", limit=limit)]

@@ -1,7 +1,5 @@
 """MJCF files; MuJoCo itself, and URDFs with the same figures, say what is right."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 

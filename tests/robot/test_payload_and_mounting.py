@@ -1,7 +1,5 @@
 """Payload, tool offset, mounting, armature, friction of the URDF: against URDFs edited by hand and by formulas."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -49,19 +47,19 @@ OFFSET = {"xyz": [0.1, 0.02, 0.3], "rpy_deg": np.degrees([0.3, -0.7, 1.1])}
 PLACE = {"xyz": [1, -2, 3], "rpy_deg": np.degrees([0.4, 1.2, -0.6])}
 
 
-def states(n: int, count: int = 20) -> tuple[np.ndarray, ...]:
+def states(n, count=20):
     rng = np.random.default_rng(2)
     return tuple(
         scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (2.0, 3.0, 8.0)
     )
 
 
-def edited(*parts: str, text: str = IIWA, tool: str = TOOL, root: str = "base") -> str:
+def edited(*parts, text=IIWA, tool=TOOL, root="base"):
     more = "".join(part.format(tool=tool, root=root) for part in parts)
     return text.replace("</robot>", more + "</robot>")
 
 
-def of(text: str, **options: object) -> Robot:
+def of(text, **options):
     return Robot.from_urdf("x", urdf_text=text, **{"tool_frame": TOOL, **options})
 
 
@@ -109,7 +107,7 @@ def test_a_urdf_edited_by_hand_moves_alike(parts, options, tool):
     assert changes_torque == (options.keys() != {"tool_offset"})
 
 
-def line(**robot: object) -> dict:
+def line(**robot):
     return {
         "brachis": 1,
         "robot": {

@@ -1,7 +1,5 @@
 """Robots from models of Pinocchio; the model itself says what is right."""
 
-from __future__ import annotations
-
 import sys
 from types import ModuleType
 

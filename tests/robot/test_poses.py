@@ -1,7 +1,5 @@
 """Task spaces of poses, and tools that roll freely."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """Postures that a user gives to a robot, and robots as keys."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

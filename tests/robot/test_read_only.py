@@ -1,7 +1,5 @@
 """What hangs on a robot cannot be changed by accident."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np
@@ -12,7 +10,7 @@ from support.chains import planar_robot
 from support.spatial import rail_arm
 
 
-def arrays(kind) -> list[str]:
+def arrays(kind):
     return [
         field.name for field in fields(kind) if field.type in (np.ndarray, "np.ndarray")
     ]

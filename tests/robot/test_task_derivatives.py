@@ -1,7 +1,5 @@
 """Task Jacobian, bias acceleration and their derivatives against differences of forward task_map."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Task maps of rows: values, and the sense of yaw."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

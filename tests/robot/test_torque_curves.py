@@ -1,7 +1,5 @@
 """Torque limits that fall with speed, power and root-mean-square torque: from the task to the robot's limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

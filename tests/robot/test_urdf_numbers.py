@@ -1,7 +1,5 @@
 """Numbers of a URDF: each is checked where it stands, and the model weighs what the file says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -23,7 +21,7 @@ TEXT = chain_urdf(
 )
 
 
-def refused(text: str) -> str:
+def refused(text):
     with pytest.raises(UrdfError) as caught:
         Robot.from_urdf(
             "file.urdf", urdf_text=text, tool_frame="tool", limits=LimitSpec(torque=1.0)
@@ -31,7 +29,7 @@ def refused(text: str) -> str:
     return str(caught.value)
 
 
-def changed(old: str, new: str, text: str = TEXT) -> str:
+def changed(old, new, text=TEXT):
     assert old in text
     return text.replace(old, new, 1)
 

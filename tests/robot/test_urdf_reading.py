@@ -1,7 +1,5 @@
 """URDF to chain: what is read, what is locked, and what is refused in which words."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -35,7 +33,7 @@ GRIPPER = """
 """.replace("{inertial}", INERTIAL.format(mass=0.5))
 
 
-def load(joints, **options) -> Robot:
+def load(joints, **options):
     more = options.pop("more", "")
     return Robot.from_urdf(
         "file.urdf",
@@ -266,7 +264,7 @@ def test_mass_without_inertia_is_refused():
         Robot.from_urdf("memory", urdf_text=without)
 
 
-def inertial(mass: float, moments: tuple[float, float, float]) -> str:
+def inertial(mass, moments):
     ixx, iyy, izz = moments
     return (
         f"<inertial><mass value='{mass}'/>"

@@ -1,7 +1,5 @@
 """Distances of a scene against formulas, Pinocchio and MuJoCo; bounds; which pairs there are."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Scenes from files and from Python, meshes, SRDF; what inspect and the viewer show of them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

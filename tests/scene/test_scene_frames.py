@@ -1,10 +1,5 @@
 """Bodies in frames: where they are, by Pinocchio, also after a sweep of the frame and with frames in frames."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import jsonschema
 import numpy as np
 import pinocchio as pin
@@ -13,7 +8,7 @@ import pytest
 import brachis
 from brachis.errors import TaskError
 from brachis.robot.from_task import robot_from_settings
-from brachis.scene import Scene, scene_of
+from brachis.scene import scene_of
 from brachis.scene.chain import Chain
 from brachis.task import json_schema, load_task
 
@@ -25,12 +20,12 @@ CELL = """<robot name="cell"><link name="top"><collision><origin xyz="0 0 0.1"/>
 </geometry></collision></link></robot>"""
 
 
-def transform(place: dict[str, Any]) -> pin.SE3:
+def transform(place):
     turn = pin.rpy.rpyToMatrix(*np.radians(place.get("rpy_deg", [0, 0, 0])))
     return pin.SE3(turn, np.array(place["xyz"], dtype=float))
 
 
-def task(**keys: Any) -> brachis.Task:
+def task(**keys):
     box = {"box": [0.1, 0.05, 0.04], "name": "clamp", "frame": "user1"}
     content = {
         "brachis": 1,
@@ -46,20 +41,20 @@ def task(**keys: Any) -> brachis.Task:
     return load_task(content | keys, changes=changes)
 
 
-def scene(of: brachis.Task) -> Scene:
+def scene(of):
     found = scene_of(robot_from_settings(of.robot), of)
     assert found is not None
     return found
 
 
-def clearance(of: brachis.Task) -> float:
+def clearance(of):
     chain = Chain.of(robot_from_settings(of.robot).model)
     closest = scene(of).find_closest(chain.place(np.array([START])))
     return float(closest.distance[0])
 
 
 @pytest.mark.parametrize("x", [0.5, 0.72, -0.3])
-def test_a_body_moves_with_its_frame(x: float) -> None:
+def test_a_body_moves_with_its_frame(x):
     table = {**TABLE, "xyz": [x, -0.2, 0.3]}
     expected = transform(table) * transform(USER) * transform(CLAMP)
     for moved in (
@@ -71,7 +66,7 @@ def test_a_body_moves_with_its_frame(x: float) -> None:
         np.testing.assert_allclose(placed, expected.homogeneous, atol=1e-12)
 
 
-def test_the_plane_of_a_half_space_is_in_its_frame() -> None:
+def test_the_plane_of_a_half_space_is_in_its_frame():
     plane = brachis.HalfSpace([0.0, 0.6, 0.8], offset=0.1, frame="user1")
     solid = scene(task(scene=[plane])).solids[-1]
     frame = transform(TABLE) * transform(USER)
@@ -81,7 +76,7 @@ def test_the_plane_of_a_half_space_is_in_its_frame() -> None:
     assert solid.geometry.d == pytest.approx(normal @ point, abs=1e-12)
 
 
-def test_the_clearance_stays_where_robot_and_frame_move_together() -> None:
+def test_the_clearance_stays_where_robot_and_frame_move_together():
     """And changes where only one of them moves."""
     step = transform({"xyz": [0.3, -0.1, 0.2], "rpy_deg": [0.0, 0.0, 40.0]})
     table = step * transform(TABLE)
@@ -94,7 +89,7 @@ def test_the_clearance_stays_where_robot_and_frame_move_together() -> None:
     assert abs(clearance(task(robot=robot)) - plain) > 0.01
 
 
-def test_a_cell_from_a_file_stands_in_a_frame(tmp_path: Path) -> None:
+def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
     (tmp_path / "cell.urdf").write_text(CELL)
     (tmp_path / "cell.yaml").write_text(
         "brachis_scene: 1\nbodies:\n"
@@ -113,7 +108,7 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path: Path) -> None:
     assert found.solids[-1].link == "tool"
 
 
-def test_bodies_and_path_of_a_plan_move_together() -> None:
+def test_bodies_and_path_of_a_plan_move_together():
     """A sweep of the frame leaves the distance from the tool's path to the body as it is."""
     body = brachis.Box([0.1, 0.1, 0.02], frame="user1", position=[0.0, 0.0, -0.2])
     segments = [brachis.Line(to=[0.1, 0.0, 0.0])]
@@ -154,6 +149,6 @@ def test_bodies_and_path_of_a_plan_move_together() -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_named(keys: dict[str, Any], message: str) -> None:
+def test_what_is_wrong_is_named(keys, message):
     with pytest.raises(TaskError, match=message):
         task(**keys)

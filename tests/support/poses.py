@@ -1,4 +1,4 @@
-"""Paths of poses for tests, and finite differences along them."""
+"""Paths as a task describes them, and finite differences along paths of poses."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from brachis.path import build_path
+from brachis.path import Path, build_path
 from brachis.path.pose import PosePath
 from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import load_task
@@ -35,6 +35,15 @@ def pose_path(
     )
     path = build_path(task.path, pose(position, rotation), POSE_ROWS)
     assert isinstance(path, PosePath)
+    return path
+
+
+def row_path(segments: list[dict[str, Any]], start: Any, rows: Any) -> Path:
+    """The path of rows that segments describe as a task file writes them."""
+    content = {"brachis": 1, "start": {"joints": [0]}, "redundant_joints": []}
+    task = load_task({**content, "task_space": rows, "path": segments})
+    path = build_path(task.path, start, rows)
+    assert isinstance(path, Path)
     return path
 
 

@@ -1,17 +1,13 @@
 """Waypoints from CSV files: what a task makes of them, and what every mistake is told."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError, TaskError
-from brachis.path import Path as TaskPath
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import CsvSegment, Task, load_task
@@ -27,33 +23,33 @@ S = np.linspace(0, 1, 20)
 
 
 @pytest.fixture(autouse=True)
-def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def write(header: str, rows: Any, name: str = "poses.csv") -> None:
+def write(header, rows, name="poses.csv"):
     lines = [header, *(",".join(repr(float(value)) for value in row) for row in rows)]
     Path(name).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def task(space: Any = "pose", **keys: Any) -> Task:
+def task(space="pose", **keys):
     segment = {"csv": {"file": "poses.csv"} | keys}
     return load_task(
         {"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": [segment]}
     )
 
 
-def spline_of(one: Task) -> SplineThrough:
+def spline_of(one):
     (segment,) = one.path
     assert isinstance(segment, SplineSegment)
     return segment.spline
 
 
-def path_of(one: Task, position: Any, turn: Rotation) -> TaskPath:
+def path_of(one, position, turn):
     return build_path(one.path, pose(position, turn), POSE_ROWS)
 
 
-def test_quaternions() -> None:
+def test_quaternions():
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
     spline = spline_of(task())
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
@@ -67,7 +63,7 @@ def test_quaternions() -> None:
     assert not spline.relative
 
 
-def test_rotation_vectors_in_any_order_of_columns() -> None:
+def test_rotation_vectors_in_any_order_of_columns():
     write("rz,ry,rx,z,y,x", np.hstack([POINTS, TURNS.as_rotvec()])[:, ::-1])
     spline = spline_of(task("pose_free_roll", orientation="rotation_vector"))
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
@@ -77,7 +73,7 @@ def test_rotation_vectors_in_any_order_of_columns() -> None:
     )
 
 
-def test_both_forms_give_the_same_path() -> None:
+def test_both_forms_give_the_same_path():
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, -QUATERNIONS]))
     one = path_of(task(), POINTS[0], TURNS[0])
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
@@ -88,7 +84,7 @@ def test_both_forms_give_the_same_path() -> None:
     )
 
 
-def test_positions_alone_leave_the_orientation_to_the_segment() -> None:
+def test_positions_alone_leave_the_orientation_to_the_segment():
     write("x,y,z", POINTS)
     segment = {"csv": {"file": "poses.csv"}, "orientation": "tangent", "blend": 0.01}
     line = {"line": {"by": [0.1, 0, 0]}}
@@ -112,7 +108,7 @@ def test_positions_alone_leave_the_orientation_to_the_segment() -> None:
 
 
 @pytest.mark.parametrize("rows", [["x", "y"], ["x", "z", "pitch"], "position", ["y"]])
-def test_rows(rows: Any) -> None:
+def test_rows(rows):
     names = ["x", "y", "z"] if rows == "position" else rows
     write(",".join(names), POINTS[:, : len(names)])
     made = task(rows)
@@ -122,7 +118,7 @@ def test_rows(rows: Any) -> None:
     )
 
 
-def test_relative_rows_start_anywhere() -> None:
+def test_relative_rows_start_anywhere():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     vectors = {"orientation": "rotation_vector"}
     recorded = path_of(task(**vectors), POINTS[0], TURNS[0]).sample(S).target
@@ -136,7 +132,7 @@ def test_relative_rows_start_anywhere() -> None:
     np.testing.assert_allclose(moved[:, 3:].reshape(-1, 3, 3), expected, atol=1e-12)
 
 
-def test_a_start_elsewhere_is_told_by_how_much() -> None:
+def test_a_start_elsewhere_is_told_by_how_much():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     with pytest.raises(
         PathError,
@@ -152,14 +148,14 @@ def test_a_start_elsewhere_is_told_by_how_much() -> None:
 
 
 @pytest.mark.parametrize("relative", [True, False])
-def test_a_loaded_task_needs_the_file_no_more(relative: bool) -> None:
+def test_a_loaded_task_needs_the_file_no_more(relative):
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
     once = task(relative=relative)
     Path("poses.csv").unlink()
     assert load_task(json.loads(json.dumps(once.to_dict(), allow_nan=False))) == once
 
 
-def test_the_file_is_relative_to_the_task_file() -> None:
+def test_the_file_is_relative_to_the_task_file():
     Path("tasks").mkdir()
     write("x,y,z", POINTS, "tasks/poses.csv")
     text = "{brachis: 1, robot: {urdf: a}, start: {joints: [0]}, task_space: pose, path: [{csv: {file: poses.csv}}]}"
@@ -176,13 +172,13 @@ def test_the_file_is_relative_to_the_task_file() -> None:
     )
 
 
-def test_what_spreadsheets_write_is_read() -> None:
+def test_what_spreadsheets_write_is_read():
     content = '\ufeff# recorded by hand\r\n\r\n x, y ,z\r\n0,0,0\r\n 1, 0,\t0\r\n\r\n"2",1e-1,0\r\n'
     Path("poses.csv").write_bytes(content.encode())
     assert spline_of(task()).through == ((1.0, 0.0, 0.0), (2.0, 0.1, 0.0))
 
 
-def test_poses_on_the_spot() -> None:
+def test_poses_on_the_spot():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS[[0, 0, 0, 0]], TURNS.as_rotvec()]))
     sample = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0]).sample(
         [0.0, 1.0]
@@ -190,7 +186,7 @@ def test_poses_on_the_spot() -> None:
     np.testing.assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
 
 
-def test_a_task_that_is_not_loaded_keeps_the_file() -> None:
+def test_a_task_that_is_not_loaded_keeps_the_file():
     made = Task.model_validate(
         {
             "brachis": 1,
@@ -202,7 +198,7 @@ def test_a_task_that_is_not_loaded_keeps_the_file() -> None:
     assert isinstance(made.path[0], CsvSegment)
 
 
-MISTAKES: list[tuple[str, list[str]]] = [
+MISTAKES = [
     (
         "",
         [
@@ -290,7 +286,7 @@ MISTAKES: list[tuple[str, list[str]]] = [
 @pytest.mark.parametrize(
     ("content", "expected"), MISTAKES, ids=[content[:40] for content, _ in MISTAKES]
 )
-def test_wrong_files(content: str, expected: list[str]) -> None:
+def test_wrong_files(content, expected):
     Path("poses.csv").write_text(content, encoding="utf-8")
     vectors = {"orientation": "rotation_vector"} if "rx" in content else {}
     with pytest.raises(TaskError) as caught:
@@ -300,7 +296,7 @@ def test_wrong_files(content: str, expected: list[str]) -> None:
         assert text in str(caught.value)
 
 
-def test_columns_of_the_wrong_task_space() -> None:
+def test_columns_of_the_wrong_task_space():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     with pytest.raises(
         TaskError,
@@ -309,7 +305,7 @@ def test_columns_of_the_wrong_task_space() -> None:
         task(["x", "y", "yaw"])
 
 
-def test_unreadable_files() -> None:
+def test_unreadable_files():
     with pytest.raises(
         TaskError,
         match=r"task: path\[0\].csv.file: the file does not exist; found poses.csv",
@@ -326,7 +322,7 @@ def test_unreadable_files() -> None:
         task()
 
 
-def test_one_word_on_the_orientation() -> None:
+def test_one_word_on_the_orientation():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     segment = {
         "csv": {"file": "poses.csv", "orientation": "rotation_vector"},
@@ -355,7 +351,7 @@ EULER = {
 
 
 @pytest.mark.parametrize("convention", EULER)
-def test_angles_of_the_makers_are_read(convention: str) -> None:
+def test_angles_of_the_makers_are_read(convention):
     columns, axes = EULER[convention]
     header = "x,y,z," + ",".join(f"{name}_deg" for name in columns.split(","))
     write(header, np.hstack([POINTS, TURNS.as_euler(axes, degrees=True)]))
@@ -368,7 +364,7 @@ def test_angles_of_the_makers_are_read(convention: str) -> None:
     np.testing.assert_allclose(turns, QUATERNIONS, atol=1e-12)
 
 
-def test_the_tools_axis_leaves_the_roll_open() -> None:
+def test_the_tools_axis_leaves_the_roll_open():
     """The tool's z axis is where the columns say, and the tool does not roll about it between the rows."""
     axes = TURNS.apply([0.0, 0.0, 1.0])
     write("x,y,z,i,j,k", np.hstack([POINTS, axes]))
@@ -394,13 +390,13 @@ AXES = [
 
 
 @pytest.mark.parametrize(("rows", "message"), AXES)
-def test_wrong_axes_are_named(rows: str, message: str) -> None:
+def test_wrong_axes_are_named(rows, message):
     Path("poses.csv").write_text(f"x,y,z,i,j,k\n0,0,0,{rows}\n")
     with pytest.raises(TaskError, match=message):
         task("pose_free_roll")
 
 
-def test_a_tool_that_points_down_may_stay_so() -> None:
+def test_a_tool_that_points_down_may_stay_so():
     write("x,y,z,i,j,k", np.hstack([POINTS, np.tile([0.0, 0.0, -1.0], (4, 1))]))
     spline = spline_of(task("pose_free_roll"))
     assert spline.starts_oriented is not None
@@ -409,7 +405,7 @@ def test_a_tool_that_points_down_may_stay_so() -> None:
     assert set(spline.orientations or ()) == {spline.starts_oriented}
 
 
-def test_quaternions_of_numbered_columns() -> None:
+def test_quaternions_of_numbered_columns():
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, QUATERNIONS]))
     with pytest.raises(
         TaskError,
@@ -477,9 +473,7 @@ AMBIGUOUS = [
 
 
 @pytest.mark.parametrize(("header", "keys", "expected"), AMBIGUOUS, ids=str)
-def test_orientations_that_are_left_open(
-    header: str, keys: dict[str, str], expected: list[str]
-) -> None:
+def test_orientations_that_are_left_open(header, keys, expected):
     write(header, np.arange(2.0 * len(header.split(","))).reshape(2, -1))
     with pytest.raises(TaskError) as caught:
         task(**keys)

@@ -1,7 +1,5 @@
 """Dotted keys."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Limits from a file: where they count, what the task still says, and what is refused."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
@@ -31,7 +29,7 @@ FILE = {
 def loaded(tmp_path):
     """Load a task whose robot part is given, beside a limits file."""
 
-    def load(robot: dict, **changes: object) -> brachis.Task:
+    def load(robot, **changes):
         (tmp_path / "limits.yaml").write_text(
             yaml.safe_dump(FILE | changes), encoding="utf-8"
         )

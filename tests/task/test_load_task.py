@@ -1,11 +1,8 @@
 """Loading tasks: what is accepted, what comes back, and what every mistake is told."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from pydantic import ValidationError
 
 from brachis import examples, robots
 from brachis.errors import TaskError
-from brachis.task import FROM_URDF, LineBy, Task, load_task
+from brachis.task import FROM_URDF, LineBy, load_task
 
 COMPLETE = """
 brachis: 1
@@ -52,7 +49,7 @@ refinement: {tolerance: 1.0e-4, density: 10, max_rounds: 10}
 """
 
 
-def minimal(**changes: Any) -> dict[str, Any]:
+def minimal(**changes):
     task = {
         "brachis": 1,
         "start": {"joints": [0.1, 0.2, 0.3]},
@@ -63,13 +60,13 @@ def minimal(**changes: Any) -> dict[str, Any]:
     return task | changes
 
 
-def written(folder: Path, text: str) -> Path:
+def written(folder, text):
     file = folder / "task.yaml"
     file.write_text(text, encoding="utf-8")
     return file
 
 
-def test_a_robot_may_be_named(tmp_path: Path) -> None:
+def test_a_robot_may_be_named(tmp_path):
     named = COMPLETE.replace("../robots/scara3/robot.urdf", "iiwa14")
     file = written(tmp_path, named)
     assert load_task(file).robot.urdf == str(robots.path_of("iiwa14"))
@@ -79,11 +76,11 @@ def test_a_robot_may_be_named(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def complete(tmp_path: Path) -> Task:
+def complete(tmp_path):
     return load_task(written(tmp_path, COMPLETE))
 
 
-def test_a_complete_file_is_read(complete: Task, tmp_path: Path) -> None:
+def test_a_complete_file_is_read(complete, tmp_path):
     assert complete.robot.urdf == str(
         tmp_path.parent / "robots" / "scara3" / "robot.urdf"
     )
@@ -104,7 +101,7 @@ def test_a_complete_file_is_read(complete: Task, tmp_path: Path) -> None:
     assert complete.solver.tolerance == 1e-6  # YAML 1.1 would read the string '1e-6'
 
 
-def test_defaults() -> None:
+def test_defaults():
     task = load_task(minimal())
     assert task.robot.gravity == (0.0, 0.0, -9.81)
     assert task.end == "free"
@@ -138,18 +135,18 @@ def test_defaults() -> None:
     assert task.robot.friction.coulomb_velocity == 0.01
 
 
-def test_a_task_is_returned_as_it_is(complete: Task) -> None:
+def test_a_task_is_returned_as_it_is(complete):
     assert load_task(complete) is complete
 
 
 @pytest.mark.parametrize("text", [COMPLETE, COMPLETE.replace("velocity: null\n", "\n")])
-def test_round_trip_through_json(tmp_path: Path, text: str) -> None:
+def test_round_trip_through_json(tmp_path, text):
     task = load_task(written(tmp_path, text))
     assert load_task(json.loads(json.dumps(task.to_dict(), allow_nan=False))) == task
 
 
 @pytest.mark.parametrize("key", ["torque", "velocity", "position"])
-def test_an_absent_limit_differs_from_none(key: str) -> None:
+def test_an_absent_limit_differs_from_none(key):
     absent = load_task(minimal())
     none = load_task(minimal(robot={"limits": {key: None}}))
     assert getattr(absent.robot.limits, key) == FROM_URDF
@@ -172,12 +169,12 @@ def test_an_absent_limit_differs_from_none(key: str) -> None:
         ),
     )
 )
-def test_every_form_of_limit_survives_the_round_trip(limit: object) -> None:
+def test_every_form_of_limit_survives_the_round_trip(limit):
     task = load_task(minimal(robot={"limits": {"torque": limit}}))
     assert load_task(task.to_dict()) == task
 
 
-def test_position_is_the_three_rows() -> None:
+def test_position_is_the_three_rows():
     assert load_task(minimal(task_space="position")) == load_task(
         minimal(task_space=["x", "y", "z"])
     )
@@ -186,7 +183,7 @@ def test_position_is_the_three_rows() -> None:
     )
 
 
-def test_arrays_and_paths_are_accepted_in_mappings() -> None:
+def test_arrays_and_paths_are_accepted_in_mappings():
     task = load_task(
         minimal(start={"joints": np.array([1.0, 2.0])}, robot={"urdf": Path("a.urdf")})
     )
@@ -194,7 +191,7 @@ def test_arrays_and_paths_are_accepted_in_mappings() -> None:
     assert task.robot.urdf == str(Path.cwd() / "a.urdf")
 
 
-def test_a_row_of_a_table_keeps_the_names_of_its_numbers() -> None:
+def test_a_row_of_a_table_keeps_the_names_of_its_numbers():
     pandas = pytest.importorskip("pandas")
     row = pandas.DataFrame({"b": [2.0], "a": [1.0]}).iloc[0]
     task = load_task(minimal(start={"joints": row}))
@@ -203,7 +200,7 @@ def test_a_row_of_a_table_keeps_the_names_of_its_numbers() -> None:
     assert load_task(minimal(start={"joints": column})).start.joints == (1.0, 2.0)
 
 
-def test_a_table_in_place_of_numbers_is_named_by_its_type() -> None:
+def test_a_table_in_place_of_numbers_is_named_by_its_type():
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame({"a": [1.0], "b": [2.0]})
     with pytest.raises(TaskError, match="wrong form; found DataFrame; allowed"):
@@ -214,7 +211,7 @@ def test_a_table_in_place_of_numbers_is_named_by_its_type() -> None:
     ("value", "share"),
     [("1 %", 0.01), ("0.5%", 0.005), ("100 %", 1.0), (0.02, 0.02), (0, 0.0)],
 )
-def test_a_share_is_a_fraction_or_a_percentage(value: object, share: float) -> None:
+def test_a_share_is_a_fraction_or_a_percentage(value, share):
     task = load_task(minimal(search={"slower": value}))
     assert task.search.slower == pytest.approx(share, rel=1e-15)
     assert load_task(task.to_dict()) == task
@@ -228,19 +225,19 @@ def test_a_share_is_a_fraction_or_a_percentage(value: object, share: float) -> N
         ("refinement", "tolerance", "0.02 %", 2e-4),
     ],
 )
-def test_all_shares_may_be_percentages(part, key, value, share) -> None:
+def test_all_shares_may_be_percentages(part, key, value, share):
     task = load_task(minimal(**{part: {key: value}}))
     assert getattr(getattr(task, part), key) == pytest.approx(share, rel=1e-15)
     with pytest.raises(TaskError, match=rf"{part}.{key}: out of range"):
         load_task(minimal(**{part: {key: "100 %"}}))
 
 
-def test_a_task_is_frozen(complete: Task) -> None:
+def test_a_task_is_frozen(complete):
     with pytest.raises(ValidationError, match="frozen"):
         complete.branch = "auto"
 
 
-def refused(source: Any) -> TaskError:
+def refused(source):
     with pytest.raises(TaskError) as caught:
         load_task(source)
     assert caught.value.__cause__ is None
@@ -249,7 +246,7 @@ def refused(source: Any) -> TaskError:
 
 
 LINE = {"line": {"to": [1, 0]}}
-MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
+MISTAKES = [
     ({"brachis": 2}, ["task: brachis: ", "found 2", "allowed: 1"]),
     ({"brachis": True}, ["task: brachis: ", "found true (a boolean)"]),
     (
@@ -532,27 +529,27 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
 @pytest.mark.parametrize(
     ("change", "expected"), MISTAKES, ids=[json.dumps(change) for change, _ in MISTAKES]
 )
-def test_every_mistake_is_named(change: dict[str, Any], expected: list[str]) -> None:
+def test_every_mistake_is_named(change, expected):
     error = refused(minimal(**change))
     assert "mistakes" not in str(error), "one mistake, one complaint"
     for text in expected:
         assert text in str(error)
 
 
-def test_degree_two_is_accepted_where_only_the_velocity_vanishes() -> None:
+def test_degree_two_is_accepted_where_only_the_velocity_vanishes():
     assert (
         load_task(minimal(spline={"degree": 2, "rest": "velocity"})).spline.degree == 2
     )
 
 
 @pytest.mark.parametrize("key", ["brachis", "start", "task_space", "path"])
-def test_required_keys(key: str) -> None:
+def test_required_keys(key):
     task = minimal()
     del task[key]
     assert f"task: {key}: this key is required, and missing" in str(refused(task))
 
 
-def test_an_array_of_mistakes_does_not_fill_the_screen() -> None:
+def test_an_array_of_mistakes_does_not_fill_the_screen():
     points = np.full((1000, 2), np.nan)
     with pytest.raises(TaskError) as caught:
         load_task(minimal(path=points))
@@ -562,7 +559,7 @@ def test_an_array_of_mistakes_does_not_fill_the_screen() -> None:
     assert lines[-1] == "  and 1980 more"
 
 
-def test_all_mistakes_are_in_one_message(tmp_path: Path) -> None:
+def test_all_mistakes_are_in_one_message(tmp_path):
     text = (
         COMPLETE.replace("0.9", ".nan")
         .replace("to: [1, 2]", "to: [1, x]")
@@ -629,7 +626,7 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
         ),
     ],
 )
-def test_broken_files(tmp_path: Path, text: str, expected: list[str]) -> None:
+def test_broken_files(tmp_path, text, expected):
     file = written(tmp_path, text)
     message = str(refused(file))
     assert message.startswith(str(file))
@@ -637,7 +634,7 @@ def test_broken_files(tmp_path: Path, text: str, expected: list[str]) -> None:
         assert part in message
 
 
-def test_merge_keys_may_be_overridden(tmp_path: Path) -> None:
+def test_merge_keys_may_be_overridden(tmp_path):
     text = COMPLETE.replace("j1: 10, j2: null", "<<: &limits {j1: 1, j2: 2}, j2: 3")
     assert load_task(written(tmp_path, text)).robot.limits.torque == {
         "j1": 1.0,
@@ -645,31 +642,31 @@ def test_merge_keys_may_be_overridden(tmp_path: Path) -> None:
     }
 
 
-def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder(tmp_path):
     assert "nothing.yaml: the file does not exist" in str(
         refused(tmp_path / "nothing.yaml")
     )
     assert "the file cannot be read" in str(refused(str(tmp_path)))
 
 
-def test_a_binary_file(tmp_path: Path) -> None:
+def test_a_binary_file(tmp_path):
     file = tmp_path / "task.yaml"
     file.write_bytes(b"\xff\xfe\x00")
     assert "not a text file" in str(refused(file))
 
 
-def test_what_is_no_source() -> None:
+def test_what_is_no_source():
     assert "found int; allowed: a file name, a mapping, or a Task" in str(refused(3))
 
 
-def test_a_file_needs_a_urdf(tmp_path: Path) -> None:
+def test_a_file_needs_a_urdf(tmp_path):
     file = written(
         tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", "")
     )
     assert f"{file}: robot.urdf: a task file needs this key" in str(refused(file))
 
 
-def test_the_given_mapping_is_not_changed() -> None:
+def test_the_given_mapping_is_not_changed():
     given_task = minimal(robot={"urdf": "a.urdf"})
     before = copy.deepcopy(given_task)
     load_task(given_task)
@@ -680,7 +677,7 @@ def test_the_given_mapping_is_not_changed() -> None:
     ("key", "word"),
     [("start.joints", "home"), ("search.effort", "for"), ("path_start", "home")],
 )
-def test_words_of_a_sentence_are_not_suggested(key: str, word: str) -> None:
+def test_words_of_a_sentence_are_not_suggested(key, word):
     with pytest.raises(TaskError) as caught:
         load_task(examples.scara_line, changes={key: word})
     assert "Did you mean" not in str(caught.value)

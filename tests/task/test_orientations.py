@@ -1,9 +1,6 @@
 """How a task file orients the tool: what is accepted, what comes back, and what every mistake is told."""
 
-from __future__ import annotations
-
 import json
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +13,6 @@ from brachis.task import (
     AlongTangent,
     LineSegment,
     Rotate,
-    Task,
     ToolPose,
     TurnTo,
     json_schema,
@@ -26,16 +22,16 @@ from brachis.task import (
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.segments import SplineSegment, TurnSegment
 
-LINE: dict[str, Any] = {"line": {"to": [1, 0, 0]}}
-ROTATE: dict[str, Any] = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}
-QUATERNION: dict[str, Any] = {"quaternion_wxyz": [0.6, 0, 0, -0.8]}
-SPLINE: dict[str, Any] = {
+LINE = {"line": {"to": [1, 0, 0]}}
+ROTATE = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}
+QUATERNION = {"quaternion_wxyz": [0.6, 0, 0, -0.8]}
+SPLINE = {
     "through": [[1, 0, 0], [1, 1, 0]],
     "orientations": [QUATERNION, {"rpy_deg": [1, 2, 3]}],
 }
 
 
-def written(*segments: dict[str, Any], space: Any = "pose") -> dict[str, Any]:
+def written(*segments, space="pose"):
     return {
         "brachis": 1,
         "start": {"joints": [0]},
@@ -44,11 +40,11 @@ def written(*segments: dict[str, Any], space: Any = "pose") -> dict[str, Any]:
     }
 
 
-def task(*segments: dict[str, Any]) -> Task:
+def task(*segments):
     return load_task(written(*segments))
 
 
-SEGMENTS: list[dict[str, Any]] = [
+SEGMENTS = [
     LINE,
     LINE | {"orientation": None},
     LINE | {"orientation": "fixed"},
@@ -80,7 +76,7 @@ SEGMENTS: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("segment", SEGMENTS, ids=json.dumps)
-def test_round_trip(segment: dict[str, Any]) -> None:
+def test_round_trip(segment):
     once = task(segment)
     assert load_task(json.loads(json.dumps(once.to_dict(), allow_nan=False))) == once
     validators = pytest.importorskip("jsonschema").validators
@@ -89,7 +85,7 @@ def test_round_trip(segment: dict[str, Any]) -> None:
     assert validator.is_valid(once.to_dict())
 
 
-def test_a_task_may_be_made_of_models() -> None:
+def test_a_task_may_be_made_of_models():
     rotate = Rotate(rotate=Rotation(axis=(0, 0, 2), angle_deg=90))
     line = task(LINE | {"orientation": ROTATE}).path[0]
     assert isinstance(line, LineSegment)
@@ -106,8 +102,8 @@ def test_a_task_may_be_made_of_models() -> None:
     assert spline.spline.orientations[0] == Attitude(quaternion_wxyz=(0.6, 0, 0, -0.8))
 
 
-def test_defaults() -> None:
-    assert task(LINE).path[0] == LineSegment(line={"to": (1, 0, 0)}, orientation=None)  # type: ignore[arg-type]
+def test_defaults():
+    assert task(LINE).path[0] == LineSegment(line={"to": (1, 0, 0)}, orientation=None)
     rotation = Rotation(axis=(0, 0, 1), angle_deg=1)
     assert (rotation.frame, rotation.profile) == ("path", "uniform")
     assert TurnTo(to=Target(rpy_deg=(0, 0, 1))).to.profile == "uniform"
@@ -120,7 +116,7 @@ def test_defaults() -> None:
     ]
 
 
-MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
+MISTAKES = [
     (
         LINE | {"orientation": "tangnt"},
         [
@@ -263,7 +259,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     MISTAKES,
     ids=[json.dumps(segment) for segment, _ in MISTAKES],
 )
-def test_every_mistake_is_named(segment: dict[str, Any], expected: list[str]) -> None:
+def test_every_mistake_is_named(segment, expected):
     with pytest.raises(TaskError) as caught:
         task(segment)
     message = str(caught.value)
@@ -272,13 +268,13 @@ def test_every_mistake_is_named(segment: dict[str, Any], expected: list[str]) ->
         assert text in message
 
 
-def free(path_start: Any, space: Any = "pose") -> Task:
+def free(path_start, space="pose"):
     return load_task(
         written(LINE, space=space) | {"start": "free", "path_start": path_start}
     )
 
 
-def test_a_path_may_start_at_a_pose_in_any_convention() -> None:
+def test_a_path_may_start_at_a_pose_in_any_convention():
     turn = SciPyRotation.from_euler("xyz", [20, -35, 110], degrees=True)
     forms = {
         "quaternion_wxyz": np.roll(turn.as_quat(), 1),
@@ -300,7 +296,7 @@ def test_a_path_may_start_at_a_pose_in_any_convention() -> None:
         )
 
 
-def test_a_program_gives_the_start_of_a_path_as_a_transform() -> None:
+def test_a_program_gives_the_start_of_a_path_as_a_transform():
     placement = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
     task = task_with(
         path=brachis.Line(by=[0, 0.1, 0]),
@@ -317,7 +313,7 @@ def test_a_program_gives_the_start_of_a_path_as_a_transform() -> None:
     )
 
 
-def test_another_start_of_the_path_takes_the_place_of_the_first_one() -> None:
+def test_another_start_of_the_path_takes_the_place_of_the_first_one():
     task = free({"position": [1, 2, 3], "rpy_deg": [0, 0, 90]})
     other = task_with(
         task, path_start={"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]}
@@ -327,7 +323,7 @@ def test_another_start_of_the_path_takes_the_place_of_the_first_one() -> None:
     )
 
 
-WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
+WRONG_STARTS = [
     (
         [1, 2, 3, 1, 0, 0, 0],
         "pose",
@@ -368,9 +364,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
 
 
 @pytest.mark.parametrize(("path_start", "space", "expected"), WRONG_STARTS, ids=str)
-def test_wrong_starts_of_a_path(
-    path_start: Any, space: Any, expected: list[str]
-) -> None:
+def test_wrong_starts_of_a_path(path_start, space, expected):
     with pytest.raises(TaskError) as caught:
         free(path_start, space)
     for text in expected:

@@ -1,17 +1,14 @@
 """Files of points with a tolerance: what a task makes of them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from brachis.errors import TaskError
 from brachis.path import build_path
-from brachis.task import Task, load_task
+from brachis.task import load_task
 from brachis.task.segments import BSplineSegment, SplineSegment
 from support.seams import bent, wave
 
@@ -19,22 +16,20 @@ MM = 1e-3
 
 
 @pytest.fixture(autouse=True)
-def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def write(
-    rows: np.ndarray, header: str = "x_mm,y_mm,z_mm", name: str = "seam.csv"
-) -> None:
+def write(rows, header="x_mm,y_mm,z_mm", name="seam.csv"):
     np.savetxt(name, rows, fmt="%.9f", header=header, delimiter=",", comments="")
 
 
 def task(
-    name: str = "seam.csv",
-    space: Any = "position",
-    beside: dict[str, Any] | None = None,
-    **keys: Any,
-) -> Task:
+    name="seam.csv",
+    space="position",
+    beside=None,
+    **keys,
+):
     segment = {
         "csv": {"file": name, "tolerance": {"position": "0.1 mm"}, **keys},
         **(beside or {}),
@@ -44,7 +39,7 @@ def task(
     )
 
 
-def test_a_file_becomes_a_curve_that_needs_it_no_more() -> None:
+def test_a_file_becomes_a_curve_that_needs_it_no_more():
     write(1e3 * wave(2_000, 0.01 * MM))
     made = task()
     (segment,) = made.path
@@ -61,7 +56,7 @@ def test_a_file_becomes_a_curve_that_needs_it_no_more() -> None:
     assert "no corners; length in mm" in str(fit)
 
 
-def test_corners_become_blends() -> None:
+def test_corners_become_blends():
     write(1e3 * bent(900, 0.005 * MM)[0])
     made = task()
     assert [segment.blend is None for segment in made.path] == [False, False, True]
@@ -77,7 +72,7 @@ def test_corners_become_blends() -> None:
     )
 
 
-def sharp(*, turn_back: bool = False) -> np.ndarray:
+def sharp(*, turn_back=False):
     """Points in mm along two lines with a corner at row 40, (0.2 m, 0, 0); the first one after it is 0.02 mm away."""
     first = np.linspace([0.0, 0.0, 0.0], [200.0, 0.0, 0.0], 41)
     direction = np.array([-1.0, 0.0, 0.0] if turn_back else [0.0, 1.0, 0.0])
@@ -87,7 +82,7 @@ def sharp(*, turn_back: bool = False) -> np.ndarray:
 
 @pytest.mark.parametrize("turn_back", [False, True])
 @pytest.mark.parametrize("tolerance", [None, {"position": "0.1 mm"}])
-def test_the_tool_stops_at_corners(tolerance: Any, turn_back: bool) -> None:
+def test_the_tool_stops_at_corners(tolerance, turn_back):
     rows = sharp(turn_back=turn_back)
     write(rows)
     made = task(corner="stop", tolerance=tolerance)
@@ -109,7 +104,7 @@ def test_the_tool_stops_at_corners(tolerance: Any, turn_back: bool) -> None:
     )
 
 
-def test_the_first_point_after_a_corner_is_passed() -> None:
+def test_the_first_point_after_a_corner_is_passed():
     """However near it is: a first waypoint of a segment that nearly equals its start is taken for it."""
     write(sharp())
     _, after = task(corner="stop", tolerance=None).path
@@ -120,13 +115,13 @@ def test_the_first_point_after_a_corner_is_passed() -> None:
     assert distances.min() < 1e-12
 
 
-def test_a_corner_of_a_file_without_a_stop_is_rounded_or_refused() -> None:
+def test_a_corner_of_a_file_without_a_stop_is_rounded_or_refused():
     write(sharp(turn_back=True))
     with pytest.raises(TaskError, match=r"the path turns back.*Set corner: stop"):
         task()
 
 
-def test_the_end_of_a_file_may_be_a_stop() -> None:
+def test_the_end_of_a_file_may_be_a_stop():
     write(sharp())
     csv = {"file": "seam.csv", "tolerance": {"position": "0.1 mm"}, "corner": "stop"}
     made = load_task(
@@ -144,7 +139,7 @@ def test_the_end_of_a_file_may_be_a_stop() -> None:
     ]
 
 
-def test_feed_rates_are_kept() -> None:
+def test_feed_rates_are_kept():
     rows = np.column_stack([1e3 * wave(500), np.full(500, 600.0)])
     write(rows, "x_mm,y_mm,z_mm,feed_mm/min")
     (segment,) = task().path
@@ -154,7 +149,7 @@ def test_feed_rates_are_kept() -> None:
     assert last == (pytest.approx(segment.bspline.knots[-1]), pytest.approx(0.01))
 
 
-def test_gcode_is_known_by_its_suffix() -> None:
+def test_gcode_is_known_by_its_suffix():
     Path("part.nc").write_text(
         "G21 G0 X800 Y0 Z600\nG1 Y300 F3000\nG3 X750 Y350 I-50 J0\n", encoding="utf-8"
     )
@@ -163,7 +158,7 @@ def test_gcode_is_known_by_its_suffix() -> None:
     assert fit.length == pytest.approx(0.3 + 0.05 * np.pi / 2.0, abs=1e-4)
 
 
-def test_rough_files_are_named_as_such() -> None:
+def test_rough_files_are_named_as_such():
     write(wave(2_000), "x,y,z", "smooth.csv")
     segment = {"csv": {"file": "rough.csv"}}
     Path("rough.csv").write_text(
@@ -188,7 +183,7 @@ def test_rough_files_are_named_as_such() -> None:
     )
 
 
-WRONG: list[tuple[dict[str, Any], str]] = [
+WRONG = [
     (
         {"corner": "refuse"},
         r"path\[0\].corner: the points have 2 corners; found .* deg at row 30\d, .*corner: blend",
@@ -208,13 +203,13 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("keys", "message"), WRONG)
-def test_mistakes_are_named(keys: dict[str, Any], message: str) -> None:
+def test_mistakes_are_named(keys, message):
     write(1e3 * bent(900, 0.005 * MM)[0])
     with pytest.raises(TaskError, match=message):
         task(**keys)
 
 
-def test_a_turn_cannot_go_on_over_corners() -> None:
+def test_a_turn_cannot_go_on_over_corners():
     write(1e3 * bent(900, 0.005 * MM)[0])
     turn = {"orientation": {"rotate": {"axis": [0, 0, 1], "angle_deg": 30}}}
     with pytest.raises(
@@ -224,7 +219,7 @@ def test_a_turn_cannot_go_on_over_corners() -> None:
         task(space="pose", beside=turn, relative=False)
 
 
-def test_a_bad_row_is_named() -> None:
+def test_a_bad_row_is_named():
     rows = 1e3 * wave(500)
     rows[321, 1] = np.nan
     write(rows)

@@ -1,26 +1,22 @@
 """Stops and dwells at the ends of segments, as a task writes them."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 import brachis
 from brachis.errors import TaskError
-from brachis.task import Task, load_task
+from brachis.task import load_task
 
-UP: dict[str, Any] = {"line": {"by": [0.0, 0.1]}}
+UP = {"line": {"by": [0.0, 0.1]}}
 
 
-def task(**keys: Any) -> Task:
+def task(**keys):
     path = [{"line": {"by": [0.1, 0.0]}, **keys}, UP]
     return load_task(
         {"brachis": 1, "start": {"joints": [0]}, "task_space": ["x", "y"], "path": path}
     )
 
 
-def test_a_dwell_is_a_stop() -> None:
+def test_a_dwell_is_a_stop():
     for keys, stop, dwell in (
         ({}, False, 0.0),
         ({"stop": True}, True, 0.0),
@@ -34,7 +30,7 @@ def test_a_dwell_is_a_stop() -> None:
         assert load_task(made.to_dict()) == made
 
 
-def test_segments_of_a_program_stop() -> None:
+def test_segments_of_a_program_stop():
     first, second = brachis.Line(by=[0.1, 0.0], dwell=0.5) + brachis.Circle(
         [0.0, 0.0], stop=True
     )
@@ -53,9 +49,7 @@ def test_segments_of_a_program_stop() -> None:
         ({"stop": 1}, "stop", "true or false"),
     ],
 )
-def test_what_is_no_stop_is_refused_with_its_key(
-    keys: dict[str, Any], where: str, said: str
-) -> None:
+def test_what_is_no_stop_is_refused_with_its_key(keys, where, said):
     with pytest.raises(TaskError) as caught:
         task(**keys)
     assert f"path[0].{where}: " in str(caught.value)
@@ -63,7 +57,7 @@ def test_what_is_no_stop_is_refused_with_its_key(
 
 
 @pytest.mark.parametrize("keys", [{"stop": True}, {"dwell": 1.0}])
-def test_the_last_segment_ends_the_motion_anyway(keys: dict[str, Any]) -> None:
+def test_the_last_segment_ends_the_motion_anyway(keys):
     path = [UP, {**UP, **keys}]
     written = next(iter(keys))
     with pytest.raises(

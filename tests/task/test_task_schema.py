@@ -1,9 +1,5 @@
 """The JSON Schema agrees with the loader on what a task looks like."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 from brachis.task import json_schema, load_task
@@ -12,7 +8,7 @@ from brachis.task.units import unit_of
 jsonschema = pytest.importorskip("jsonschema")
 
 
-def task(**changes: Any) -> dict[str, Any]:
+def task(**changes):
     segments = [
         {"line": {"to": [1, 2]}, "blend": 0.1},
         {"line": {"length": 1.0, "angle_deg": 90}},
@@ -42,7 +38,7 @@ def task(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def validator() -> Any:
+def validator():
     schema = json_schema()
     cls = jsonschema.validators.validator_for(schema)
     cls.check_schema(schema)
@@ -93,14 +89,12 @@ DYNAMICS = {
         },
     ],
 )
-def test_the_schema_accepts_what_the_loader_accepts(
-    validator: Any, change: dict[str, Any]
-) -> None:
+def test_the_schema_accepts_what_the_loader_accepts(validator, change):
     load_task(task(**change))
     assert validator.is_valid(task(**change))
 
 
-def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
+def test_the_schema_accepts_a_saved_task(validator):
     assert validator.is_valid(load_task(task()).to_dict())
 
 
@@ -122,13 +116,11 @@ def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
         {"search": {"slower": "150 %"}},
     ],
 )
-def test_the_schema_refuses_what_the_loader_refuses(
-    validator: Any, change: dict[str, Any]
-) -> None:
+def test_the_schema_refuses_what_the_loader_refuses(validator, change):
     assert not validator.is_valid(task(**change))
 
 
-def test_the_schema_tells_an_editor_what_keys_mean() -> None:
+def test_the_schema_tells_an_editor_what_keys_mean():
     schema = json_schema()
     assert schema["$schema"].startswith("https://json-schema.org/")
     assert schema["title"]

@@ -1,7 +1,5 @@
 """Limits on the tool, as a task writes them: what is refused, with its key; tables as arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

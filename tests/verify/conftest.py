@@ -4,14 +4,13 @@ import pytest
 import yaml
 
 from brachis.planner import plan
-from brachis.trajectory import Trajectory
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
-def planned() -> Trajectory:
+def planned():
     """A planned line whose limits of every kind are far from the motion, but for torque."""
     task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")

@@ -1,7 +1,5 @@
 """Saved motions that were tampered with, each so that a coarse look would let it pass: none may end verified."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

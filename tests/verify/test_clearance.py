@@ -1,7 +1,5 @@
 """The smallest distance on a whole motion: proven between the instants that are looked at, and refused if too small."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The verification's own kinematics and torques, from the URDF's text, against Pinocchio's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

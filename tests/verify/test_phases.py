@@ -1,7 +1,5 @@
 """Stops, dwells and given speeds are verified: the motion by hand passes, and each check finds its fault."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Roots and turns of polynomials in Bernstein form, against NumPy's."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Splines of degree 2: the acceleration jumps at knots, and limits are checked on both sides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The verification of poses: it sees a wrong orientation, and a wrong roll."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

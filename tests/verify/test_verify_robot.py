@@ -1,12 +1,9 @@
 """What a task adds to its robot reaches the verification through the saved motion, each part by itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 import brachis
-from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import check_robot_settings
 from support.effort import QUICK
@@ -54,7 +51,7 @@ def saved(scara_urdf, tmp_path_factory):
     return brachis.Trajectory.load(path)
 
 
-def failed(trajectory, robot: Robot) -> set[str]:
+def failed(trajectory, robot):
     """Names of the checks that fail for a robot in the place of the saved one."""
     return {
         check.name
@@ -98,7 +95,7 @@ def test_every_part_counts(saved, change, fault):
 
 
 def test_an_arm_on_a_wall_is_the_arm_on_the_floor_turned(scara_urdf):
-    def plan(space: list[str], by: list[float], **robot: object) -> brachis.Result:
+    def plan(space, by, **robot):
         task = {
             "brachis": 1,
             "robot": {

@@ -1,7 +1,5 @@
 """Every check lets the planned motion pass and finds the fault that it is there for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

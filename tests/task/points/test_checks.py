@@ -1,7 +1,5 @@
 """What is wrong with points is named, with its row."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Conventions of orientations, against matrices that are worked out by hand and against products about single axes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Fits stay within their tolerances, with few knots, through both ends; errors are those of an independent formula."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,9 +12,7 @@ from support.seams import bent, brute_distances, points, wave
 MM = 1e-3
 
 
-def tolerance(
-    position: float, orientation: float = 1e-3, corner: float | None = None
-) -> FitTolerance:
+def tolerance(position, orientation=1e-3, corner=None):
     return FitTolerance(position=position, orientation=orientation, corner=corner)
 
 

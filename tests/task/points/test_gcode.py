@@ -1,7 +1,5 @@
 """G-code becomes the points of its lines and arcs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Speeds of points become tables along the curve that are nowhere above what was prescribed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from brachis.task.points.curves import speed_runs

@@ -1,7 +1,5 @@
 """Tables as spreadsheets and CAM write them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

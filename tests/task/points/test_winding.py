@@ -3,11 +3,8 @@
 The full count, 60, is ``benchmarks/winding_paths.py``.
 """
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,13 +12,13 @@ BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
 
 @pytest.fixture
-def winding_paths(monkeypatch: pytest.MonkeyPatch) -> Any:
+def winding_paths(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return importlib.import_module("winding_paths")
 
 
 @pytest.mark.parametrize("seed", [1, 5, 14, 20, 23, 28, 30, 37, 54])
-def test_winding_paths_are_fitted_with_few_knots(winding_paths: Any, seed: int) -> None:
+def test_winding_paths_are_fitted_with_few_knots(winding_paths, seed):
     path = winding_paths.winding_path(seed, most_points=2_000)
     curves, intervals = winding_paths.fit(path)
     of_points, of_curve = winding_paths.deviations(path, curves, sides=2_000, count=500)
@@ -32,8 +29,8 @@ def test_winding_paths_are_fitted_with_few_knots(winding_paths: Any, seed: int) 
 
 
 def test_a_raster_with_round_turns_takes_knots_where_it_bends(
-    winding_paths: Any,
-) -> None:
+    winding_paths,
+):
     path = winding_paths.winding_path(45, most_points=2_000)
     assert path.kind == "raster"
     curves, intervals = winding_paths.fit(path)
@@ -41,6 +38,6 @@ def test_a_raster_with_round_turns_takes_knots_where_it_bends(
     assert intervals <= 20 * path.turns
 
 
-def test_every_kind_is_among_the_seeds(winding_paths: Any) -> None:
+def test_every_kind_is_among_the_seeds(winding_paths):
     kinds = {winding_paths.winding_path(seed, 300).kind for seed in range(12)}
     assert kinds == set(winding_paths.KINDS)
