@@ -17,7 +17,7 @@ TILT = {"rotate": {"axis": [1, 0, 0], "angle_deg": 90}}
 HALF = {"rpy_deg": [180, 0, 0]}
 
 
-def refused(segments):
+def error_of(segments):
     with pytest.raises(PathError) as caught:
         pose_path(segments, np.zeros(3), Rotation.identity())
     return caught.value
@@ -33,20 +33,8 @@ def along(*attitudes, **keys):
 
 SEGMENTS = [
     (
-        {"line": {"to": [1, 2]}},
-        ["path[0].line.to: wrong number of coordinates", "allowed: 3: [x, y, z]"],
-    ),
-    (
-        {"line": {"length": 1, "angle_deg": 0}},
-        ["path[0].line: ", "needs 2 position rows", "[x, y, z]"],
-    ),
-    (
         {"line": {"by": [0, 0, 0]}},
         ["path[0].line.by: the segment has zero length", "turn: {...} turns the tool"],
-    ),
-    (
-        {"turn": {"rotate": {"axis": [1, 0, 0], "angle_deg": 0}}},
-        ["path[0].turn: the turn has zero length"],
     ),
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 0]}}},
@@ -85,21 +73,10 @@ SEGMENTS = [
     ),
     (
         {
-            "arc": {"via": [1, 0, 0.5], "to": [2.1, 0, 0]},
-            "orientation": {"tangent": {"up": [1, 0, 0]}},
-        },
-        ["path[0].orientation: the tangent becomes parallel", "at x = 1.05, y = "],
-    ),
-    (
-        {
             "spline": {"through": [[1, 0, 0], [1.000002, 0, 0], [0, 0, 0]]},
             "orientation": "tangent",
         },
         ["path[0].orientation: the curve almost stops", "found x = 1.17"],
-    ),
-    (
-        spline(starts_at=[0, 0, 0.1]),
-        ["path[0].spline.starts_at: the segment starts elsewhere", "0.1 m off"],
     ),
     (
         along(
@@ -108,28 +85,11 @@ SEGMENTS = [
             [0, 0, 0],
             starts_oriented={"rotation_vector": [0, 0, 0.2]},
         ),
-        [
-            "path[0].spline.starts_oriented: ",
-            "an orientation that is 0.2 rad off",
-            "1e-04|0.0001",
-        ],
-    ),
-    (
-        along([180, 0, 0], [0, 0, 0], [0, 0, 0]),
-        ["path[0].spline.orientations[0]: ", "half a turn"],
+        ["path[0].spline.starts_oriented: ", "an orientation that is 0.2 rad off"],
     ),
     (
         along([0, 0, 90], [0, 0, -90], [0, 0, 0]),
         ["path[0].spline.orientations[1]: ", "half a turn"],
-    ),
-    (
-        {
-            "spline": {
-                "through": [[1, 0, 0], [1, 0, 0]],
-                "orientations": [{"rpy_deg": [0, 0, 9]}, {"rpy_deg": [0, 0, 0]}],
-            }
-        },
-        ["path[0].spline.through[1]: a waypoint repeats the one before"],
     ),
     (
         {
@@ -143,19 +103,9 @@ SEGMENTS = [
         ],
     ),
     (
-        {"spline": {"through": [[0, 0, 0]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
-        ["path[0].spline.through: the segment has zero length"],
-    ),
-    (
         {
             "spline": {
-                "through": [
-                    [1, 0, 0],
-                    [1.01, 0, 0],
-                    [1.02, 0, 0],
-                    [2, 0, 0],
-                    [3, 0, 0],
-                ],
+                "through": [[x, 0, 0] for x in (1, 1.01, 1.02, 2, 3)],
                 "orientations": [
                     {"rpy_deg": [0, 0, angle]} for angle in (170, 0, 170, 0, 170)
                 ],
@@ -171,16 +121,16 @@ SEGMENTS = [
 
 
 @pytest.mark.parametrize(
-    ("segment", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS]
+    ("segment", "expected"), SEGMENTS, ids=[str(case[0]) for case in SEGMENTS]
 )
-def test_wrong_segments(segment, expected):
-    message = str(refused([segment]))
+def test_the_error_names_what_is_wrong_with_a_segment(segment, expected):
+    message = str(error_of([segment]))
     for text in expected:
-        assert any(one in message for one in text.split("|")), message
+        assert text in message
 
 
 def test_a_jump_of_the_turning_rate_is_told_in_words():
-    error = refused([RIGHT | {"orientation": TURN}, RIGHT])
+    error = error_of([RIGHT | {"orientation": TURN}, RIGHT])
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0, z = 0: the path must be smooth to the third derivative; found "
         "the tool's turning rate jumps by 1.571 rad/m; allowed: segments that continue each other. "
@@ -193,10 +143,6 @@ def test_a_jump_of_the_turning_rate_is_told_in_words():
 @pytest.mark.parametrize(
     ("segments", "expected"),
     [
-        (
-            [RIGHT | {"orientation": TURN}, UP],
-            ["a corner of 90 degrees", "Set path[0].blend (m) to round it"],
-        ),
         (
             [RIGHT | {"orientation": TURN}, RIGHT | {"orientation": TILT}],
             ["the tool's turning rate jumps by 2.221 rad/m"],
@@ -221,10 +167,6 @@ def test_a_jump_of_the_turning_rate_is_told_in_words():
         ),
         ([RIGHT, {"turn": TURN}], ["a stop: ", "or set path[0].stop: true"]),
         (
-            [RIGHT, UP, RIGHT, RIGHT | {"orientation": TURN}],
-            ["likewise path[1], path[2]"],
-        ),
-        (
             [
                 {
                     "arc": {"center": [0, 1, 0], "angle_deg": 90, "normal": [0, 0, 1]},
@@ -237,13 +179,13 @@ def test_a_jump_of_the_turning_rate_is_told_in_words():
     ],
 )
 def test_what_jumps_at_a_join(segments, expected):
-    message = str(refused(segments))
+    message = str(error_of(segments))
     for text in expected:
         assert text in message
 
 
 def test_a_blend_beside_a_turn_on_the_spot():
-    message = str(refused([RIGHT | {"blend": 0.1}, {"turn": TURN}]))
+    message = str(error_of([RIGHT | {"blend": 0.1}, {"turn": TURN}]))
     assert "on one the tool turns on the spot" in message
     assert "Turn the tool along a line" in message
 
@@ -251,7 +193,7 @@ def test_a_blend_beside_a_turn_on_the_spot():
 def test_a_blend_in_which_the_tool_turns_too_much():
     fast = {"rotate": {"axis": [0, 0, 1], "angle_deg": 1500}}
     back = {"rotate": {"axis": [0, 0, 1], "angle_deg": -1500}}
-    error = refused(
+    error = error_of(
         [RIGHT | {"orientation": fast, "blend": 0.4}, RIGHT | {"orientation": back}]
     )
     assert str(error).startswith("path[0].blend: path[0] to path[1], at s = 0.5")
@@ -262,10 +204,9 @@ def test_a_blend_in_which_the_tool_turns_too_much():
     assert error.s_interval == (0.5, 0.5)
 
 
-@pytest.mark.parametrize("rows", [POSE_ROWS, ("x", "y", "z")])
-def test_a_csv_file_is_read_before(rows):
-    start = pose(np.zeros(3), Rotation.identity())[: 12 if rows == POSE_ROWS else 3]
+def test_a_csv_file_has_to_be_read_before():
+    start = pose(np.zeros(3), Rotation.identity())
     with pytest.raises(
         PathError, match=r"path\[0\].csv.file: the file has not been read; found a.csv"
     ):
-        build_path([CsvSegment(csv=PointFile(file="a.csv"))], start, rows)
+        build_path([CsvSegment(csv=PointFile(file="a.csv"))], start, POSE_ROWS)

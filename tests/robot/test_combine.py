@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import InputError, TaskError, UnknownNameError
+from brachis.errors import InputError, TaskError
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_for
 from brachis.task import RobotSettings, check_robot_settings
@@ -171,13 +171,6 @@ def test_what_a_task_writes_counts_even_where_it_is_the_default(settings, key):
     with pytest.raises(TaskError, match="contradict") as caught:
         robot_for(robot, asked(**settings))
     assert caught.value.where == key
-
-
-def test_unknown_joints_of_the_task_are_named():
-    with pytest.raises(UnknownNameError, match="'j9'"):
-        robot_for(scara({"j1": 5.0}), asked(limits={"torque": {"j9": 6}}))
-    with pytest.raises(UnknownNameError, match="'j9'"):
-        robot_for(Robot.from_urdf(SCARA), asked(limits={"torque": {"j9": 6}}))
 
 
 def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():

@@ -1,10 +1,9 @@
 """Torques and their derivatives: Lagrange's equations, the friction formula, central differences."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
-from brachis.errors import InputError, UnknownNameError
+from brachis.errors import InputError
 from brachis.robot import Robot, dynamics
 from support.chains import Joint, chain_urdf, planar_robot
 
@@ -166,40 +165,6 @@ def test_one_joint_alone():
     )
 
 
-def test_pinocchio_adds_the_armature_of_the_model_but_neither_friction_and_damping_nor_rotors():
-    plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
-    damped = plain.replace(
-        "</joint>", "<dynamics damping='7' friction='3'/></joint>", 2
-    )
-    models = [pin.buildModelFromXML(text) for text in (plain, damped)]
-    assert models[1].damping[0] == 7.0
-    args = (np.array([0.3]), np.array([2.0]), np.array([5.0]))
-    tau = [pin.rnea(model, model.createData(), *args)[0] for model in models]
-    assert tau[1] == tau[0]
-    assert models[1].friction[0] == models[1].upperDryFrictionLimit[0] == 3.0
-    models[1].rotorInertia, models[1].rotorGearRatio = (
-        np.array([1e-3]),
-        np.array([100.0]),
-    )
-    assert pin.rnea(models[1], models[1].createData(), *args)[0] == tau[0]
-    models[0].armature = np.array([0.6])
-    assert pin.rnea(models[0], models[0].createData(), *args)[0] == pytest.approx(
-        tau[0] + 0.6 * 5.0
-    )
-
-
-def test_brachis_counts_armature_once():
-    plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
-    args = (np.array([[0.3]]), np.array([[2.0]]), np.array([[5.0]]))
-    tau = [
-        dynamics.torque(
-            Robot.from_urdf("x", urdf_text=plain, friction=friction), *args
-        )[0, 0]
-        for friction in (None, {"armature": 0.6})
-    ]
-    assert tau[1] == pytest.approx(tau[0] + 0.6 * 5.0)
-
-
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
@@ -221,8 +186,3 @@ def test_brachis_counts_armature_once():
 def test_friction_that_cannot_be(friction, words):
     with pytest.raises(InputError, match=words):
         planar_robot("RRR", friction=friction)
-
-
-def test_friction_of_an_unknown_joint():
-    with pytest.raises(UnknownNameError, match="Did you mean 'j1'"):
-        planar_robot("RRR", friction={"viscous": {"j11": 1.0}})

@@ -48,27 +48,6 @@ def test_forms_of_a_limit(value, expected):
     )
 
 
-def test_every_kind_goes_to_its_own_place():
-    limits = limits_of(
-        torque=1.0, velocity=2.0, acceleration=3.0, position=[[-4.0, 5.0]] * 3
-    )
-    for values, expected in (
-        (limits.torque, 1.0),
-        (limits.velocity, 2.0),
-        (limits.acceleration, 3.0),
-        (limits.position_lower, -4.0),
-        (limits.position_upper, 5.0),
-    ):
-        np.testing.assert_array_equal(values, np.full(3, expected))
-
-
-def test_urdf_has_no_acceleration():
-    np.testing.assert_array_equal(limits_of().acceleration, [INF] * 3)
-    np.testing.assert_array_equal(
-        limits_of(acceleration={"j2": 4.0}).acceleration, [INF, 4.0, INF]
-    )
-
-
 @pytest.mark.parametrize(
     ("value", "lower", "upper"),
     [
@@ -118,33 +97,6 @@ def test_limit_of_the_urdf_that_is_not_positive(changes, kind):
     assert f"Set robot.limits.{kind}.j2 in the task file" in str(caught.value)
 
 
-@pytest.mark.parametrize("value", [0.0, -3.0, float("nan")])
-@pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
-def test_limit_of_the_task_that_is_not_positive(kind, value):
-    with pytest.raises(TaskError) as caught:
-        limits_of(**{kind: {"j3": value}})
-    assert caught.value.where == f"robot: limits.{kind}.j3"
-    assert caught.value.problem in ("out of range", "not a finite number")
-    assert f"found {value}" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("value", "where"),
-    [("ten", "limits.torque"), ({"j1": "ten"}, "limits.torque.j1")],
-    ids=str,
-)
-def test_limit_that_is_no_number(value, where):
-    with pytest.raises(TaskError, match="wrong form; found 'ten'") as caught:
-        limits_of(torque=value)
-    assert caught.value.where == f"robot: {where}"
-
-
-@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan"), "half"])
-def test_scale_that_is_not_positive(factor):
-    with pytest.raises(InputError, match="scale"):
-        limits_of(scale={"torque": factor})
-
-
 @pytest.mark.parametrize("factors", [2.0, "half", [1.0]])
 def test_a_scale_that_is_no_mapping(factors):
     with pytest.raises(InputError, match=r"limits\.scale: .* allowed: a mapping"):
@@ -184,11 +136,6 @@ def test_infinite_figures_in_lists_leave_limits_open():
 def test_a_limit_that_scaling_would_mend_is_refused():
     with pytest.raises(LimitError, match="torque limit is too small or too large"):
         limits_of(torque={"j3": 1e13}, scale={"torque": 1e-3})
-
-
-def test_unknown_scale():
-    with pytest.raises(InputError, match="torqe"):
-        limits_of(scale={"torqe": 0.5})
 
 
 def test_neither_torque_nor_acceleration():
@@ -234,20 +181,8 @@ def test_wrong_length(kind):
 
 
 def test_empty_range():
-    for low, high in ((1.0, 1.0), (2.0, -2.0)):
-        with pytest.raises(TaskError, match="lower limit must be below") as caught:
-            limits_of(position={"j1": [low, high]})
-        assert caught.value.where == "robot: limits.position.j1"
     with pytest.raises(LimitError, match="position range is empty"):
         with_limit(lower=1.0, upper=0.5)
-
-
-@pytest.mark.parametrize(
-    "value", [[-1.0, 1.0, 2.0], {"j1": 1.0}, {"j1": [1.0]}, {"j1": ["a", 1.0]}], ids=str
-)
-def test_range_of_a_wrong_shape(value):
-    with pytest.raises(InputError, match="position"):
-        limits_of(position=value)
 
 
 def test_coulomb_friction_that_no_torque_overcomes_is_refused():

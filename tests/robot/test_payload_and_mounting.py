@@ -8,7 +8,7 @@ import pytest
 
 import brachis
 from brachis.errors import InputError, LimitError, TaskError
-from brachis.robot import Robot, bind, dynamics
+from brachis.robot import Robot, dynamics
 from brachis.robot.from_task import in_use, robot_for, robot_from_settings
 from brachis.task import check_robot_settings
 from support.chains import Joint, chain_urdf, planar_urdf
@@ -279,30 +279,6 @@ def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
             speed_override=0.5,
             limits=brachis.LimitSpec(velocity=None),
         )
-
-
-def test_everything_is_combined_with_a_task():
-    asked = check_robot_settings(
-        {
-            "payload": PAYLOAD,
-            "tool_offset": {"xyz": [0, 0, 0.2]},
-            "mounting": "wall",
-            "speed_override": 0.5,
-        }
-    )
-    made = robot_for(of(IIWA), asked)
-    alone = of(
-        IIWA,
-        payload=PAYLOAD,
-        tool_offset={"xyz": [0, 0, 0.2]},
-        mounting={"rpy_deg": [0, 90, 0]},
-        speed_override=0.5,
-    )
-    assert made.settings == alone.settings
-    assert made.model == alone.model
-    assert robot_for(alone, asked).model == alone.model
-    rolling, _ = bind(alone, "pose_free_roll")
-    assert robot_for(rolling, asked).settings == alone.settings
 
 
 @pytest.mark.parametrize(

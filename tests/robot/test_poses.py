@@ -24,11 +24,6 @@ def test_a_pose_has_six_rows_and_twelve_coordinates():
     assert isinstance(task_map_of(robot, space.rows), Pose)
 
 
-def test_position_is_the_three_rows():
-    robot = rail_arm()
-    assert task_map_of(robot, "position").rows == ("x", "y", "z")
-
-
 def coordinates(placement):
     return np.concatenate([placement.translation, placement.rotation.ravel()])
 
@@ -44,14 +39,6 @@ def test_difference_of_poses_is_the_displacement_in_the_second_ones_frame():
         np.testing.assert_allclose(
             found, np.append(shift, turn), atol=1e-14 if size < 1.0 else 1e-12
         )
-
-
-def test_batches_of_differences():
-    space = task_map_of(rail_arm(), "pose")
-    poses = np.array([coordinates(pin.SE3.Random()) for _ in range(5)])
-    found = space.difference(poses[:, None], poses[None])
-    assert found.shape == (5, 5, 6)
-    np.testing.assert_allclose(found[np.arange(5), np.arange(5)], 0.0, atol=1e-12)
 
 
 def test_words_that_do_not_exist():
@@ -92,6 +79,8 @@ def test_the_virtual_joint_has_no_inertia_and_no_limits():
             limits.torque[-1],
             limits.velocity[-1],
             limits.acceleration[-1],
+            limits.power[-1],
+            limits.rms_torque[-1],
             limits.position_upper[-1],
         ]
     ).all()

@@ -8,8 +8,6 @@ import pytest
 
 import brachis
 from brachis.errors import InputError, UnknownNameError
-from brachis.robot import bind
-from support.spatial import rail_arm
 
 SCARA = brachis.robots.scara3
 
@@ -31,13 +29,6 @@ def test_the_tool_of_a_posture(posture):
         [np.cos(expected).sum(), np.sin(expected).sum()],
         atol=1e-12,
     )
-
-
-def test_virtual_joints_may_be_left_out():
-    rolling, _ = bind(rail_arm(), "pose_free_roll")
-    q = np.full(rolling.n - 1, 0.1)
-    whole = rolling.tool_placement(np.append(q, 0.0))
-    assert rolling.tool_placement(q).isApprox(whole)
 
 
 @pytest.mark.parametrize(

@@ -33,13 +33,6 @@ def test_position_rows_are_world_coordinates_in_the_order_asked(rows):
     np.testing.assert_array_equal(space.value(q), [named[row] for row in rows])
 
 
-def test_yaw_of_the_scara_is_the_sum_of_its_angles(scara):
-    space = task_map_of(scara, ["x", "y", "yaw"])
-    assert space.units == ("m", "m", "rad")
-    for q in np.random.default_rng(1).uniform(-1.0, 1.0, (10, 3)):
-        assert space.value(q)[2] == pytest.approx(q.sum())
-
-
 MOUNTS = {"roll": (0.0, np.pi / 2, 0.0), "pitch": (np.pi / 2, 0.0, 0.0), "yaw": ZERO}
 
 
@@ -62,22 +55,6 @@ def test_an_angle_turns_about_its_axis_by_the_right_hand_rule(angle, rows):
         np.testing.assert_allclose(value[:-1], [named[row] for row in rows])
         base = space.of_placements(first[None], upright[None])[0]
         assert space.difference(value, base)[-1] == pytest.approx(turn)
-
-
-def test_yaw_is_the_direction_of_a_tool_axis(scara):
-    space = task_map_of(scara, ["x", "y", "yaw"])
-    tool_x = scara.tool_placement(np.array([0.5, 0.6, 0.7])).rotation[
-        :, space.tool_axis
-    ]
-    np.testing.assert_allclose(tool_x, [np.cos(1.8), np.sin(1.8), 0.0], atol=1e-14)
-
-
-def test_batch_equals_single_values(scara):
-    space = task_map_of(scara, ["x", "y", "yaw"])
-    q = np.random.default_rng(1).uniform(-3.0, 3.0, (7, 3))
-    np.testing.assert_allclose(
-        space.values(q), [space.value(posture) for posture in q], atol=1e-14
-    )
 
 
 def test_sizes_of_displacements_of_positions_and_angles_apart(scara):

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from brachis.errors import InputError, LimitError, UnknownNameError
-from brachis.robot import bind
 from brachis.robot.from_task import robot_for
 from brachis.task import LimitSpec, RobotSettings
 from brachis.task.limit_kinds import LimitScale
 from support.chains import planar_robot
-from support.spatial import rail_arm
 
 CURVE = [[0.0, 50.0], [1.0, 50.0], [2.0, 20.0]]
 
@@ -118,12 +116,3 @@ def test_a_robot_keeps_them_beside_what_a_task_sets():
     assert both.limits.torque_speed == given.limits.torque_speed
     assert both.limits.total_power == 70.0
     np.testing.assert_array_equal(both.limits.velocity, 1.5)
-
-
-def test_the_virtual_joint_of_a_free_roll_has_none():
-    arm = bind(rail_arm(), "pose_free_roll")[0]
-    assert np.isinf(
-        [arm.limits.power[-1], arm.limits.rms_torque[-1], arm.limits.position_upper[-1]]
-    ).all()
-    assert arm.limits.position_lower[-1] == -np.inf
-    assert arm.limits.torque_speed[-1] == ()

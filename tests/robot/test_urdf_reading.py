@@ -42,15 +42,6 @@ def load(joints, **options):
     )
 
 
-def test_chain_as_written():
-    robot = planar_robot("RPC")
-    assert robot.joint_names == ("j1", "j2", "j3")
-    assert robot.n == robot.model.nq == robot.model.nv == 3
-    assert robot.position_units == ("rad", "m", "rad")
-    assert (robot.base_frame, robot.tool_frame) == ("world", "tool")
-    assert robot.source == "RPC xy"
-
-
 def test_forward_kinematics_are_those_of_the_file():
     # Pinocchio reads the same text by itself; the continuous joint there has cosine and sine.
     text = planar_urdf("RPC", "tilted")
@@ -180,12 +171,6 @@ def test_a_mimic_that_is_locked_elsewhere_is_refused():
     locked = {"finger": 0.03, "follower": 0.01}
     with pytest.raises(UrdfError, match=message):
         load([TURN], more=GRIPPER, tool_frame="tool", locked_joints=locked)
-
-
-def test_mimic_on_the_chain_is_refused_by_name():
-    mimic = Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<mimic joint='j1'/>")
-    with pytest.raises(UrdfError, match="joint 'j2' mimics 'j1'"):
-        load([TURN, mimic])
 
 
 def test_a_joint_beside_the_chain_that_follows_it_is_held():
@@ -425,31 +410,10 @@ def test_missing_file_and_binary_file(tmp_path):
         Robot.from_urdf(binary)
 
 
-def test_file_with_declared_encoding(tmp_path):
-    file = tmp_path / "robot.urdf"
-    file.write_text(
-        "<?xml version='1.0' encoding='utf-8'?>\n" + planar_urdf("RR"), encoding="utf-8"
-    )
-    assert Robot.from_urdf(file).n == 2
-    assert Robot.from_urdf(str(file)).n == 2
-
-
 def test_meshes_are_not_read():
     mesh = "<link name='shell'><visual><geometry><mesh filename='package://nowhere/none.stl'/></geometry></visual></link>"
     mesh += "<joint name='cover' type='fixed'><parent link='tool'/><child link='shell'/></joint>"
     assert load([TURN], more=mesh).tool_frame == "shell"
-
-
-def test_gravity_vector():
-    robot = load([TURN], gravity=[0.0, -2.0, 0.0])
-    zero = np.zeros(1)
-    # Centre of mass of the link and where it was put; torque about z by gravity along -y.
-    expected = 2.0 * 2.0 * 0.21
-    assert pin.rnea(robot.model, robot.model.createData(), zero, zero, zero)[
-        0
-    ] == pytest.approx(expected)
-    standard = load([TURN])
-    np.testing.assert_array_equal(standard.model.gravity.linear, [0.0, 0.0, -9.81])
 
 
 @pytest.mark.parametrize(
@@ -458,24 +422,6 @@ def test_gravity_vector():
 def test_gravity_that_is_no_vector(gravity):
     with pytest.raises(InputError, match=r"robot: gravity\[\d\]: "):
         load([TURN], gravity=gravity)
-
-
-def test_posture_checks():
-    robot = planar_robot("RR")
-    np.testing.assert_array_equal(
-        robot.posture({"j2": 2.0, "j1": 1.0}, "start.joints"), [1.0, 2.0]
-    )
-    with pytest.raises(InputError, match=r"start\.joints: no position for j2"):
-        robot.posture({"j1": 1.0}, "start.joints")
-    with pytest.raises(
-        InputError,
-        match="wrong number of values; found 3; allowed: 2, one for each of j1, j2",
-    ):
-        robot.posture([1.0, 2.0, 3.0], "start.joints")
-    with pytest.raises(UnknownNameError, match="Did you mean 'j1'"):
-        robot.posture({"j1x": 1.0}, "start.joints")
-    with pytest.raises(InputError, match="a joint position is out of range"):
-        robot.posture([1.0, float("inf")], "start.joints")
 
 
 def test_the_keywords_of_from_urdf_are_the_settings_of_a_task():

@@ -108,22 +108,6 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
     assert found.solids[-1].link == "tool"
 
 
-def test_bodies_and_path_of_a_plan_move_together():
-    """A sweep of the frame leaves the distance from the tool's path to the body as it is."""
-    body = brachis.Box([0.1, 0.1, 0.02], frame="user1", position=[0.0, 0.0, -0.2])
-    segments = [brachis.Line(to=[0.1, 0.0, 0.0])]
-    start = {"position": [0.0, 0.0, 0.0], "rpy_deg": [180.0, 0.0, 0.0]}
-    keys = {"scene": [body], "path": segments, "path_frame": "user1"}
-    keys |= {"start": "free", "path_start": start}
-    for xyz in ([0.5, 0.0, 0.3], [0.4, 0.2, 0.35]):
-        asked = task(frames={"user1": {"xyz": xyz}}, **keys)
-        robot = robot_from_settings(asked.robot)
-        problem = brachis.problem.problem.Problem.of(robot, asked)
-        first = problem.path.sample([0.0]).target[0, :3]
-        gap = first - scene(asked).placements[-1][:3, 3]
-        np.testing.assert_allclose(gap, [0.0, 0.0, 0.2], atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("keys", "message"),
     [

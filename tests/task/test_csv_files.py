@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.errors import PathError, TaskError
+from brachis.errors import TaskError
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import CsvSegment, Task, load_task
+from brachis.task import load_task
 from brachis.task.segments import SplineSegment, SplineThrough
 from support.poses import pose
 
@@ -19,7 +19,6 @@ TURNS = Rotation.from_rotvec(
 )
 POINTS = np.array([[0.5, 0.1, 0.3], [0.7, 0.2, 0.3], [0.8, 0.4, 0.5], [1.0, 0.4, 0.6]])
 QUATERNIONS = np.roll(TURNS.as_quat(), 1, axis=1)
-S = np.linspace(0, 1, 20)
 
 
 @pytest.fixture(autouse=True)
@@ -73,17 +72,6 @@ def test_rotation_vectors_in_any_order_of_columns():
     )
 
 
-def test_both_forms_give_the_same_path():
-    write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, -QUATERNIONS]))
-    one = path_of(task(), POINTS[0], TURNS[0])
-    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    other = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0])
-    np.testing.assert_allclose(one.sample(S).target, other.sample(S).target, atol=1e-12)
-    np.testing.assert_allclose(
-        one.sample([1.0]).target[0], pose(POINTS[-1], TURNS[-1]), atol=1e-12
-    )
-
-
 def test_positions_alone_leave_the_orientation_to_the_segment():
     write("x,y,z", POINTS)
     segment = {"csv": {"file": "poses.csv"}, "orientation": "tangent", "blend": 0.01}
@@ -116,35 +104,6 @@ def test_rows(rows):
     np.testing.assert_allclose(
         path.sample([0.0, 1.0]).target, POINTS[[0, -1], : len(names)], atol=1e-12
     )
-
-
-def test_relative_rows_start_anywhere():
-    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    vectors = {"orientation": "rotation_vector"}
-    recorded = path_of(task(**vectors), POINTS[0], TURNS[0]).sample(S).target
-    start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
-    moved = path_of(task(relative=True, **vectors), start, turn).sample(S).target
-    np.testing.assert_allclose(
-        moved[:, :3], recorded[:, :3] - POINTS[0] + start, atol=1e-12
-    )
-    change = turn * TURNS[0].inv()
-    expected = change.as_matrix() @ recorded[:, 3:].reshape(-1, 3, 3)
-    np.testing.assert_allclose(moved[:, 3:].reshape(-1, 3, 3), expected, atol=1e-12)
-
-
-def test_a_start_elsewhere_is_told_by_how_much():
-    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    with pytest.raises(
-        PathError,
-        match=r"starts_at: .*0.02 m off; allowed: at most 0.0001 m .*relative: true",
-    ):
-        path_of(task(orientation="rotation_vector"), POINTS[0] + [0, 0.02, 0], TURNS[0])
-    with pytest.raises(PathError, match=r"starts_oriented: .* 0.3 rad off"):
-        path_of(
-            task(orientation="rotation_vector"),
-            POINTS[0],
-            TURNS[0] * Rotation.from_rotvec([0, 0.3, 0]),
-        )
 
 
 @pytest.mark.parametrize("relative", [True, False])
@@ -184,18 +143,6 @@ def test_poses_on_the_spot():
         [0.0, 1.0]
     )
     np.testing.assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
-
-
-def test_a_task_that_is_not_loaded_keeps_the_file():
-    made = Task.model_validate(
-        {
-            "brachis": 1,
-            "start": {"joints": [0]},
-            "task_space": "pose",
-            "path": [{"csv": {"file": "poses.csv"}}],
-        }
-    )
-    assert isinstance(made.path[0], CsvSegment)
 
 
 MISTAKES = [

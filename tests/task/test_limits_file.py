@@ -1,6 +1,5 @@
 """Limits from a file: where they count, what the task still says, and what is refused."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.task import RobotSettings, load_task, read_limits
 
 ROOT = Path(__file__).parents[2]
-PANDA = ROOT / "robots/panda_limits.yaml"
-URDF = "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
 FILE = {
     "brachis_limits": 1,
     "source": "the maker",
@@ -78,11 +75,6 @@ def test_a_loaded_task_needs_the_file_no_more(loaded):
     task = loaded({})
     assert task.robot.limits_file is None
     assert load_task(task.to_dict()) == task
-
-
-def test_joints_that_the_task_locks_are_left_out(loaded):
-    robot = robot_from_settings(loaded({"locked_joints": {"j1": 0.1}}).robot)
-    np.testing.assert_array_equal(robot.limits.torque_upper, [6.0, 8.0])
 
 
 def test_a_program_reads_the_file_too(tmp_path):
@@ -151,29 +143,6 @@ def test_joints_that_the_robot_does_not_have_are_named(loaded):
     task = loaded({}, joints=["a1", "j2", "j3"], limits={"torque": 5})
     with pytest.raises(UnknownNameError, match="'a1'"):
         robot_from_settings(task.robot)
-
-
-def test_the_published_limits_of_the_panda_are_those_of_its_urdf():
-    folder = next(
-        (Path(folder) for folder in sys.path if (Path(folder) / URDF).is_file()), None
-    )
-    if folder is None:
-        pytest.skip("example-robot-data is not installed")
-    stated = Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp").limits
-    published = Robot.from_urdf(
-        folder / URDF, tool_frame="panda_hand_tcp", limits=read_limits(PANDA)
-    ).limits
-    for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_allclose(
-            getattr(published, name), getattr(stated, name), rtol=1e-12
-        )
-    np.testing.assert_array_equal(
-        published.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20]
-    )
-    np.testing.assert_array_equal(
-        published.jerk, [7500, 3750, 5000, 6250, 7500, 10000, 10000]
-    )
-    np.testing.assert_array_equal(published.torque_rate, 1000.0)
 
 
 def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):

@@ -101,59 +101,10 @@ def test_a_complete_file_is_read(complete, tmp_path):
     assert complete.solver.tolerance == 1e-6  # YAML 1.1 would read the string '1e-6'
 
 
-def test_defaults():
-    task = load_task(minimal())
-    assert task.robot.gravity == (0.0, 0.0, -9.81)
-    assert task.end == "free"
-    assert (
-        task.spline.degree,
-        task.spline.intervals,
-        task.spline.rest,
-        task.spline.points_per_interval,
-    ) == (
-        3,
-        "auto",
-        "full",
-        3,
-    )
-    assert (
-        task.solver.name,
-        task.solver.max_iterations,
-        task.solver.time_limit,
-        task.solver.tolerance,
-    ) == (
-        "auto",
-        300,
-        60.0,
-        1e-6,
-    )
-    assert (
-        task.refinement.tolerance,
-        task.refinement.density,
-        task.refinement.max_rounds,
-    ) == (1e-4, 10, 10)
-    assert task.robot.friction.coulomb_velocity == 0.01
-
-
-def test_a_task_is_returned_as_it_is(complete):
-    assert load_task(complete) is complete
-
-
 @pytest.mark.parametrize("text", [COMPLETE, COMPLETE.replace("velocity: null\n", "\n")])
 def test_round_trip_through_json(tmp_path, text):
     task = load_task(written(tmp_path, text))
     assert load_task(json.loads(json.dumps(task.to_dict(), allow_nan=False))) == task
-
-
-@pytest.mark.parametrize("key", ["torque", "velocity", "position"])
-def test_an_absent_limit_differs_from_none(key):
-    absent = load_task(minimal())
-    none = load_task(minimal(robot={"limits": {key: None}}))
-    assert getattr(absent.robot.limits, key) == FROM_URDF
-    assert getattr(none.robot.limits, key) is None
-    assert absent != none
-    for task in (absent, none):
-        assert load_task(task.to_dict()) == task
 
 
 @given(

@@ -3,24 +3,17 @@
 import json
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation as SciPyRotation
 
 import brachis
 from brachis.errors import TaskError
 from brachis.task import (
-    AlongTangent,
-    LineSegment,
-    Rotate,
     ToolPose,
-    TurnTo,
     json_schema,
     load_task,
     task_with,
 )
-from brachis.task.orientation import Attitude, Rotation, Tangent, Target
-from brachis.task.segments import SplineSegment, TurnSegment
 
 LINE = {"line": {"to": [1, 0, 0]}}
 ROTATE = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}
@@ -83,37 +76,6 @@ def test_round_trip(segment):
     validator = validators.validator_for(json_schema())(json_schema())
     assert validator.is_valid(written(segment))
     assert validator.is_valid(once.to_dict())
-
-
-def test_a_task_may_be_made_of_models():
-    rotate = Rotate(rotate=Rotation(axis=(0, 0, 2), angle_deg=90))
-    line = task(LINE | {"orientation": ROTATE}).path[0]
-    assert isinstance(line, LineSegment)
-    assert line == LineSegment(line=line.line, orientation=rotate)
-    assert task({"turn": ROTATE}).path[0] == TurnSegment(turn=rotate)
-    up = AlongTangent(tangent=Tangent(up=(0, 0, 1)))
-    made = load_task(
-        written(LINE | {"orientation": {"tangent": {"up": np.array([0, 0, 1])}}})
-    )
-    assert made.path[0] == LineSegment(line=line.line, orientation=up)
-    spline = task({"spline": SPLINE}).path[0]
-    assert isinstance(spline, SplineSegment)
-    assert spline.spline.orientations is not None
-    assert spline.spline.orientations[0] == Attitude(quaternion_wxyz=(0.6, 0, 0, -0.8))
-
-
-def test_defaults():
-    assert task(LINE).path[0] == LineSegment(line={"to": (1, 0, 0)}, orientation=None)
-    rotation = Rotation(axis=(0, 0, 1), angle_deg=1)
-    assert (rotation.frame, rotation.profile) == ("path", "uniform")
-    assert TurnTo(to=Target(rpy_deg=(0, 0, 1))).to.profile == "uniform"
-    assert [
-        segment.kind
-        for segment in task(LINE | {"orientation": "fixed"}, {"turn": ROTATE}).path
-    ] == [
-        "line",
-        "turn",
-    ]
 
 
 MISTAKES = [
@@ -294,23 +256,6 @@ def test_a_path_may_start_at_a_pose_in_any_convention():
         np.testing.assert_allclose(
             found, [1, 2, 3, *turn.as_matrix().ravel()], atol=1e-14
         )
-
-
-def test_a_program_gives_the_start_of_a_path_as_a_transform():
-    placement = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
-    task = task_with(
-        path=brachis.Line(by=[0, 0.1, 0]),
-        start="free",
-        path_start=placement,
-        task_space="pose",
-    )
-    assert task.path_start is not None
-    found = brachis.task_map_of(brachis.robots.iiwa14, "pose").read(
-        task.path_start, "path_start"
-    )
-    np.testing.assert_allclose(
-        found, [1, 2, 3, *placement.rotation.ravel()], atol=1e-14
-    )
 
 
 def test_another_start_of_the_path_takes_the_place_of_the_first_one():

@@ -2,7 +2,6 @@
 
 import pytest
 
-import brachis
 from brachis.errors import TaskError
 from brachis.task import load_task
 
@@ -28,13 +27,6 @@ def test_a_dwell_is_a_stop():
         made = task(**keys)
         assert (made.path[0].stop, made.path[0].dwell) == (stop, dwell)
         assert load_task(made.to_dict()) == made
-
-
-def test_segments_of_a_program_stop():
-    first, second = brachis.Line(by=[0.1, 0.0], dwell=0.5) + brachis.Circle(
-        [0.0, 0.0], stop=True
-    )
-    assert (first.stop, first.dwell, second.stop) == (True, 0.5, True)
 
 
 @pytest.mark.parametrize(

@@ -90,14 +90,6 @@ def test_orientations_are_fitted_too():
     assert (fitted.inv() * turned[::20]).magnitude().max() <= 2.1e-3
 
 
-def test_yaw_is_fitted_too():
-    position, t = wave(400)[:, :2], np.linspace(0.0, 1.0, 400)
-    yaw = np.sin(3.0 * t)[:, None]
-    (curve,), report = fit_curves(points(position, yaw), tolerance(0.05 * MM, 1e-3))
-    assert report.orientation_error <= 1e-3
-    assert curve.spline.c.shape[1] == 3
-
-
 @pytest.mark.parametrize(
     ("count", "scatter", "allowed"),
     [(31, 0.0, 0.05), (300, 0.0, 0.05), (2_000, 0.005, 0.05), (10_000, 0.05, 0.3)],
@@ -142,20 +134,6 @@ def test_smooth_points_have_no_corners():
         fit_curves(points(wave(20_000, 0.05 * MM)), tolerance(0.3 * MM))[1].corners
         == ()
     )
-
-
-def test_a_path_that_turns_back_is_refused():
-    back = np.concatenate(
-        [
-            np.linspace([0.0, 0.0], [0.2, 0.0], 100),
-            np.linspace([0.199, 0.0005], [0.0, 0.03], 99),
-        ]
-    )
-    with pytest.raises(
-        TaskError,
-        match=r"row 99: the path turns back, by 15\d.* degrees; .*corners up to 150 degrees",
-    ):
-        fit_curves(points(back), tolerance(0.05 * MM))
 
 
 def test_long_straight_ways_are_straight():

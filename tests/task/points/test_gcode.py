@@ -77,17 +77,6 @@ def test_whole_circles_and_long_arcs(motion, side):
     assert side * long.position[len(long) // 2, 1] > 0.0
 
 
-def test_a_program_is_fitted_with_its_corners():
-    points, _ = points_of(PROGRAM)
-    curves, report = fit_curves(
-        points, FitTolerance(position=0.02e-3, orientation=1e-3, corner=0.1e-3)
-    )
-    assert [corner.row for corner in report.corners] == [5]
-    assert report.position_error <= 0.02e-3
-    assert curves[1].speeds[0][0] == (0.0, 0.01)
-    assert curves[1].speeds[0][-1][1] == pytest.approx(0.02)
-
-
 MISTAKES = [
     ("G0 X1 Y1 Z1\nG81 X2", r"line 2: canned cycles are not read; found G81"),
     (

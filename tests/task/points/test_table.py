@@ -1,7 +1,5 @@
 """Tables as spreadsheets and CAM write them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -122,26 +120,3 @@ def test_mistakes_are_named(text, units, message):
         TaskError, match=f"a.csv: {message}" if message.startswith("line") else message
     ):
         read(text, units=units)
-
-
-def test_the_example_is_read_as_it_is_written(tmp_path):
-    """The seam of the example, through its own writer."""
-    import importlib.util
-
-    place = Path(__file__).parents[3] / "examples/08_cam_seam.py"
-    spec = importlib.util.spec_from_file_location(place.stem, place)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    module.write(tmp_path / "seam.csv")
-    points, told = read(
-        (tmp_path / "seam.csv").read_text(encoding="utf-8"),
-        orientation="rotation_vector",
-    )
-    rows = module.seam()
-    np.testing.assert_allclose(points.position, rows[:, :3] / 1e3, atol=5.1e-8)
-    np.testing.assert_allclose(points.speed, rows[:, 6] / 6e4)
-    assert told[:3] == (
-        "a byte order mark",
-        "columns separated by semicolons",
-        "decimal commas",
-    )
