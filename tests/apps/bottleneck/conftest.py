@@ -1,7 +1,5 @@
 """Slides pushed by limited forces, and the paper's lines."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,18 +1,14 @@
 """What holds a motion of several phases back: each phase by itself, and the multipliers of all of them."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 
 import brachis
 from brachis.apps.bottleneck import limit_ratios, limits_by_phase, saturations
-from brachis.explain import ActiveSet
 from support.effort import QUICK
 from support.gantry import gantry_motion
 
@@ -20,7 +16,7 @@ ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")
-def stopping() -> brachis.Result:
+def stopping():
     """A planned motion that waits at a corner."""
     task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
@@ -62,7 +58,7 @@ def test_costs_are_those_of_all_phases(stopping):
 
 
 def test_a_saved_motion_is_solved_again_by_phase(stopping):
-    lines: list[str] = []
+    lines = []
     again = brachis.bottleneck.report(
         stopping.trajectory, reference=True, listener=lines.append
     )
@@ -87,12 +83,3 @@ def test_phases_are_named_for_a_motion_that_was_not_planned():
     assert (label.subject, label.kind) == ("j2", "velocity")
     assert 0.0 < share < 0.5
     assert str(phases[1]) == "none"
-
-
-@pytest.mark.parametrize(("equalities", "dependent"), [(1, False), (0, True)])
-def test_an_equality_has_one_multiplier_of_either_sign(equalities, dependent):
-    slopes = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    rows = np.array([0, 1, 1])
-    signs = np.array([1.0, 1.0, -1.0])
-    found = ActiveSet(slopes, rows, signs, equalities)
-    assert found.dependent is dependent

@@ -1,7 +1,5 @@
 """The best value known: reachable, faster, and within the limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

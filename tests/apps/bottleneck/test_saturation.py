@@ -1,7 +1,5 @@
 """Which limit is active when, on motions made by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -81,13 +79,6 @@ def test_the_threshold_is_met_between_grid_points(made):
     assert entry.active[0].begin == pytest.approx(0.99 / 1.7 * T)
 
 
-def test_below_the_threshold_nothing_is_active(made):
-    trajectory = made([0.0, T], [0.989 * LIMIT] * 2, [0.989 * LIMIT] * 2)
-    entry = of(saturations(trajectory), "j1", "force")
-    assert (entry.active, entry.share) == ((), 0.0)
-    assert entry.peak == pytest.approx(0.989)
-
-
 def rippling(made, lowest):
     """A force at its limit with one dip in the middle of the motion."""
     times, forces = (
@@ -134,29 +125,3 @@ def test_positions_are_measured_by_their_place_in_the_range(made):
         column["j1 position"], (q + 1.0) / 3.0, atol=1e-12
     )  # 0 in the middle, at -1 m
     np.testing.assert_allclose(column["j2 position"], 0.75)  # one end: 0.25 m away
-
-
-def test_unlimited_joints_are_left_out(made):
-    trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])
-    limits = trajectory.robot.limits.with_magnitudes(torque=np.array([FORCE, np.inf]))
-    trajectory = dataclasses.replace(
-        trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits)
-    )
-    names = [str(label) for label in limit_ratios(trajectory).labels]
-    assert "j1 force" in names
-    assert "j2 force" not in names
-    assert not [name for name in names if name.endswith("acceleration")]
-
-
-def test_a_saved_motion_will_do(scara, tmp_path):
-    trajectory = scara("j1").trajectory
-    trajectory.save(tmp_path / "motion.npz")
-    found = saturations(type(trajectory).load(tmp_path / "motion.npz"))
-    shares = {str(each.label): each.share for each in saturations(trajectory)}
-    assert {str(each.label): each.share for each in found} == pytest.approx(
-        shares, abs=1e-3
-    )
-    assert 0.05 < found[0].share < 1.0
-    assert [entry.share for entry in found] == sorted(
-        (entry.share for entry in found), reverse=True
-    )

@@ -1,7 +1,5 @@
 """Reports of saved motions against those of the plans that they come from."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -53,19 +51,6 @@ def test_other_knots_and_boundary_conditions(slide, tmp_path):
     )
 
 
-def test_check_and_reference(slide, tmp_path):
-    result = slide(intervals=10, rest="full")
-    fresh = brachis.bottleneck.report(result, check=True, reference=True)
-    saved = brachis.bottleneck.report(
-        loaded(result, tmp_path), check=True, reference=True
-    )
-    assert_same(saved, fresh)
-    assert saved.reference.t_end == pytest.approx(fresh.reference.t_end, rel=1e-3)
-    assert saved.check.worst_deviation() == pytest.approx(
-        fresh.check.worst_deviation(), abs=1e-3
-    )
-
-
 def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
     trajectory = loaded(slide(intervals=10, rest="full"), tmp_path)
     slow = dataclasses.replace(
@@ -92,13 +77,6 @@ def test_a_motion_of_another_branch_is_refused(scara, tmp_path):
     trajectory = loaded(scara("j3"), tmp_path)
     with pytest.raises(InputError, match="branch"):
         brachis.bottleneck.report(dataclasses.replace(trajectory, branch="sideways"))
-
-
-def test_the_trajectory_of_a_plan_need_not_be_saved(scara):
-    result = scara("j1")
-    again = brachis.bottleneck.plan_again(result.trajectory)
-    x = result.candidate.refined.x
-    np.testing.assert_allclose(again.refined.x, x, atol=1e-6)
 
 
 class ElbowRange(Limit):

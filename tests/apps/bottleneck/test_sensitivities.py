@@ -1,9 +1,5 @@
 """What limits cost, on problems whose answer is known by hand and against least squares."""
 
-from __future__ import annotations
-
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -11,7 +7,6 @@ import brachis
 from brachis.explain import (
     ActiveSet,
     Multipliers,
-    figures_of,
     multipliers_of,
     sensitivities_at,
 )
@@ -23,16 +18,12 @@ from .conftest import FORCE, LENGTH, MASS, X, Z
 CARRIED = 2.0 * MASS
 
 
-def found_of(result):
-    return result.sensitivities
-
-
 @pytest.mark.parametrize("rest", ["full", "velocity"])
 @pytest.mark.parametrize("degree", [3, 4])
 def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     # t = 2 sqrt(m L / F) times a factor of the spline alone: d t / d ln F = -t / 2 exactly.
     result = slide(rest=rest, degree=degree)
-    found, answer = found_of(result), result.solver_report.objective
+    found, answer = result.sensitivities, result.solver_report.objective
     assert found.of("j1", "force").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
     assert found.of("j1", "force").derivative == pytest.approx(
         -0.5 * answer / FORCE, rel=1e-5
@@ -47,7 +38,7 @@ def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
 def test_trapezoid(slide):
     limit = 2.0
     result = slide(intervals=40, robot={"limits": {"velocity": limit}})
-    found = found_of(result)
+    found = result.sensitivities
     ramp = (
         limit * CARRIED / FORCE
     )  # t = L / v + v m / F, but for the corners that a spline rounds
@@ -64,22 +55,13 @@ def test_trapezoid(slide):
     assert found.of("j1", "velocity").label.unit == "m/s"
 
 
-def test_acceleration_limit(slide):
-    result = slide(robot={"limits": {"acceleration": 6.0, "torque": None}})
-    found = found_of(result)
-    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(
-        -0.5 * result.solver_report.objective, rel=1e-5
-    )
-    assert found.of("j1", "acceleration").label.unit == "m/s^2"
-
-
 def test_lifting_against_gravity(slide):
     # From rest to rest t^2 = 2 L (a + b) / (a b) with a = F / m - g, b = F / m + g: no mere scaling of time.
     force, g = 30.0, 9.81
     robot = {"gravity": [0, 0, -g], "limits": {"torque": {"j1": 200.0, "j2": force}}}
-    found = found_of(
-        slide((X, Z), ("x", "z"), (0.0, LENGTH), intervals=40, robot=robot)
-    )
+    found = slide(
+        (X, Z), ("x", "z"), (0.0, LENGTH), intervals=40, robot=robot
+    ).sensitivities
 
     def best(force):
         up, down = force / MASS - g, force / MASS + g
@@ -90,39 +72,25 @@ def test_lifting_against_gravity(slide):
     assert found.of("j2", "force").label.unit == "N"
 
 
-def held(slide, half):
-    """Two slides along one line; the lower one recoils within a narrow range, which costs time."""
-    limits = {"torque": {"j1": 30.0}, "position": {"j1": [-half, half]}}
-    return slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
-
-
 def test_ends_of_a_range(slide):
+    """Two slides along one line; the lower one recoils within a narrow range, which costs time."""
     half = 0.02
-    result = held(slide, half)
-    found = found_of(result)
-    ends = {end: found.of("j1", "position", end) for end in ("lower", "upper")}
-    assert ends["lower"].derivative >= 0.0 >= ends["upper"].derivative
-    assert min(entry.change(1.0) for entry in ends.values()) < -1e-3, (
-        "a wider range saves time"
+    limits = {"torque": {"j1": 30.0}, "position": {"j1": [-half, half]}}
+    result = slide(
+        (X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}
     )
-    assert ends["lower"].full_scale == pytest.approx(2.0 * half)
-    assert ends["lower"].label.unit == "m"
-    figures = figures_of(result.candidate.optimum.program)
-    for entry in ends.values():
-        ((limit, bound),) = figures[entry.label, entry.side]
-        wider, column = limit.relax(bound, 0.5 * entry.full_scale), bound.column
-        ends_now = (
-            half * wider.lower[column],
-            half * wider.upper[column],
-        )  # the rows count half ranges
-        assert ends_now == pytest.approx(
-            (-2.0 * half, half) if entry.side == "lower" else (-half, 2.0 * half)
-        )
+    lower, upper = (
+        result.sensitivities.of("j1", "position", end) for end in ("lower", "upper")
+    )
+    assert lower.derivative >= 0.0 >= upper.derivative
+    assert min(lower.change(1.0), upper.change(1.0)) < -1e-3, "a wider range saves time"
+    assert lower.full_scale == pytest.approx(2.0 * half)
+    assert lower.label.unit == "m"
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
 def test_no_limit_costs_less_than_nothing(scara, joint):
-    found = found_of(scara(joint))
+    found = scara(joint).sensitivities
     assert all(entry.change(1.0) <= 0.0 for entry in found.limits)
     # Torque limits and nothing else: were all torques f times as large, the time would fall with the root of f.
     expected = -0.5 * scara(joint).solver_report.objective
@@ -205,19 +173,6 @@ def test_least_squares_agree_with_the_solver(scara, joint):
         assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
 
 
-def test_an_answer_without_multipliers(slide):
-    result = slide(intervals=10)
-    refined = result.candidate.refined
-    report = refined.reports[-1]
-    report = dataclasses.replace(report, multipliers=np.zeros_like(report.multipliers))
-    multipliers = multipliers_of(refined.program, report.x, report.multipliers)
-    found = sensitivities_at(refined.program, multipliers)
-    assert found.source == "least squares"
-    assert found.of("j1", "force").change(1.0) == pytest.approx(
-        -0.5 * result.solver_report.objective, rel=1e-3
-    )
-
-
 def test_an_answer_that_is_no_optimum_is_told(scara):
     refined = scara("j3").candidate.refined
     report = refined.reports[-1]
@@ -272,23 +227,27 @@ def test_branch_boundary_is_told_apart(scara):
     }
 
 
+@pytest.mark.parametrize("weights", [[1.0, 1e-4], [1.0, 3e-5, 7e-5]])
 @pytest.mark.parametrize(("residual", "cost"), [(1e-6, 1e-4), (1e-3, 0.0)])
-def test_what_balances_less_than_the_residual_costs_nothing(residual, cost):
-    active_set = ActiveSet(np.eye(2), np.array([0, 1]), np.ones(2))
-    weights = np.array([1.0, 1e-4])
-    found = Multipliers(active_set, weights, "least squares", residual)
-    assert found.change(np.array([1.0, 0.0])) == -1.0
-    assert found.change(np.array([0.0, 1.0])) == -cost
+def test_what_balances_less_than_the_residual_costs_nothing(weights, residual, cost):
+    """Alone, or together with another row that holds alike."""
+    count = len(weights)
+    slopes = np.eye(2)[[0, *[1] * (count - 1)]]
+    active_set = ActiveSet(slopes, np.arange(count), np.ones(count))
+    assert active_set.dependent == (count > 2)
+    multipliers = Multipliers(active_set, np.array(weights), "least squares", residual)
+    first, *others = np.eye(count)
+    assert multipliers.change(first) == pytest.approx(-1.0, rel=1e-6)
+    together = multipliers.change(np.sum(others, axis=0))
+    assert together == pytest.approx(-cost, rel=1e-2, abs=1e-12)
+    if active_set.dependent:
+        assert multipliers.change(others[0]) == pytest.approx(0.0, abs=1e-7)
 
 
-@pytest.mark.parametrize(("residual", "cost"), [(1e-6, 1e-4), (1e-3, 0.0)])
-def test_so_do_two_rows_that_hold_alike(residual, cost):
-    slopes = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-    active_set = ActiveSet(slopes, np.arange(3), np.ones(3))
-    assert active_set.dependent
-    weights = np.array([1.0, 3e-5, 7e-5])
-    found = Multipliers(active_set, weights, "least squares", residual)
-    both = found.change(np.array([0.0, 1.0, 1.0]))
-    assert both == pytest.approx(-cost, rel=1e-2, abs=1e-12)
-    assert found.change(np.array([0.0, 1.0, 0.0])) == pytest.approx(0.0, abs=1e-7)
-    assert found.change(np.array([1.0, 0.0, 0.0])) == pytest.approx(-1.0, rel=1e-6)
+def test_acceleration_limit(slide):
+    result = slide(robot={"limits": {"acceleration": 6.0, "torque": None}})
+    found = result.sensitivities
+    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(
+        -0.5 * result.solver_report.objective, rel=1e-5
+    )
+    assert found.of("j1", "acceleration").label.unit == "m/s^2"

@@ -1,7 +1,5 @@
 """What the timing costs, on a gantry whose fastest motion is known, and on the paper's line."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import shutil
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +13,7 @@ import pytest
 import yaml
 
 from brachis.search import verified
-from brachis.trajectory import Trajectory
-from brachis.verify import Verification, VerifyOptions
+from brachis.verify import VerifyOptions
 from support.command_line import code_of, interrupts_kept
 from support.effort import QUICK
 
@@ -31,14 +29,14 @@ class Outcome:
 
 
 @pytest.fixture(autouse=True)
-def own_interrupts(rough_figures: None) -> Iterator[None]:  # noqa: ARG001
+def own_interrupts(rough_figures):  # noqa: ARG001
     with interrupts_kept():
         yield
 
 
 @pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
-    def run(*arguments: object, columns: int = 200) -> Outcome:
+def run(capfd):
+    def run(*arguments, columns=200):
         code = code_of(*arguments, columns=columns)
         streams = capfd.readouterr()
         return Outcome(code, streams.out, streams.err)
@@ -47,12 +45,12 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 
 
 @pytest.fixture
-def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
+def too_strict(monkeypatch):
     """A verification that passes nothing, and after which the time for further attempts is up."""
     honest, now = verified.verify_trajectory, [0.0]
     strict = VerifyOptions(ratio_tolerance=-0.5)
 
-    def refusing(trajectory: Trajectory, **more: object) -> Verification:
+    def refusing(trajectory, **more):
         now[0] += 90.0
         return honest(trajectory, strict, **more)
 
@@ -60,7 +58,7 @@ def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
 
 
-def quick_task() -> dict:
+def quick_task():
     content = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     content["robot"]["urdf"] = str(SCARA)
     content["search"] = QUICK
@@ -68,7 +66,7 @@ def quick_task() -> dict:
 
 
 @pytest.fixture
-def task() -> dict:
+def task():
     """The first example with few intervals as a mapping, with an absolute URDF path, planned from its one start."""
     return quick_task() | {"spline": {"intervals": 8}}
 
@@ -80,12 +78,12 @@ class Planned:
     data: dict
     out: Path
 
-    def copied(self, to: Path) -> Path:
+    def copied(self, to):
         return shutil.copytree(self.out, to)
 
 
 @pytest.fixture(scope="session")
-def planned(tmp_path_factory: pytest.TempPathFactory) -> Planned:
+def planned(tmp_path_factory):
     folder, printed = tmp_path_factory.mktemp("planned"), io.StringIO()
     (folder / "task.yaml").write_text(yaml.safe_dump(quick_task()))
     with interrupts_kept(), contextlib.redirect_stdout(printed):
@@ -97,8 +95,8 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Planned:
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Callable[[dict], Path]:
-    def write(content: dict) -> Path:
+def write(tmp_path):
+    def write(content):
         path = tmp_path / "task.yaml"
         path.write_text(yaml.safe_dump(content))
         return path

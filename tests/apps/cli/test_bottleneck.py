@@ -1,7 +1,5 @@
 """``brachis bottleneck``: what it prints and writes."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import re

@@ -1,7 +1,5 @@
 """What all commands have in common: help with examples that work, completion, how much is said, changes of a task."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -85,15 +83,6 @@ def test_help_of_the_program(run):
 def test_help_of_plot_lists_every_figure(run):
     text = run("plot", "--help", columns=80).out
     assert all(kind in text.split("--kind")[1] for kind in plots.PLOTS)
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_script(shell):
-    environment = {**os.environ, "_BRACHIS_COMPLETE": f"source_{shell}"}
-    done = subprocess.run(
-        COMMAND, env=environment, capture_output=True, text=True, check=True
-    )
-    assert f"_BRACHIS_COMPLETE=complete_{shell}" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """``brachis compose``: what it writes and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

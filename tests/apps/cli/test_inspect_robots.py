@@ -1,7 +1,5 @@
 """`brachis inspect` on every robot of this repository and on five of example-robot-data: it explains, never crashes."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -24,7 +22,7 @@ PUBLISHED = {
 }
 
 
-def published(name: str) -> Path:
+def published(name):
     for folder in map(Path, sys.path):
         path = folder / "cmeel.prefix/share/example-robot-data/robots" / PUBLISHED[name]
         if path.is_file():
@@ -32,7 +30,7 @@ def published(name: str) -> Path:
     pytest.skip("example-robot-data is not installed")
 
 
-def inspected(run, urdf: Path, *options: str) -> tuple[dict[str, str], list[str]]:
+def inspected(run, urdf, *options):
     """Solver of every choice of redundant joints, and remarks, after a check of the rest."""
     outcome = run("inspect", urdf, *options, "--json")
     assert outcome.code == 0, outcome.err
@@ -47,7 +45,7 @@ def inspected(run, urdf: Path, *options: str) -> tuple[dict[str, str], list[str]
     )
 
 
-def decompositions(run, urdf: Path, *options: str) -> dict[str, str]:
+def decompositions(run, urdf, *options):
     return inspected(run, urdf, *options)[0]
 
 
@@ -67,12 +65,6 @@ def test_every_robot_of_the_repository(run, urdf):
     )
     if choices is not None:
         assert (len(solvers), set(solvers.values())) == (choices, {"-"})
-
-
-def test_all_robots_without_a_closed_form_are_looked_at():
-    assert set(WITHOUT_CLOSED_FORM) <= {
-        urdf.parent.name for urdf in OWN if urdf.name == "robot.urdf"
-    }
 
 
 def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):

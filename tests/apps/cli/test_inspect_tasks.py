@@ -1,10 +1,6 @@
 """`brachis inspect` on tasks: where the tool is in every convention, pairs that are never free, and how long it is."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +15,7 @@ USER = {"xyz": [0.3, 0.1, 0.2], "rpy_deg": [10.0, -90.0, 40.0]}
 FLOOR = {"name": "floor", "half_space": {"normal": [0, 0, 1], "offset": 0.2}}
 
 
-def written(tmp_path: Path, **keys: Any) -> Path:
+def written(tmp_path, **keys):
     content = {
         "brachis": 1,
         "robot": {"urdf": "iiwa14"},
@@ -34,7 +30,7 @@ def written(tmp_path: Path, **keys: Any) -> Path:
     return file
 
 
-def place_of(run: Any, *arguments: object) -> dict[str, Any]:
+def place_of(run, *arguments):
     outcome = run("inspect", *arguments, "--json")
     assert outcome.code == 0, outcome.err
     return json.loads(outcome.out)["tool"]
@@ -43,7 +39,7 @@ def place_of(run: Any, *arguments: object) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("options", "frame"), [((), pin.SE3.Identity()), (("--frame", "user1"), None)]
 )
-def test_every_convention_says_the_same_place(run, tmp_path, options, frame) -> None:
+def test_every_convention_says_the_same_place(run, tmp_path, options, frame):
     if frame is None:
         turn = pin.rpy.rpyToMatrix(*np.radians(USER["rpy_deg"]))
         frame = pin.SE3(turn, np.array(USER["xyz"]))
@@ -63,7 +59,7 @@ def test_every_convention_says_the_same_place(run, tmp_path, options, frame) -> 
 @pytest.mark.parametrize(
     "end", [{"joints": [0.0] * 7}, {"joints": [0.0, 1.0]}, {"joints": [9.0] * 7}]
 )
-def test_the_place_is_told_while_the_end_is_wrong(run, tmp_path, end) -> None:
+def test_the_place_is_told_while_the_end_is_wrong(run, tmp_path, end):
     file = written(tmp_path, end=end)
     assert run("inspect", file).code == 2
     outcome = run("inspect", file, "--posture", "home")
@@ -73,7 +69,7 @@ def test_the_place_is_told_while_the_end_is_wrong(run, tmp_path, end) -> None:
     assert "the task cannot be planned: end.joints" in outcome.out.replace("\n", " ")
 
 
-def test_wrong_names_of_postures_and_frames(run, tmp_path) -> None:
+def test_wrong_names_of_postures_and_frames(run, tmp_path):
     file = written(tmp_path)
     for options, said in (
         (("--posture", "hom"), "no posture named 'hom'; allowed: home"),
@@ -89,7 +85,7 @@ def test_wrong_names_of_postures_and_frames(run, tmp_path) -> None:
 
 def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch(
     run, tmp_path
-) -> None:
+):
     """The start posture cannot keep clear of them, and the entries are enough to plan."""
     file = written(tmp_path, scene=[FLOOR])
     assert run("inspect", written(tmp_path, scene=[FLOOR]), "--json").code == 0
@@ -106,7 +102,7 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
     assert "never free" not in run("inspect", written(tmp_path, scene=[low])).out
 
 
-def test_it_fits_a_screen_and_has_the_reasons_where_asked(run) -> None:
+def test_it_fits_a_screen_and_has_the_reasons_where_asked(run):
     short = run("inspect", "tx90l_rail").out
     assert len(short.splitlines()) < 40
     assert "do not meet in a point" not in short
@@ -122,7 +118,7 @@ def test_it_fits_a_screen_and_has_the_reasons_where_asked(run) -> None:
     assert "and 72 more" in many
 
 
-def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path) -> None:
+def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path):
     pytest.importorskip("mujoco")
     file = tmp_path / "arm.xml"
     file.write_text(

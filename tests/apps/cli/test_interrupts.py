@@ -4,8 +4,6 @@ The press comes at an event, not at a time: where a module begins to be imported
 There it is swallowed, too, as compiled libraries and finalisers do.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 
@@ -38,9 +36,7 @@ main()
 """
 
 
-def brachis(
-    where: str, how: str, *arguments: object
-) -> subprocess.CompletedProcess[str]:
+def brachis(where, how, *arguments):
     command = [sys.executable, "-c", SCRIPT, where, how, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 

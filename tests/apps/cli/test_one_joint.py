@@ -1,7 +1,5 @@
 """A robot with one joint through every command."""
 
-from __future__ import annotations
-
 import csv
 import json
 

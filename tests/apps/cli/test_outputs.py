@@ -1,7 +1,5 @@
 """What commands may not write over, standard output that cannot be written, and inputs that never end."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

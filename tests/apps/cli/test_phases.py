@@ -1,7 +1,5 @@
 """A plan of several phases prints them and has them in its JSON; one of a single phase says nothing of phases."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -10,7 +8,7 @@ from .conftest import quick_task
 
 
 @pytest.fixture
-def stopping() -> dict:
+def stopping():
     """A task that waits at a corner."""
     path = [
         {"line": {"by": [0.2, 0.0]}, "dwell": 0.3},

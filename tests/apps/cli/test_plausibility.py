@@ -1,7 +1,5 @@
 """Figures that are hardly meant, on the command line: one message each on standard error, an error with --strict."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -83,15 +81,6 @@ def test_inspect_refuses_what_a_plan_refuses(run, task, write):
     assert remark.startswith(
         "warning: start.joints: the position looks like degrees; found j1 30 rad, j2"
     )
-
-
-def test_inspect_refuses_a_path_out_of_reach_as_plan_does(run, task, write):
-    task["path"] = [{"line": {"by": [0.0, 5.0]}}]
-    path = write(task)
-    refused = run("inspect", path)
-    assert refused == run("plan", path)
-    assert refused.code == 2
-    assert "the path is out of reach" in refused.err
 
 
 def test_inspect_says_of_a_path_out_of_reach_that_the_robot_is_in_mm(

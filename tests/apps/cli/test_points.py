@@ -1,7 +1,5 @@
 """What the command line says of points that a path follows."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -9,9 +7,6 @@ import pytest
 from typer.testing import CliRunner
 
 from brachis.apps.cli.app import app
-from brachis.errors import PlausibilityError, TaskError
-from brachis.planner import plan
-from brachis.task import load_task
 from support.effort import QUICK
 
 RUNNER = CliRunner()
@@ -52,22 +47,6 @@ def test_inspect_says_what_was_found(seam):
     assert fit["corners"] == []
 
 
-@pytest.mark.parametrize(
-    ("corner", "said"),
-    [
-        ("stop", "corners, at which the tool stops"),
-        ("blend", "corners, rounded within the tolerance"),
-    ],
-)
-def test_inspect_says_what_happens_at_corners(corner, said, task, write, tmp_path):
-    there = [f"1700;{4 * i}" for i in range(100)]
-    back = [f"{1700 - 4 * i};396" for i in range(1, 100)]
-    (tmp_path / "corner.csv").write_text("\n".join(["x_mm;y_mm", *there, *back]))
-    read = {"file": "corner.csv", "tolerance": {"position": "1 mm"}, "corner": corner}
-    task = write({**task, "path": [{"csv": read}], "start": "free"})
-    assert said in RUNNER.invoke(app, ["inspect", str(task)]).stdout
-
-
 def test_inspect_of_a_path_without_points(task, write):
     shown = RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
     assert "path: 1 segment (line), 1 m long\n" in shown
@@ -90,13 +69,3 @@ def test_plan_reports_and_draws_the_fit(seam, tmp_path):
         str(tmp_path / "again.svg"),
     ]
     assert RUNNER.invoke(app, arguments).exit_code == 0
-
-
-def test_points_in_other_units_are_warned_of(seam, tmp_path):
-    rows = (tmp_path / "seam.csv").read_text().replace("x_mm;y_mm", "x;y")
-    (tmp_path / "seam.csv").write_text(rows)
-    with pytest.raises(TaskError, match=r"mm for m\? Set units: {length: mm}"):
-        load_task(seam)
-    seam.write_text(seam.read_text().replace("0.12 mm", "0.12 m"))
-    with pytest.raises(PlausibilityError, match=r"mm for m\? Set units: {length: mm}"):
-        plan(seam, strict=True)

@@ -63,26 +63,6 @@ def test_import(run, recorded, tmp_path):
     )
 
 
-def test_import_of_a_urdf_alone(run, recorded, tmp_path):
-    file, _, trajectory = recorded
-    urdf = trajectory.task.robot.urdf
-    outcome = run(
-        "import",
-        file,
-        "--robot",
-        urdf,
-        "--angle",
-        "deg",
-        "--out",
-        tmp_path / "today.npz",
-        "--json",
-    )
-    assert outcome.code == 0, outcome.err
-    data = json.loads(outcome.out)
-    assert data["t_end"] == pytest.approx(trajectory.t_end)
-    assert data["recovered"]["source"] == str(file)
-
-
 def test_compare(run, recorded, tmp_path):
     file, cell, trajectory = recorded
     out = tmp_path / "out"

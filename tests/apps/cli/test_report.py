@@ -1,7 +1,5 @@
 """``brachis report``."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import brachis

@@ -1,7 +1,5 @@
 """``brachis sweep``, with plans that cost nothing."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -102,14 +100,6 @@ def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
     assert done.code == 1
     assert "2 failed with PathError" in done.out
     assert not (tmp_path / "out/sweep.png").exists()
-
-
-def test_a_wrong_key_is_exit_code_2(run, sweep_file, tmp_path):
-    sweep_file.write_text(sweep_file.read_text().replace("length", "lenght"))
-    done = run("sweep", sweep_file, "--out", tmp_path / "out")
-    assert done.code == 2
-    assert "Did you mean 'length'?" in done.err
-    assert not (tmp_path / "out").exists()
 
 
 def test_parts_are_planned_by_themselves_and_merged(run, sweep_file, tmp_path):

@@ -1,7 +1,5 @@
 """Tables fit the terminal, and no number in them is cut or wrapped, whichever command prints them."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -75,17 +75,6 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
         assert _read_candidates(tmp_path / "result.npz", trajectory) == []
 
 
-def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):
-    def second(viewer):
-        looked_at.append(run("view", saved, "--port", viewer.url.rpartition(":")[2]))
-
-    monkeypatch.setattr(Viewer, "wait", second)
-    run("view", saved, "--port", 0)
-    (refused,) = looked_at
-    assert refused.code == 2
-    assert "Address already in use" in refused.err
-
-
 def test_other_machines_are_let_in_with_a_warning(run, saved, looked_at):
     shown = run("view", saved, "--port", 0, "--host", "0.0.0.0")  # noqa: S104  (what is tested)
     assert shown.code == 0, shown.err

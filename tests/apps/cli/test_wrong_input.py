@@ -1,7 +1,5 @@
 """Wrong input: exit code 2, one clear message on standard error, nothing written."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -11,7 +9,7 @@ import pytest
 from brachis.errors import PlanningError
 
 
-def set_key(task: dict, dotted: str, value: object) -> None:
+def set_key(task, dotted, value):
     *parents, last = dotted.split(".")
     for key in parents:
         task = task[int(key)] if key.isdigit() else task[key]

@@ -106,41 +106,31 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
     found, today, task, tmp_path
 ):
     t = np.append(np.arange(0.0, today.motion.duration, 0.008), today.motion.duration)
-    table, header = (
-        np.column_stack([t, today.motion(t)]),
-        ",".join(["t", *today.robot.joint_names]),
-    )
-    np.savetxt(
-        tmp_path / "today.csv",
-        table,
-        delimiter=",",
-        header=header,
-        comments="",
-        fmt="%.4f",
-    )
-    rough = brachis.import_motion(tmp_path / "today.csv", task=task)
-    proven, verification = (
-        comparison.bound_ratios(rough),
-        brachis.verify_trajectory(rough),
-    )
+    file = tmp_path / "today.csv"
+    header = ",".join(["t", *today.robot.joint_names])
+    rows = np.column_stack([t, today.motion(t)])
+    np.savetxt(file, rows, delimiter=",", header=header, comments="", fmt="%.4f")
+    rough = brachis.import_motion(file, task=task)
+    verification = brachis.verify_trajectory(rough)
     coarse = dataclasses.replace(
-        found, recorded=rough, proven=proven, verification=verification
+        found,
+        recorded=rough,
+        proven=comparison.bound_ratios(rough),
+        verification=verification,
     )
     assert verification.worst_ratio > 1.02  # the overshoot of a smoothing spline
     assert not coarse.exceeded
     assert not any("exceeds" in remark for remark in coarse.remarks)
     use = max(coarse.uses, key=lambda use: use.recorded_up_to)
     assert use.recorded_up_to == verification.worst_ratio
+    percent = f"{100 * use.recorded_up_to:.1f} %"
+    assert use.recorded_text.endswith(f", between the rows up to {percent}")
     words = f"{use.limit}: {use.recorded_text} used by the recorded motion"
-    assert use.recorded_text.endswith(
-        f", between the rows up to {100 * use.recorded_up_to:.1f} %"
-    )
     assert words in str(coarse)
     *_, ratio = plot_both_motions(coarse).axes
     (band,) = ratio.collections
-    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(
-        use.recorded_up_to, rel=0.02
-    )
+    highest = band.get_paths()[0].vertices[:, 1].max()
+    assert highest == pytest.approx(use.recorded_up_to, rel=0.02)
     assert ratio.lines[0].get_ydata().max() <= 1.0 + 1e-4
 
 

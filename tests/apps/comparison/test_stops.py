@@ -1,7 +1,5 @@
 """A recorded motion that waits at a corner is compared with a plan that waits as long."""
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

@@ -1,11 +1,8 @@
 """An arm to be mounted, and the script that makes the robots of the repository."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -19,7 +16,7 @@ BASE_INERTIAL = (
 )
 
 
-def arm_text(*, more: str = "") -> str:
+def arm_text(*, more=""):
     """Text of three joints about unlike axes, 4 kg + 3 kg + 2 kg, on a base of 7 kg below ``world``."""
     joints = [
         Joint("revolute", axis=(0.0, 0.0, 1.0), xyz=(0.0, 0.1, 0.4)),
@@ -33,7 +30,7 @@ def arm_text(*, more: str = "") -> str:
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Path:
+def arm(tmp_path):
     """File of that arm."""
     path = tmp_path / "arm" / "arm.urdf"
     path.parent.mkdir()
@@ -42,7 +39,7 @@ def arm(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def maker() -> ModuleType:
+def maker():
     """The script robots/make_robots.py, imported without leaving compiled files in its folder."""
     spec = importlib.util.spec_from_file_location(
         "make_robots", ROOT / "robots/make_robots.py"

@@ -1,7 +1,5 @@
 """What happens to the arm's own URDF: names, mesh files, and what yourdfpy does not know."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -39,16 +37,16 @@ OTHER = """
 """
 
 
-def parsed(text: str) -> etree._Element:
+def parsed(text):
     return etree.fromstring(text.encode())
 
 
-def files(text: str) -> list[str]:
+def files(text):
     return [each.get("filename") for each in parsed(text).iter("mesh", "texture")]
 
 
 @pytest.fixture
-def meshed(arm) -> Path:
+def meshed(arm):
     arm.write_text(arm_text(more=MESHES))
     return arm
 

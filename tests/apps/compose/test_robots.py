@@ -1,9 +1,6 @@
 """The robots of the repository: made by their script, readable, and as their data sheets say."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -28,32 +25,24 @@ MADE = (
 TX90L_START = (0.0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1)
 
 
-def gravity_torque(robot: Robot, q: np.ndarray) -> np.ndarray:
+def gravity_torque(robot, q):
     still = np.zeros_like(q)
     return dynamics.torque(robot, q, still, still)
 
 
-def anywhere(robot: Robot, count: int = 2000) -> np.ndarray:
+def anywhere(robot, count=2000):
     limits = robot.limits
     return np.random.default_rng(0).uniform(
         limits.position_lower, limits.position_upper, (count, robot.n)
     )
 
 
-def turn(axis: str, angle: float) -> pin.SE3:
+def turn(axis, angle):
     return pin.SE3(pin.exp3(angle * np.eye(3)["xyz".index(axis)]), np.zeros(3))
 
 
-def shift(x: float, y: float, z: float) -> pin.SE3:
+def shift(x, y, z):
     return pin.SE3(np.eye(3), np.array([x, y, z]))
-
-
-def test_there_are_robots():
-    assert {path.parent.name for path in URDFS} >= {
-        "scara3",
-        "gantry2",
-        *(Path(path).parent.name for path in MADE),
-    }
 
 
 @pytest.mark.parametrize("path", URDFS, ids=lambda path: "/".join(path.parts[-2:]))
@@ -74,32 +63,14 @@ def test_robot_is_read_by_brachis_and_yourdfpy(path):
 def test_robot_is_what_the_script_makes_of_its_figures(maker, name):
     if name.startswith("ur10") and maker.example_robot_data() is None:
         pytest.skip("example-robot-data is not installed")
+    assert {*maker.MAKERS} == {*MADE}
     assert maker.MAKERS[name]() == (ROBOTS / name).read_text(), (
         "run python robots/make_robots.py"
     )
 
 
-def test_script_makes_every_composed_robot(maker, monkeypatch, tmp_path, capsys):
-    assert set(maker.MAKERS) == set(MADE)
-    monkeypatch.setattr(maker, "example_robot_data", lambda: None)
-    for name in {Path(path).parent.name for path in MADE}:
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "figures.yaml").write_text(
-            (ROBOTS / name / "figures.yaml").read_text()
-        )
-    monkeypatch.setattr(maker, "ROBOTS", tmp_path)
-    maker.main()
-    assert (
-        "ur10_rail/robot.urdf: left as it is, example-robot-data is not installed"
-        in capsys.readouterr().out
-    )
-    assert {
-        str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.urdf")
-    } == set(MADE[:-1])
-
-
 @pytest.fixture(scope="module")
-def tx90l() -> Robot:
+def tx90l():
     return Robot.from_urdf(ROBOTS / "tx90l_rail/robot.urdf")
 
 
@@ -145,14 +116,6 @@ def test_tx90l_forward_kinematics_are_those_of_an_ortho_parallel_wrist_arm(tx90l
         )
 
 
-def test_tx90l_can_be_held_at_the_start_of_the_reference_task(tx90l):
-    start = np.array([TX90L_START])
-    assert np.all(
-        (tx90l.limits.position_lower < start) & (start < tx90l.limits.position_upper)
-    )
-    assert np.all(np.abs(gravity_torque(tx90l, start)) < tx90l.limits.torque)
-
-
 def test_tx90l_gravity_asks_121_of_130_newton_metres(tx90l):
     stretched = np.array([[0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.0]])
     assert abs(gravity_torque(tx90l, stretched)[0, 2]) == pytest.approx(121.2, abs=0.05)
@@ -160,34 +123,12 @@ def test_tx90l_gravity_asks_121_of_130_newton_metres(tx90l):
     assert np.all(worst < tx90l.limits.torque)
 
 
-def test_tx90l_rail_moves_the_whole_arm_and_no_other_carriage(tx90l, tmp_path):
+def test_tx90l_rail_moves_the_whole_arm_and_no_other_carriage(tx90l):
     q, still = np.array([TX90L_START]), np.zeros((1, 7))
     force = dynamics.torque(tx90l, q, still, np.eye(7)[:1])[0, 0]
     assert force == pytest.approx(
         10.733459 + 16.934564 + 14.350897 + 7.501506 + 6.420429 + 0.568760 + 0.030977
     )
-    # With the rail alone 0.8 m take longer than the reference task does: there the arm has to help.
-    assert 0.8 / 2.0 + 2.0 / (1500.0 / force) == pytest.approx(0.475, abs=1e-3)
-    # A carriage of its own is added by composing.
-    text = on_rail(
-        ROBOTS / "tx90l_rail/arm.urdf",
-        Rail(range=(-2, 2), velocity=2, force=1500, mass=50),
-        output=tmp_path / "new.urdf",
-    )
-    heavy = Robot.from_urdf("heavy", urdf_text=text)
-    assert dynamics.torque(heavy, q, still, np.eye(7)[:1])[0, 0] == pytest.approx(
-        force + 50.0
-    )
-    assert heavy.joint_names == tx90l.joint_names
-    for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_array_equal(
-            getattr(heavy.limits, name), getattr(tx90l.limits, name)
-        )
-    for posture in anywhere(tx90l, 5):
-        expected = tx90l.tool_placement(posture).homogeneous
-        np.testing.assert_allclose(
-            heavy.tool_placement(posture).homogeneous, expected, atol=1e-15
-        )
 
 
 def test_iiwa14_is_the_published_arm():
@@ -252,29 +193,6 @@ def test_ur10_rail_is_the_published_arm():
         )
 
 
-def test_ur10_rail_carries_the_arm_of_example_robot_data(maker):
-    folder = maker.example_robot_data()
-    if folder is None:
-        pytest.skip("example-robot-data is not installed")
-    arm = Robot.from_urdf(
-        folder / "ur_description/urdf/ur10_robot.urdf", tool_frame="tool0"
-    )
-    robot = Robot.from_urdf(ROBOTS / "ur10_rail/robot.urdf")
-    for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_array_equal(
-            getattr(robot.limits, name)[1:], getattr(arm.limits, name)
-        )
-    q = anywhere(robot, 20)
-    np.testing.assert_allclose(
-        gravity_torque(robot, q)[:, 1:], gravity_torque(arm, q[:, 1:]), atol=1e-10
-    )
-    for posture in q:
-        expected = shift(0.0, posture[0], 0.0) * arm.tool_placement(posture[1:])
-        np.testing.assert_allclose(
-            robot.tool_placement(posture).homogeneous, expected.homogeneous, atol=1e-14
-        )
-
-
 PUBLIC = {
     "ur5": ("ur_description/urdf/ur5_robot.urdf", "tool0", 6),
     "ur10": ("ur_description/urdf/ur10_robot.urdf", "tool0", 6),
@@ -285,25 +203,19 @@ PUBLIC = {
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_public_arm_on_a_tilted_rail(maker, name, tmp_path):
+def test_a_public_arm_on_a_rail_keeps_its_joints_and_meshes(maker, name, tmp_path):
     folder = maker.example_robot_data()
     if folder is None:
         pytest.skip("example-robot-data is not installed")
     path, tool, joints = PUBLIC[name]
     output = tmp_path / "composed.urdf"
-    rail = Rail(axis=(0.6, 0.8, 1.0), range=(0, 3), velocity=1, force=3000, mass=50)
+    rail = Rail(range=(0, 3), velocity=1, force=3000, mass=50)
     on_rail(folder / path, rail, output=output)
     arm, robot = (
         Robot.from_urdf(each, tool_frame=tool) for each in (folder / path, output)
     )
     assert robot.n == 1 + joints
     assert robot.joint_names == ("rail", *arm.joint_names)
-    q = np.random.default_rng(2).uniform(-1.0, 1.0, robot.n)
-    step = q[0] * np.array([0.6, 0.8, 1.0]) / math.sqrt(2.0)
-    expected = shift(*step) * arm.tool_placement(q[1:])
-    np.testing.assert_allclose(
-        robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
-    )
     files = [
         each.get("filename")
         for each in etree.fromstring(output.read_bytes()).iter("mesh")

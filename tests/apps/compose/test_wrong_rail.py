@@ -1,7 +1,5 @@
 """What on_rail refuses, in which words, and that nothing is written then."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -158,12 +156,3 @@ def test_output_that_cannot_be_written(arm, tmp_path):
             f"{output}: the file cannot be written; found "
         )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm", "folder.urdf"]
-
-
-def test_failure_leaves_the_old_output(arm, tmp_path):
-    output = tmp_path / "new.urdf"
-    text = on_rail(arm, Rail(**RAIL), output=output)
-    arm.write_text("<robot name='x'/>")
-    with pytest.raises(UrdfError):
-        on_rail(arm, Rail(**RAIL), output=output)
-    assert output.read_text() == text

@@ -14,21 +14,12 @@ from brachis.apps.plots.style import figure_class, save_figure
 from brachis.apps.report.page import Report
 from brachis.common.files import atomic_write
 from brachis.errors import InputError
-from brachis.trajectory import Trajectory
 
 
 def half_write(path, error):
     with atomic_write(path) as stream:
         stream.write(b"half")
         raise error
-
-
-def test_writes_and_leaves_nothing_else(tmp_path):
-    path = tmp_path / "new"
-    with atomic_write(path) as stream:
-        stream.write(b"content")
-    assert path.read_bytes() == b"content"
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_the_old_file_stays_until_the_block_has_ended(tmp_path):
@@ -39,15 +30,6 @@ def test_the_old_file_stays_until_the_block_has_ended(tmp_path):
         stream.flush()
         assert path.read_bytes() == b"old"
     assert path.read_bytes() == b"new"
-
-
-def test_whoever_reads_the_old_file_keeps_it(tmp_path):
-    path = tmp_path / "file"
-    path.write_bytes(b"old")
-    with path.open("rb") as reader:
-        with atomic_write(path) as stream:
-            stream.write(b"new")
-        assert reader.read() == b"old"
 
 
 @pytest.mark.parametrize(
@@ -117,15 +99,6 @@ def test_a_full_disk_is_named():
         atomic_write("/dev/full") as stream,
     ):
         stream.write(b"content")
-
-
-def test_a_trajectory_is_saved_through_it(line_trajectory, tmp_path):
-    path = tmp_path / "result.npz"
-    line_trajectory.save(path)
-    assert list(tmp_path.iterdir()) == [path]
-    assert np.array_equal(Trajectory.load(path).q, line_trajectory.q)
-    with pytest.raises(InputError, match=r"nowhere.*cannot be written"):
-        line_trajectory.save(tmp_path / "nowhere" / "result.npz")
 
 
 def foreign_files(folder):

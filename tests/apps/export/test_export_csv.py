@@ -65,14 +65,6 @@ def test_joint_names_with_commas_stay_one_column(
     assert {len(row) for row in rows} == {13}
 
 
-def test_a_missing_folder_is_named(line_trajectory, tmp_path):
-    path = tmp_path / "nowhere" / "motion.csv"
-    with pytest.raises(InputError, match="No such file") as caught:
-        export.write(line_trajectory, path, dt=DT)
-    assert caught.value.where == str(path)
-    assert caught.value.exit_code == 2
-
-
 @pytest.mark.parametrize("dt", [0.0, -0.1, float("nan"), 1e-9])
 def test_an_unusable_period_leaves_the_old_file(line_trajectory, tmp_path, dt):
     path = tmp_path / "motion.csv"

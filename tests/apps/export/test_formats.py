@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import jsonschema
 import numpy as np
-import pinocchio as pin
 import pyarrow.parquet
 import pytest
 import yaml
@@ -399,14 +398,3 @@ def test_what_cannot_be_written(line_trajectory, tmp_path, name, parameters, tol
 
 def test_every_format_has_a_suffix_of_its_own():
     assert len({form.suffix for form in export.FORMATS.values()}) == len(export.FORMATS)
-
-
-def test_animations_in_space(ur10):
-    (figure, pixels), *_ = frames(ur10, np.array([0.0, 1.0]))
-    ax = figure.axes[0]
-    place = pin.SE3(ur10.robot.tool_placement(ur10.q[1])).translation
-    (tool,) = (line for line in ax.lines if line.get_gid() == "tool")
-    np.testing.assert_allclose(
-        [part[0] for part in tool.get_data_3d()], place, atol=1e-12
-    )
-    assert pixels.shape[2] == 4

@@ -1,19 +1,16 @@
 """Plots, report and viewer show where phases meet; a motion of one phase has nothing of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from brachis.apps import plots
 from brachis.apps.report import make_report
 from brachis.apps.view import tables
-from brachis.trajectory import Trajectory
 from support.gantry import gantry_motion
 
 
 @pytest.fixture(scope="module")
-def motion() -> Trajectory:
+def motion():
     return gantry_motion()
 
 

@@ -1,7 +1,5 @@
 """Times along joint paths are compared with those of motions as finishing would make them."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """The figure of fit errors shows the report's profile, tolerances and corners."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

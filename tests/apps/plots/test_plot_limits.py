@@ -1,7 +1,5 @@
 """Ratios to all limits, a panel for each kind."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -36,29 +34,6 @@ def test_a_panel_for_every_kind_and_a_line_for_every_value(line_trajectory):
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         np.testing.assert_allclose(
             drawn[label.subject, label.axis].get_ydata(), column, atol=1e-9
-        )
-
-
-def test_a_joint_has_one_colour_in_all_panels(line_trajectory):
-    for name in line_trajectory.joint_names:
-        found = {
-            lines(ax)[name].get_color()
-            for ax in plot_limits(line_trajectory).axes
-            if name in lines(ax)
-        }
-        assert len(found) == 1
-
-
-@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
-def test_nothing_is_cut_off(name, request):
-    figure = plot_limits(request.getfixturevalue(name))
-    figure.draw_without_rendering()
-    for ax in figure.axes:
-        low, high = ax.get_ylim()
-        assert all(
-            low <= value <= high
-            for line in lines(ax).values()
-            for value in line.get_ydata()
         )
 
 

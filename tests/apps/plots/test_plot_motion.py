@@ -84,14 +84,8 @@ def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajecto
         r"$\dot{q}$ (rad/s)",
         r"$\dot{q}$ (m/s)",
     ]
-
-
-def test_joints_in_rad_and_in_m_have_axes_of_their_own(spatial_trajectory):
-    turning, sliding = plot_motion(spatial_trajectory).axes[:2]
-    assert list(labelled(turning)) == list(spatial_trajectory.joint_names[1:])
+    sliding = plot_motion(spatial_trajectory).axes[1]
     assert list(labelled(sliding)) == ["rail"]
-    t, q = labelled(sliding)["rail"].get_data()
-    assert np.array_equal(q, spatial_trajectory.position(t)[:, 0])
 
 
 def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limits):
@@ -118,100 +112,50 @@ def test_far_and_infinite_limits_do_not_squeeze_the_data(line_trajectory, with_l
     assert far.get_ylim() == free.get_ylim()
 
 
-def test_every_joint_has_its_own_limits_also_where_they_are_the_same(
-    line_trajectory, with_limits
+@pytest.mark.parametrize(
+    ("kind", "name", "panel"), [("position", "q", 0), ("velocity", "qdot", 1)]
+)
+def test_limits_that_differ_in_both_directions_are_both_drawn(
+    line_trajectory, with_limits, kind, name, panel
 ):
-    limit = 1.02 * np.abs(line_trajectory.qdot).max()
-    open_below = {
-        "velocity_lower": np.full(3, -INF),
-        "velocity_upper": np.full(3, limit),
-    }
-    ax = plot_motion(with_limits(line_trajectory, **open_below)).axes[1]
-    curves = labelled(ax)
-    near = {
-        name
-        for name, line in curves.items()
-        if limit < line.get_ydata().max() + 0.3 * np.ptp(ax.dataLim.intervaly)
-    }
-    drawn = drawn_limits(ax)
-    assert {line.get_color() for line in drawn} == {
-        curves[name].get_color() for name in near
-    }
-    assert levels(ax) == [limit] * len(near)
+    values = getattr(line_trajectory, name)
+    lower = values.min(axis=0) - np.array([0.01, 0.02, 0.03])
+    upper = values.max(axis=0) + np.array([0.04, 0.05, 0.06])
+    limits = {f"{kind}_lower": lower, f"{kind}_upper": upper}
+    ax = plot_motion(with_limits(line_trajectory, **limits)).axes[panel]
+    assert levels(ax) == sorted([*lower, *upper])
+    for joint, joint_name in enumerate(line_trajectory.joint_names):
+        colour = labelled(ax)[joint_name].get_color()
+        drawn = [line for line in drawn_limits(ax) if line.get_color() == colour]
+        ends = sorted(line.get_ydata()[0] for line in drawn)
+        assert ends == [lower[joint], upper[joint]]
 
 
 def test_joints_that_share_a_level_share_its_dashes():
     dashes = [limit_dashes(place, 3) for place in range(3)]
-    inked = [
-        {(offset_of - offset + step) % 18 for step in range(4) for offset_of in [0.0]}
-        for offset, _ in dashes
-    ]
+    assert len({offset for offset, _ in dashes}) == 3
     assert all(sum(pattern) == 18.0 for _, pattern in dashes)
-    assert not inked[0] & inked[1]
-    assert not inked[1] & inked[2]
-    assert not inked[0] & inked[2]
-
-
-def test_limits_that_differ_in_both_directions_are_both_drawn(
-    line_trajectory, with_limits
-):
-    lower = line_trajectory.qdot.min(axis=0) - np.array([0.01, 0.02, 0.03])
-    upper = line_trajectory.qdot.max(axis=0) + np.array([0.04, 0.05, 0.06])
-    ax = plot_motion(
-        with_limits(line_trajectory, velocity_lower=lower, velocity_upper=upper)
-    ).axes[1]
-    assert levels(ax) == sorted([*lower, *upper])
-    for joint, name in enumerate(line_trajectory.joint_names):
-        own = [
-            line.get_ydata()[0]
-            for line in drawn_limits(ax)
-            if line.get_color() == labelled(ax)[name].get_color()
-        ]
-        assert sorted(own) == [lower[joint], upper[joint]]
-
-
-def test_position_ranges_are_drawn(line_trajectory, with_limits):
-    low, high = (
-        line_trajectory.q.min(axis=0) - 0.05,
-        line_trajectory.q.max(axis=0) + 0.07,
-    )
-    ax = plot_motion(
-        with_limits(line_trajectory, position_lower=low, position_upper=high)
-    ).axes[0]
-    assert levels(ax) == sorted([*low, *high])
 
 
 def test_the_overview_has_every_curve(line_trajectory):
     figure = plot_overview(line_trajectory)
     postures, *panels = figure.axes
-    assert (
-        len(
-            [
-                line
-                for line in postures.get_lines()
-                if (line.get_gid() or "").startswith("posture")
-            ]
-        )
-        > 2
-    )
-    wanted = {
-        r"$\tau / \tau_\mathrm{max}$": lambda t: (
-            line_trajectory.torque(t) / line_trajectory.robot.limits.torque
-        ),
-        "$q$ (rad)": line_trajectory.position,
-        r"$\dot{q}$ (rad/s)": line_trajectory.velocity,
-    }
-    found = {ax.get_ylabel(): ax for ax in panels}
-    for label, function in wanted.items():
-        curves = labelled(found[label])
-        assert list(curves) == list(line_trajectory.joint_names)
-        t = curves["j1"].get_xdata()
+    gids = [line.get_gid() or "" for line in postures.get_lines()]
+    assert sum(gid.startswith("posture") for gid in gids) > 2
+    by_label = {ax.get_ylabel(): ax for ax in panels}
+    assert {"$s$", "tool speed (m/s)"} < by_label.keys()
+    names = list(line_trajectory.joint_names)
+    for label, function in (
+        ("$q$ (rad)", line_trajectory.position),
+        (r"$\dot{q}$ (rad/s)", line_trajectory.velocity),
+    ):
+        curves = labelled(by_label[label])
+        assert list(curves) == names
         drawn = np.column_stack([line.get_ydata() for line in curves.values()])
-        np.testing.assert_allclose(drawn, function(t), atol=1e-9)
-    assert {"$s$", "tool speed (m/s)"} < set(found)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(
-        line_trajectory.joint_names
-    )
+        expected = function(curves["j1"].get_xdata())
+        np.testing.assert_allclose(drawn, expected, atol=1e-9)
+    assert list(labelled(by_label[r"$\tau / \tau_\mathrm{max}$"])) == names
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == names
 
 
 def test_the_overview_shows_what_holds_the_motion(line_trajectory, with_limits):

@@ -1,12 +1,8 @@
-import dataclasses
-import itertools
-
 import numpy as np
 import pytest
-from mpl_toolkits.mplot3d import proj3d
 
 from brachis.apps.plots import plot_postures
-from brachis.apps.plots.postures import drawing_plane, skeleton
+from brachis.apps.plots.postures import drawing_plane
 
 POSTURES = 7
 
@@ -38,14 +34,6 @@ def test_the_tool_path_is_the_prescribed_line(line_trajectory):
     np.testing.assert_allclose(x, np.sqrt(3.0), atol=1e-9)
     np.testing.assert_allclose([y[0], y[-1]], [0.0, 1.0], atol=1e-9)
     assert len(y) > 100
-
-
-def test_later_postures_are_darker_and_on_top(line_trajectory):
-    figure = plot_postures(line_trajectory)
-    postures = [drawn(figure, f"posture {k}") for k in range(POSTURES)]
-    brightness = [sum(line.get_color()) for line in postures]
-    assert all(np.diff(brightness) < -0.01)
-    assert all(np.diff([line.get_zorder() for line in postures]) > 0.0)
 
 
 def test_only_the_redundant_joint_is_filled(line_trajectory):
@@ -96,37 +84,6 @@ def test_a_spatial_chain_is_drawn_in_space_with_equal_scales(spatial_trajectory)
     np.testing.assert_allclose(ratios, ratios[0])
 
 
-def test_postures_in_space_fill_their_frame_and_nothing_is_cut_off(spatial_trajectory):
-    figure = plot_postures(spatial_trajectory)
-    figure.draw_without_rendering()
-    ax = figure.axes[0]
-    frame, box = ax.get_window_extent(), ax.get_tightbbox()
-    corners = np.array(
-        list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()))
-    ).T
-    across, up, _ = proj3d.proj_transform(*corners, ax.get_proj())
-    places = ax.transData.transform(np.column_stack([across, up]))
-    filled = np.ptp(places, axis=0) / (frame.width, frame.height)
-    assert filled.max() > 0.77
-    assert filled.min() > 0.55
-    assert box.x0 >= 0.0
-    assert box.y0 >= 0.0
-    assert box.x1 <= figure.bbox.x1
-    assert box.y1 <= figure.bbox.y1
-
-
-def test_a_prismatic_joint_is_drawn_from_its_rest_to_where_it_is(spatial_trajectory):
-    q = spatial_trajectory.q[-1:]
-    bones = skeleton(spatial_trajectory.robot, q)
-    np.testing.assert_allclose(
-        bones[0, :3],
-        [[0.0, 0.0, 0.0], [0.0, 0.0, 0.2], [0.0, q[0, 0], 0.2]],
-        atol=1e-12,
-    )
-    np.testing.assert_allclose(bones[0, 2], [0.0, q[0, 0], 0.2], atol=1e-12)
-    assert bones.shape == (1, 16, 3)
-
-
 TURN = {axis: ("revolute", axis, "0.5 0 0.1") for axis in ("1 0 0", "0 1 0", "0 0 1")}
 SLIDE = {axis: ("prismatic", axis, "0.5 0 0.1") for axis in ("1 0 0", "0 1 0", "0 0 1")}
 
@@ -151,15 +108,7 @@ def test_drawing_plane(chain, joints, axes, plane):
     assert drawing_plane(robot, axes) == plane
 
 
-def test_no_legend_entry_for_redundant_joints_where_there_are_none(line_trajectory):
-    labels = [
-        text.get_text()
-        for text in plot_postures(line_trajectory).axes[0].get_legend().get_texts()
-    ]
-    assert labels == ["tool path", "start", "end", "redundant"]
-    without = dataclasses.replace(line_trajectory, redundant_joints=())
-    labels = [
-        text.get_text()
-        for text in plot_postures(without).axes[0].get_legend().get_texts()
-    ]
-    assert labels == ["tool path", "start", "end"]
+def test_later_postures_are_darker(line_trajectory):
+    figure = plot_postures(line_trajectory)
+    postures = [drawn(figure, f"posture {k}") for k in range(POSTURES)]
+    assert all(np.diff([sum(line.get_color()) for line in postures]) < -0.01)

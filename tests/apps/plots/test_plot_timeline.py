@@ -39,13 +39,6 @@ def test_a_row_for_every_limit_that_comes_near(line_trajectory):
     assert len(meshes(ax)) == len(expected)
 
 
-def test_a_limit_that_stays_far_off_is_left_out(line_trajectory, with_limits):
-    far = with_limits(line_trajectory, torque=np.array([10.0, 10.0, 1e3]))
-    assert "j3 torque" not in rows(plot_timeline(far).axes[0])
-    near = with_limits(line_trajectory, torque=np.array([10.0, 10.0, 0.1]))
-    assert "j3 torque" in rows(plot_timeline(near).axes[0])
-
-
 def test_colours_are_the_ratios(line_trajectory):
     ax = plot_timeline(line_trajectory).axes[0]
     ratios = limit_ratios(line_trajectory)
@@ -73,14 +66,6 @@ def test_active_stretches_are_marked_where_they_are(line_trajectory):
     assert len(entry.active) < 7
 
 
-def test_time_axis(line_trajectory):
-    ax = plot_timeline(line_trajectory).axes[0]
-    assert ax.get_xlabel() == "$t$ (s)"
-    assert ax.get_xlim() == (0.0, line_trajectory.t_end)
-    knots = np.unique(line_trajectory.knots)[1:-1] * line_trajectory.t_end
-    assert np.array_equal(ax.get_xticks(minor=True), knots)
-
-
 def test_limits_that_are_never_near_are_said(line_trajectory, with_limits):
     open_range = {
         "position_lower": np.full(3, -np.inf),
@@ -91,14 +76,3 @@ def test_limits_that_are_never_near_are_said(line_trajectory, with_limits):
     ).axes[0]
     assert rows(ax) == []
     assert any("no limit" in text.get_text() for text in ax.texts)
-
-
-@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
-def test_nothing_is_cut_off(name, request):
-    figure = plot_timeline(request.getfixturevalue(name))
-    figure.draw_without_rendering()
-    box = figure.get_tightbbox().transformed(figure.dpi_scale_trans)
-    assert box.x0 >= -1.0
-    assert box.y0 >= -1.0
-    assert box.x1 <= figure.bbox.x1 + 1.0
-    assert box.y1 <= figure.bbox.y1 + 1.0

@@ -11,7 +11,6 @@ from brachis.robot import Robot
 from .conftest import ROOT, SCARA
 
 ROBOT = Robot.from_urdf(SCARA)
-NAMES = ("j1", "j2", "j3")
 
 
 def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
@@ -46,18 +45,6 @@ def test_names_and_units(header, units, factors, table, write):
     np.testing.assert_allclose(found.t, t, atol=1e-12)
     np.testing.assert_allclose(found.q, q, atol=1e-14)
     assert found.qdot is None
-
-
-@pytest.mark.parametrize("unit", ["deg/s^2", "deg/s2"])
-def test_accelerations_with_their_unit(unit, table, write):
-    t, q, qdot = table
-    path = write(
-        f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2",
-        t,
-        q,
-        np.rad2deg(qdot),
-    )
-    np.testing.assert_allclose(read_recording(path, ROBOT, {}).qddot, qdot, rtol=1e-12)
 
 
 def test_columns_in_any_order_and_others_beside_them(table, write):
@@ -144,14 +131,6 @@ def test_headers_that_are_not_understood(header, change, told, table, write):
         read_recording(write(header, *table[:2]), ROBOT, check_units(change))
 
 
-def test_names_of_joints_may_have_spaces(table, write):
-    t, q, _ = table
-    text = ROBOT.urdf.replace('"j2"', '"joint 2"')
-    robot = Robot.from_urdf("arm", urdf_text=text, tool_frame=ROBOT.tool_frame)
-    found = read_recording(write("t,j1,joint 2_pos,j3", t, q), robot, {})
-    np.testing.assert_array_equal(found.q, q)
-
-
 def test_only_some_velocities(table, write):
     with pytest.raises(TaskError, match="the velocity of 'j2' is missing"):
         read_recording(write("t,j1,j2,j3,qd_j1", *table[:2], table[2][:, 0]), ROBOT, {})
@@ -179,3 +158,23 @@ def test_rows_that_are_no_motion(table, write):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, {})
     with pytest.raises(TaskError, match="the file does not exist"):
         read_recording("nowhere.csv", ROBOT, {})
+
+
+@pytest.mark.parametrize("unit", ["deg/s^2", "deg/s2"])
+def test_accelerations_with_their_unit(unit, table, write):
+    t, q, qdot = table
+    path = write(
+        f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2",
+        t,
+        q,
+        np.rad2deg(qdot),
+    )
+    np.testing.assert_allclose(read_recording(path, ROBOT, {}).qddot, qdot, rtol=1e-12)
+
+
+def test_names_of_joints_may_have_spaces(table, write):
+    t, q, _ = table
+    text = ROBOT.urdf.replace('"j2"', '"joint 2"')
+    robot = Robot.from_urdf("arm", urdf_text=text, tool_frame=ROBOT.tool_frame)
+    found = read_recording(write("t,j1,joint 2_pos,j3", t, q), robot, {})
+    np.testing.assert_array_equal(found.q, q)

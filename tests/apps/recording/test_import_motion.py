@@ -109,13 +109,6 @@ def test_bottlenecks_are_when_limits_are_active(imported):
         bottleneck.report(imported, check=True)
 
 
-def test_positions_alone_will_do(motion, table, write):
-    t, q, _ = table
-    found = import_motion(write("t,j1,j2,j3", t, q), task=motion.task)
-    np.testing.assert_allclose(found.qdot, motion.velocity(found.times), atol=2e-4)
-    assert verify_trajectory(found).path_error < 1e-6
-
-
 def test_few_digits_are_smoothed(motion, table, write):
     t, q, _ = table
     found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task)
@@ -306,14 +299,8 @@ def test_a_task_file_is_named_if_its_robot_is_wrong(file, motion, tmp_path):
     assert "task.yaml" not in str(raised.value)
 
 
-def test_a_path_of_joints(file, motion):
-    found = import_motion(file, motion.robot, task_space="joints")
-    assert found.task.task_space == "joints"
-    assert verify_trajectory(found).path_error < 1e-6
-
-
-@pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
-def test_poses_of_an_arm_in_space(space, write):
+@pytest.mark.parametrize("space", ["pose", "pose_free_roll", "joints"])
+def test_the_path_of_an_arm_in_space_comes_back(space, write):
     robot, t = (
         Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf"),
         np.linspace(0.0, 2.0, 401),

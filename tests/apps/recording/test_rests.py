@@ -1,7 +1,5 @@
 """A recorded motion that waits is imported in phases: its path stops there, and may turn off."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ from support.gantry import DWELL, SPLINES, gantry_motion, gantry_urdf
 
 
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory) -> Robot:
+def robot(tmp_path_factory):
     urdf = tmp_path_factory.mktemp("gantry") / "robot.urdf"
     urdf.write_text(gantry_urdf())
     return Robot.from_urdf(urdf)

@@ -1,7 +1,5 @@
 """Short motions of a planar arm and of an arm on a rail, and a browser to look at their reports."""
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import json

@@ -1,7 +1,5 @@
 """Reports in a headless Chromium: nothing is fetched, nothing goes wrong, the slider moves the robot."""
 
-from __future__ import annotations
-
 import pytest
 
 MOVE = """part => {

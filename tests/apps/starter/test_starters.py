@@ -1,7 +1,5 @@
 """First tasks: they plan and verify at once, for whichever robot."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
@@ -10,7 +8,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.apps.starter import Starter, choices, placeholders, starter_task, task_text
+from brachis.apps.starter import choices, placeholders, starter_task, task_text
 from brachis.errors import InputError, PlanningError, UrdfError
 from brachis.robot import bind
 from brachis.robot.limits import UrdfLimit
@@ -26,7 +24,7 @@ FOREIGN = {
 }
 
 
-def check(starter: Starter, folder: Path) -> None:
+def check(starter, folder):
     """The quick plan is one of the task file as it was written, and begins well within all ranges."""
     path = folder / "task.yaml"
     path.write_text(starter.text)
@@ -45,7 +43,7 @@ def check(starter: Starter, folder: Path) -> None:
     )
 
 
-def two_joints(axis: tuple[float, ...] = (0.0, 0.0, 1.0), effort: float = 60.0) -> str:
+def two_joints(axis=(0.0, 0.0, 1.0), effort=60.0):
     """A chain whose first joint may be weak."""
     limit = {"lower": -3.1, "upper": 3.1, "velocity": 3.0, "effort": effort}
     joints = [
@@ -77,15 +75,6 @@ def test_an_arm_on_a_rail_begins_away_from_its_own_singularities(name, slides):
     assert (
         np.linalg.svd(arm, compute_uv=False)[-1] > 0.1
     )  # 0.011 to 0.017 with the rail's help alone
-
-
-def test_the_limits_that_are_suggested_are_those_of_the_urdf():
-    robot, space = bind(brachis.robots.tx90l_rail, "pose")
-    text = task_text(robot, "pose", next(choices(space)), LimitSpec(), Path())
-    (line,) = [line for line in text.splitlines() if "# limits:" in line]
-    assert f"torque: {{rail: {robot.limits.torque_upper[0]}}}" in line
-    assert "# N, as the URDF" in line
-    assert "acceleration" not in line
 
 
 def test_heights_are_above_the_base_wherever_it_is():
@@ -181,3 +170,12 @@ def test_masses_in_g_are_named_if_no_motion_is_found(tmp_path):
 def test_a_frame_that_only_turns_on_the_spot_is_refused(name, frame):
     with pytest.raises(InputError, match=r"only turns on the spot.*Name another"):
         starter_task(brachis.robots.path_of(name), tool_frame=frame)
+
+
+def test_the_limits_that_are_suggested_are_those_of_the_urdf():
+    robot, space = bind(brachis.robots.tx90l_rail, "pose")
+    text = task_text(robot, "pose", next(choices(space)), LimitSpec(), Path())
+    (line,) = [line for line in text.splitlines() if "# limits:" in line]
+    assert f"torque: {{rail: {robot.limits.torque_upper[0]}}}" in line
+    assert "# N, as the URDF" in line
+    assert "acceleration" not in line

@@ -1,7 +1,5 @@
 """One small sweep of the planar arm, run once, and what others are compared with."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 
@@ -34,12 +32,12 @@ ROUNDED = ["t_end_s", "worst_ratio", "path_error", "iterations", "wall_time_s"]
 
 
 @pytest.fixture
-def content() -> dict:
+def content():
     return copy.deepcopy(CONTENT)
 
 
 @pytest.fixture(scope="session")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> brachis.SweepResult:
+def undisturbed(tmp_path_factory):
     return brachis.sweep(
         CONTENT, tmp_path_factory.mktemp("undisturbed") / "out", jobs=1
     )
@@ -49,7 +47,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> brachis.SweepResult
 def same_as_undisturbed(undisturbed):
     """Whether a table says what the undisturbed one says; the last digits depend on how memory is aligned."""
 
-    def same(table) -> bool:
+    def same(table):
         ours, theirs = (each.drop(ROUNDED) for each in (table, undisturbed.table))
         ends, others = (
             np.array(each.column("t_end_s").to_pylist(), float)

@@ -1,7 +1,5 @@
 """Clusters started by command line as a user would, and processes that end."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -1,7 +1,5 @@
 """Sweeps in processes of this machine: outcomes, folders, and going on."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

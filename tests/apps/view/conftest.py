@@ -1,7 +1,5 @@
 """Motions of any robot without planning them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -15,7 +13,7 @@ from support.shown import NO_VISUALS
 def motion_of(line_result):
     """Give a motion of a robot between two postures, one polynomial piece of 1.1 s."""
 
-    def motion(robot: Robot, begin=0.1, end=0.5):
+    def motion(robot, begin=0.1, end=0.5):
         q = np.array([np.full(robot.n, begin), np.full(robot.n, end)])
         return dataclasses.replace(
             line_result.trajectory,

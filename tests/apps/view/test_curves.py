@@ -107,20 +107,6 @@ def test_the_tools_speed_is_in_metres_per_second_beside_what_the_task_allows(
     assert levels(capped)[0] < capped.view()[1]
 
 
-def test_what_is_limited_is_plotted_over_its_limit(line_result):
-    motion = with_limits(
-        line_result.trajectory,
-        acceleration=np.array([1.0, 2.0, 4.0]),
-        jerk=np.full(3, 50.0),
-    )
-    found = curves_of(motion)
-    acceleration, jerk = found["acceleration / limit"], found["jerk / limit"]
-    np.testing.assert_allclose(
-        acceleration.values * [1.0, 2.0, 4.0], motion.acceleration(acceleration.t)
-    )
-    np.testing.assert_allclose(jerk.values * 50.0, motion.jerk(jerk.t))
-
-
 def test_angles_without_limits_may_be_in_degrees(bare_robot, motion_of):
     motion = motion_of(bare_robot)
     motion = with_limits(
