@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -39,54 +40,50 @@ def assert_derivatives(curve, step=1e-5):
 
 XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "pitch"]
 CURVES = {
-    "line": ({"line": {"to": [1, 2]}}, [0.3, 0.4], XY),
-    "line with yaw": ({"line": {"by": [1, 2, -3]}}, [0.3, 0.4, 0.5], XYW),
-    "yaw alone": ({"line": {"by": [0, 0, -3]}}, [0.3, 0.4, 0.5], XYW),
-    "heading": ({"line": {"length": 2, "angle_deg": 30}}, [0.3, 0.4], XY),
-    "arc": ({"arc": {"center": [1, 0], "angle_deg": -130}}, [0.3, 0.4], XY),
+    "line": ("line: {to: [1, 2]}", [0.3, 0.4], XY),
+    "line with yaw": ("line: {by: [1, 2, -3]}", [0.3, 0.4, 0.5], XYW),
+    "yaw alone": ("line: {by: [0, 0, -3]}", [0.3, 0.4, 0.5], XYW),
+    "heading": ("line: {length: 2, angle_deg: 30}", [0.3, 0.4], XY),
+    "arc": ("arc: {center: [1, 0], angle_deg: -130}", [0.3, 0.4], XY),
     "arc in space": (
-        {"arc": {"center": [1, 0, 0], "angle_deg": 80, "normal": [0, 2, -1]}},
+        "arc: {center: [1, 0, 0], angle_deg: 80, normal: [0, 2, -1]}",
         [0, 0.5, 1],
         XYZ,
     ),
-    "arc via": ({"arc": {"via": [1, 0, 1], "to": [2, 1, 3]}}, [0, 0, 0], XYZ),
+    "arc via": ("arc: {via: [1, 0, 1], to: [2, 1, 3]}", [0, 0, 0], XYZ),
     "arc along the tangent": (
-        {"arc": {"center": [1, 0], "angle_deg": 130, "yaw": "tangent"}},
+        "arc: {center: [1, 0], angle_deg: 130, yaw: tangent}",
         [0, 0, 1],
         XYW,
     ),
-    "circle": ({"circle": {"center": [0.2, 0], "turns": -2.5}}, [0, 0], XY),
+    "circle": ("circle: {center: [0.2, 0], turns: -2.5}", [0, 0], XY),
     "helix": (
-        {
-            "helix": {
-                "center": [0.2, 0, 1],
-                "pitch": -0.1,
-                "normal": [0, 0, 2],
-                "turns": 2.5,
-            }
-        },
+        "helix: {center: [0.2, 0, 1], pitch: -0.1, normal: [0, 0, 2], turns: 2.5}",
         [0, 0, 1],
         XYZ,
     ),
-    "spline, one waypoint": ({"spline": {"through": [[1, 2]]}}, [0, 0], XY),
-    "spline, two": ({"spline": {"through": [[1, 2], [2, 1]]}}, [0, 0], XY),
-    "spline, three": ({"spline": {"through": [[1, 2], [2, 1], [2.5, 3]]}}, [0, 0], XY),
+    "spline, one waypoint": ("spline: {through: [[1, 2]]}", [0, 0], XY),
+    "spline, two": ("spline: {through: [[1, 2], [2, 1]]}", [0, 0], XY),
+    "spline, three": ("spline: {through: [[1, 2], [2, 1], [2.5, 3]]}", [0, 0], XY),
     "spline, seven, with yaw": (
-        {"spline": {"through": [[i, np.sin(i), np.cos(i)] for i in range(1, 8)]}},
+        (
+            "spline: {through: [[1, 0.841, 0.54], [2, 0.909, -0.416], [3, 0.141, -0.99], [4, -0.757, -0.654], [5,"
+            " -0.959, 0.284], [6, -0.279, 0.96], [7, 0.657, 0.754]]}"
+        ),
         [0, 0, 1],
         XYW,
     ),
-    "spline in one row": ({"spline": {"through": [[1], [0.5], [2]]}}, [0], ["x"]),
+    "spline in one row": ("spline: {through: [[1], [0.5], [2]]}", [0], ["x"]),
 }
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_derivatives(name):
-    curve = curve_of(*CURVES[name])
+def test_derivatives_are_the_slopes_of_those_below(name):
+    segment, start, rows = CURVES[name]
+    curve = curve_of(yaml.safe_load(segment), start, rows)
     assert_derivatives(curve)
-    np.testing.assert_allclose(
-        curve.derivatives(np.zeros(1), 0)[0, 0], CURVES[name][1], atol=1e-12
-    )
+    first = curve.derivatives(np.zeros(1), 0)[0, 0]
+    np.testing.assert_allclose(first, start, atol=1e-12)
     assert curve.knots[0] == 0
     assert curve.knots[-1] == pytest.approx(curve.length)
 

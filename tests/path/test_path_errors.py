@@ -1,7 +1,10 @@
 """Every way in which a path can be wrong, and what is said about it."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
 
 from brachis.errors import PathError
 from brachis.path.joins import Join, row_corner, septic
@@ -20,164 +23,157 @@ def refused(segments, rows):
 
 SEGMENTS = [
     (
-        {"line": {"to": [0, 0]}},
+        "line: {to: [0, 0]}",
         XY,
-        ["path[0].line.to: the segment has zero length", "found [0.0, 0.0]"],
+        r"path\[0\].line.to: the segment has zero length.*found \[0.0, 0.0\]",
     ),
     (
-        {"line": {"to": [1, 2, 3]}},
+        "line: {to: [1, 2, 3]}",
         XY,
-        ["path[0].line.to: wrong number", "found 3: [1.0, 2.0, 3.0]", "2: [x, y]"],
+        r"path\[0\].line.to: wrong number.*found 3: \[1.0, 2.0, 3.0\].*2: \[x, y\]",
     ),
     (
-        {"line": {"length": 1, "angle_deg": 0}},
+        "line: {length: 1, angle_deg: 0}",
         XYZ,
-        ["path[0].line: ", "needs 2 position rows", "[x, y, z]"],
+        r"path\[0\].line: .*needs 2 position rows.*\[x, y, z\]",
     ),
     (
-        {"arc": {"center": [1], "angle_deg": 9}},
+        "arc: {center: [1], angle_deg: 9}",
         X,
-        ["path[0].arc: an arc needs 2 or 3 position rows", "Use line"],
+        r"path\[0\].arc: an arc needs 2 or 3 position rows.*Use line",
     ),
     (
-        {"helix": {"center": [0.3, 0.0], "pitch": 0.1, "normal": [0, 0, 1]}},
+        "helix: {center: [0.3, 0.0], pitch: 0.1, normal: [0, 0, 1]}",
         XY,
-        ["a helix needs 3 position rows"],
+        "a helix needs 3 position rows",
     ),
-    *(
+    (
+        "circle: {center: [1, 0, 0], turns: 1000000.0, normal: [0, 0, 1]}",
+        XYZ,
+        r"too many turns.*found 1e\+06 turns; allowed: at most 1000.*periodic",
+    ),
+    (
+        "helix: {center: [1, 0, 0], turns: -1000000.0, pitch: 0.001}",
+        XYZ,
+        r"too many turns.*found 1e\+06 turns; allowed: at most 1000.*periodic",
+    ),
+    (
+        "arc: {center: [1, 0, 0], angle_deg: 360000000.0, normal: [0, 0, 1]}",
+        XYZ,
+        r"too many turns.*found 1e\+06 turns; allowed: at most 1000.*periodic",
+    ),
+    (
+        "arc: {center: [0, 0], angle_deg: 9}",
+        XY,
+        r"path\[0\].arc.center: .*zero length.*centre is at its start",
+    ),
+    (
+        "arc: {center: [1, 0], angle_deg: 0}",
+        XY,
+        r"path\[0\].arc.angle_deg: the segment has zero length",
+    ),
+    (
+        "arc: {center: [1, 0, 0], angle_deg: 9}",
+        XYW,
+        r"path\[0\].arc.center: wrong number.*2: \[x, y\]",
+    ),
+    (
+        "circle: {center: [1, 0, 0]}",
+        XYZ,
+        r"path\[0\].circle.normal: .*found no normal.*via and to",
+    ),
+    (
+        "circle: {center: [1, 0, 0], normal: [1, 0, 1]}",
+        XYZ,
+        "circle.normal: .*found 135 degrees",
+    ),
+    (
+        "circle: {center: [1, 0], normal: [0, 0, 1]}",
+        XY,
+        r"path\[0\].circle.normal: .*allowed: no normal",
+    ),
+    (
+        "circle: {center: [1, 0], yaw: tangent}",
+        XY,
+        r"path\[0\].circle.yaw: the task space has no angle.*Add an angle",
+    ),
+    (
+        "arc: {via: [1, 1], to: [2, 2]}",
+        XY,
+        r"path\[0\].arc.via: .*lie on a line.*to \[2.0, 2.0\]",
+    ),
+    (
+        "arc: {via: [2, 2], to: [0, 0]}",
+        XY,
+        r"path\[0\].arc.to: the segment has zero length",
+    ),
+    (
+        "arc: {via: [1, 2, 3], to: [2, 2]}",
+        XY,
+        r"path\[0\].arc.via: wrong number of coordinates",
+    ),
+    (
+        "spline: {through: [[1, 1], [1]]}",
+        XY,
+        r"path\[0\].spline.through\[1\]: wrong number.*2: \[x, y\]",
+    ),
+    (
+        "spline: {through: [[0, 0], [1, 1], [1, 1]]}",
+        XY,
+        r"spline.through\[2\]: a waypoint repeats the one before",
+    ),
+    (
+        "spline: {through: [[0, 0]]}",
+        XY,
+        r"path\[0\].spline.through: the segment has zero length",
+    ),
+    (
         (
-            shape,
-            XYZ,
-            ["too many turns", "found 1e+06 turns; allowed: at most 1000", "periodic"],
-        )
-        for shape in (
-            {"circle": {"center": [1, 0, 0], "turns": 1e6, "normal": [0, 0, 1]}},
-            {"helix": {"center": [1, 0, 0], "turns": -1e6, "pitch": 0.001}},
-            {"arc": {"center": [1, 0, 0], "angle_deg": 3.6e8, "normal": [0, 0, 1]}},
-        )
-    ),
-    (
-        {"arc": {"center": [0, 0], "angle_deg": 9}},
+            "spline: {through: [[1000000000000.0, 0], [1000000000000.0, 1.0e-06], [1000000000000.0, 2.0e-06], [0,"
+            " 0]]}"
+        ),
         XY,
-        ["path[0].arc.center: ", "zero length", "centre is at its start"],
+        r"no spline goes through the waypoints.*found distances from 1e-06 to 1e\+12.*similar distances",
     ),
     (
-        {"arc": {"center": [1, 0], "angle_deg": 0}},
+        "spline: {through: [[1, 1]], starts_at: [0, 0.0002]}",
         XY,
-        ["path[0].arc.angle_deg: the segment has zero length"],
+        r"path\[0\].spline.starts_at: the segment starts elsewhere.*x = 0, y = 0, 0.0002 m off.*relative: true",
     ),
     (
-        {"arc": {"center": [1, 0, 0], "angle_deg": 9}},
+        "spline: {through: [[1, 1]], starts_at: [0]}",
+        XY,
+        r"path\[0\].spline.starts_at: wrong number of coord",
+    ),
+    (
+        "spline: {through: [[1, 1]], orientations: [{rpy_deg: [0, 0, 0]}]}",
+        XY,
+        (
+            r"path\[0\].spline.orientations: orientations need a task space of poses.*\[x, y\].*Set task_space: "
+            r"pose"
+        ),
+    ),
+    (
+        "{line: {by: [1, 0]}, orientation: fixed}",
+        XY,
+        r"path\[0\].orientation: this orientation needs.*found task_space \[x, y\]",
+    ),
+    (
+        "turn: {to: {rpy_deg: [0, 0, 9]}}",
+        XYZ,
+        r"path\[0\].turn: this turn needs.*Set task_space: pose",
+    ),
+    (
+        "turn: {to: {rpy_deg: [0, 0, 9]}}",
         XYW,
-        ["path[0].arc.center: wrong number", "2: [x, y]"],
-    ),
-    (
-        {"circle": {"center": [1, 0, 0]}},
-        XYZ,
-        ["path[0].circle.normal: ", "found no normal", "via and to"],
-    ),
-    (
-        {"circle": {"center": [1, 0, 0], "normal": [1, 0, 1]}},
-        XYZ,
-        ["circle.normal: ", "found 135 degrees"],
-    ),
-    (
-        {"circle": {"center": [1, 0], "normal": [0, 0, 1]}},
-        XY,
-        ["path[0].circle.normal: ", "allowed: no normal"],
-    ),
-    (
-        {"circle": {"center": [1, 0], "yaw": "tangent"}},
-        XY,
-        ["path[0].circle.yaw: the task space has no angle", "Add an angle"],
-    ),
-    (
-        {"arc": {"via": [1, 1], "to": [2, 2]}},
-        XY,
-        ["path[0].arc.via: ", "lie on a line", "to [2.0, 2.0]"],
-    ),
-    (
-        {"arc": {"via": [2, 2], "to": [0, 0]}},
-        XY,
-        ["path[0].arc.to: the segment has zero length"],
-    ),
-    (
-        {"arc": {"via": [1, 2, 3], "to": [2, 2]}},
-        XY,
-        ["path[0].arc.via: wrong number of coordinates"],
-    ),
-    (
-        {"spline": {"through": [[1, 1], [1]]}},
-        XY,
-        ["path[0].spline.through[1]: wrong number", "2: [x, y]"],
-    ),
-    (
-        {"spline": {"through": [[0, 0], [1, 1], [1, 1]]}},
-        XY,
-        ["spline.through[2]: a waypoint repeats the one before"],
-    ),
-    (
-        {"spline": {"through": [[0, 0]]}},
-        XY,
-        ["path[0].spline.through: the segment has zero length"],
-    ),
-    (
-        {"spline": {"through": [[1e12, 0], [1e12, 1e-6], [1e12, 2e-6], [0, 0]]}},
-        XY,
-        [
-            "no spline goes through the waypoints",
-            "found distances from 1e-06 to 1e+12",
-            "similar distances",
-        ],
-    ),
-    (
-        {"spline": {"through": [[1, 1]], "starts_at": [0, 2e-4]}},
-        XY,
-        [
-            "path[0].spline.starts_at: the segment starts elsewhere",
-            "x = 0, y = 0, 0.0002 m off",
-            "relative: true",
-        ],
-    ),
-    (
-        {"spline": {"through": [[1, 1]], "starts_at": [0]}},
-        XY,
-        ["path[0].spline.starts_at: wrong number of coord"],
-    ),
-    (
-        {"spline": {"through": [[1, 1]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
-        XY,
-        [
-            "path[0].spline.orientations: orientations need a task space of poses",
-            "[x, y]",
-            "Set task_space: pose",
-        ],
-    ),
-    (
-        RIGHT | {"orientation": "fixed"},
-        XY,
-        ["path[0].orientation: this orientation needs", "found task_space [x, y]"],
-    ),
-    (
-        {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
-        XYZ,
-        ["path[0].turn: this turn needs", "Set task_space: pose"],
-    ),
-    (
-        {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
-        XYW,
-        ["path[0].turn: this turn needs", "line: {by: [..., angle]}"],
+        r"path\[0\].turn: this turn needs.*line: \{by: \[..., angle\]\}",
     ),
 ]
 
 
-@pytest.mark.parametrize(
-    ("segment", "rows", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS]
-)
-def test_wrong_segments(segment, rows, expected):
-    message = str(refused([segment], rows))
-    for text in expected:
-        assert text in message
+@pytest.mark.parametrize(("segment", "rows", "message"), SEGMENTS)
+def test_the_error_names_what_is_wrong_with_a_segment(segment, rows, message):
+    assert re.search(message, str(refused([yaml.safe_load(segment)], rows)))
 
 
 def test_the_key_counts_segments():

@@ -1,7 +1,10 @@
 """Every way in which a path of poses can be wrong, and what is said about it."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError
@@ -11,10 +14,8 @@ from brachis.task import CsvSegment, PointFile
 from support.poses import pose, pose_path
 
 RIGHT = {"line": {"by": [1, 0, 0]}}
-UP = {"line": {"by": [0, 0, 1]}}
 TURN = {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}
 TILT = {"rotate": {"axis": [1, 0, 0], "angle_deg": 90}}
-HALF = {"rpy_deg": [180, 0, 0]}
 
 
 def error_of(segments):
@@ -23,110 +24,77 @@ def error_of(segments):
     return caught.value
 
 
-def spline(**keys):
-    return {"spline": {"through": [[1, 0, 0], [1, 1, 0], [1, 1, 1]]} | keys}
-
-
-def along(*attitudes, **keys):
-    return spline(orientations=[{"rpy_deg": one} for one in attitudes], **keys)
-
-
 SEGMENTS = [
     (
-        {"line": {"by": [0, 0, 0]}},
-        ["path[0].line.by: the segment has zero length", "turn: {...} turns the tool"],
+        "line: {by: [0, 0, 0]}",
+        r"path\[0\].line.by: the segment has zero length.*turn: \{...\} turns the tool",
     ),
     (
-        {"turn": {"to": {"rpy_deg": [0, 0, 0]}}},
-        ["path[0].turn: the turn has zero length", "an orientation that differs"],
+        "turn: {to: {rpy_deg: [0, 0, 0]}}",
+        r"path\[0\].turn: the turn has zero length.*an orientation that differs",
     ),
     (
-        {"turn": {"to": HALF}},
-        ["path[0].turn.to: the orientation is half a turn away", "rotate: {axis"],
+        "turn: {to: {rpy_deg: [180, 0, 0]}}",
+        r"path\[0\].turn.to: the orientation is half a turn away.*rotate: \{axis",
     ),
     (
-        RIGHT | {"orientation": {"to": HALF}},
-        ["path[0].orientation.to: ", "found 180 degrees", "less than 180"],
+        "{line: {by: [1, 0, 0]}, orientation: {to: {rpy_deg: [180, 0, 0]}}}",
+        r"path\[0\].orientation.to: .*found 180 degrees.*less than 180",
     ),
     (
-        {"circle": {"center": [1, 0, 0], "normal": [0, 0, 1], "yaw": "tangent"}},
-        ["circle.yaw: ", "orientation: tangent"],
+        "circle: {center: [1, 0, 0], normal: [0, 0, 1], yaw: tangent}",
+        "circle.yaw: .*orientation: tangent",
     ),
     (
-        UP | {"orientation": "tangent"},
-        [
-            "path[0].orientation: the tangent becomes parallel to up",
-            "found 0 degrees",
-            "up: [...]",
-        ],
+        "{line: {by: [0, 0, 1]}, orientation: tangent}",
+        r"path\[0\].orientation: the tangent becomes parallel to up.*found 0 degrees.*up: \[...\]",
     ),
     (
-        {
-            "circle": {"center": [1, 0, 0], "normal": [0, 1, 0]},
-            "orientation": {"tangent": {"up": [0, 0.001, 1]}},
-        },
-        [
-            "path[0].orientation: the tangent becomes parallel",
-            "between them at x = 0, y = 0, z = 0",
-            "1 degree or more",
-        ],
-    ),
-    (
-        {
-            "spline": {"through": [[1, 0, 0], [1.000002, 0, 0], [0, 0, 0]]},
-            "orientation": "tangent",
-        },
-        ["path[0].orientation: the curve almost stops", "found x = 1.17"],
-    ),
-    (
-        along(
-            [0, 0, 0],
-            [0, 0, 9],
-            [0, 0, 0],
-            starts_oriented={"rotation_vector": [0, 0, 0.2]},
+        "{circle: {center: [1, 0, 0], normal: [0, 1, 0]}, orientation: {tangent: {up: [0, 0.001, 1]}}}",
+        (
+            r"path\[0\].orientation: the tangent becomes parallel.*between them at x = 0, y = 0, z = 0.*1 degree "
+            r"or more"
         ),
-        ["path[0].spline.starts_oriented: ", "an orientation that is 0.2 rad off"],
     ),
     (
-        along([0, 0, 90], [0, 0, -90], [0, 0, 0]),
-        ["path[0].spline.orientations[1]: ", "half a turn"],
+        "{spline: {through: [[1, 0, 0], [1.000002, 0, 0], [0, 0, 0]]}, orientation: tangent}",
+        r"path\[0\].orientation: the curve almost stops.*found x = 1.17",
     ),
     (
-        {
-            "spline": {"through": [[1, 0, 0], [1, 1e-9, 0], [2, 1, 0]]},
-            "orientation": "fixed",
-        },
-        [
-            "path[0].spline.through[1]: a waypoint repeats the one before; found ",
-            "1e-09 (m or rad) away",
-            "Remove one of both",
-        ],
+        (
+            "spline: {through: [[1, 0, 0], [1, 1, 0], [1, 1, 1]], orientations: [{rpy_deg: [0, 0, 0]}, {rpy_deg: "
+            "[0, 0, 9]}, {rpy_deg: [0, 0, 0]}], starts_oriented: {rotation_vector: [0, 0, 0.2]}}"
+        ),
+        r"path\[0\].spline.starts_oriented: .*an orientation that is 0.2 rad off",
     ),
     (
-        {
-            "spline": {
-                "through": [[x, 0, 0] for x in (1, 1.01, 1.02, 2, 3)],
-                "orientations": [
-                    {"rpy_deg": [0, 0, angle]} for angle in (170, 0, 170, 0, 170)
-                ],
-            }
-        },
-        [
-            "path[0].spline.orientations[",
-            "differ too much, over too short a distance",
-            "0.5 or more",
-        ],
+        (
+            "spline: {through: [[1, 0, 0], [1, 1, 0], [1, 1, 1]], orientations: [{rpy_deg: [0, 0, 90]}, "
+            "{rpy_deg: [0, 0, -90]}, {rpy_deg: [0, 0, 0]}]}"
+        ),
+        r"path\[0\].spline.orientations\[1\]: .*half a turn",
+    ),
+    (
+        "{spline: {through: [[1, 0, 0], [1, 1.0e-09, 0], [2, 1, 0]]}, orientation: fixed}",
+        (
+            r"path\[0\].spline.through\[1\]: a waypoint repeats the one before; found .*1e-09 \(m or rad\) away.*"
+            r"Remove one of both"
+        ),
+    ),
+    (
+        (
+            "spline: {through: [[1, 0, 0], [1.01, 0, 0], [1.02, 0, 0], [2, 0, 0], [3, 0, 0]], orientations: "
+            "[{rpy_deg: [0, 0, 170]}, {rpy_deg: [0, 0, 0]}, {rpy_deg: [0, 0, 170]}, {rpy_deg: [0, 0, 0]}, "
+            "{rpy_deg: [0, 0, 170]}]}"
+        ),
+        r"path\[0\].spline.orientations\[.*differ too much, over too short a distance.*0.5 or more",
     ),
 ]
 
 
-@pytest.mark.parametrize(
-    ("segment", "expected"), SEGMENTS, ids=[str(case[0]) for case in SEGMENTS]
-)
-def test_the_error_names_what_is_wrong_with_a_segment(segment, expected):
-    message = str(error_of([segment]))
-    for text in expected:
-        assert text in message
+@pytest.mark.parametrize(("segment", "message"), SEGMENTS)
+def test_the_error_names_what_is_wrong_with_a_segment(segment, message):
+    assert re.search(message, str(error_of([yaml.safe_load(segment)])))
 
 
 def test_a_jump_of_the_turning_rate_is_told_in_words():

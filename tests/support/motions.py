@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from brachis.kinematics import ChartMap, ClosedFormMap, JointDerivatives
 from brachis.path import build_path
 from brachis.problem.feasibility import branch_of
 from brachis.robot import Robot, task_map_of
+from brachis.robot.limits import MAGNITUDES
 from brachis.task import load_task
 
 
@@ -140,3 +141,11 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             value, expected, atol=2e-6 * max(1.0, np.abs(expected).max())
         )
     return exact
+
+
+def with_limits(trajectory, **limits):
+    """The motion of a robot that has other limits: magnitudes for both directions, or arrays by their names."""
+    robot = trajectory.robot
+    magnitudes = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
+    changed = replace(robot.limits.with_magnitudes(**magnitudes), **limits)
+    return replace(trajectory, robot=replace(robot, limits=changed))

@@ -88,42 +88,31 @@ def test_a_program_reads_the_file_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "message"),
     [
-        ({"brachis_limits": 2}, ["limits.yaml: brachis_limits"]),
-        ({"brachis_limits": True}, ["brachis_limits: the version", "found true"]),
-        ({"source": None}, ["limits.yaml: source"]),
+        ("brachis_limits: 2", "limits.yaml: brachis_limits"),
+        ("brachis_limits: true", "brachis_limits: the version.*found true"),
+        ("source: null", "limits.yaml: source"),
+        ("limits: {torqe: 1}", "limits.torqe: unknown key.*Did you mean 'torque'"),
         (
-            {"limits": {"torqe": 1}},
-            ["limits.torqe: unknown key", "Did you mean 'torque'"],
+            "limits: {torque: [1, 2]}",
+            "limits.torque: the list has the wrong number of values; found 2.*j1, j2, j3",
+        ),
+        ("limits: {torque: {j4: 1}}", "limits.torque.*'j4'.*j1, j2, j3"),
+        ("limits: {torque: [1, 2, -3]}", r"limits.torque\[2\]: out of range; found -3"),
+        (
+            "limits: {torque: [1, 2, [3, 4]]}",
+            r"limits.torque\[2\]: a pair of limits must lie around zero",
         ),
         (
-            {"limits": {"torque": [1, 2]}},
-            [
-                "limits.torque: the list has the wrong number of values; found 2",
-                "j1, j2, j3",
-            ],
-        ),
-        ({"limits": {"torque": {"j4": 1}}}, ["limits.torque", "'j4'", "j1, j2, j3"]),
-        (
-            {"limits": {"torque": [1, 2, -3]}},
-            ["limits.torque[2]: out of range; found -3"],
-        ),
-        (
-            {"limits": {"torque": [1, 2, [3, 4]]}},
-            ["limits.torque[2]: a pair of limits must lie around zero"],
-        ),
-        (
-            {"limits": {"scale": {"torque": 0.5}}},
-            ["limits.scale: a limits file cannot contain factors on limits"],
+            "limits: {scale: {torque: 0.5}}",
+            "limits.scale: a limits file cannot contain factors on limits",
         ),
     ],
-    ids=str,
 )
-def test_a_wrong_file_is_refused_with_its_key(loaded, changes, words):
-    with pytest.raises(InputError) as caught:
-        loaded({}, **changes)
-    assert all(word in str(caught.value) for word in words), str(caught.value)
+def test_the_error_names_the_key_of_a_wrong_file(loaded, changes, message):
+    with pytest.raises(InputError, match=message):
+        loaded({}, **yaml.safe_load(changes))
 
 
 def test_files_that_are_none(tmp_path, loaded):

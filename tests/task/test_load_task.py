@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -196,295 +197,236 @@ def refused(source):
     return caught.value
 
 
-LINE = {"line": {"to": [1, 0]}}
 MISTAKES = [
-    ({"brachis": 2}, ["task: brachis: ", "found 2", "allowed: 1"]),
-    ({"brachis": True}, ["task: brachis: ", "found true (a boolean)"]),
+    ("brachis: 2", "brachis: .*found 2.*allowed: 1"),
+    ("brachis: true", r"brachis: .*found true \(a boolean\)"),
     (
-        {"strat": 1},
-        [
-            "task: strat: unknown key",
-            "allowed: brachis, robot, start",
-            "Did you mean 'start'?",
-        ],
+        "strat: 1",
+        r"strat: unknown key.*allowed: brachis, robot, start.*Did you mean 'start'\?",
     ),
     (
-        {"robot": {"urdff": "a"}},
-        [
-            "task: robot.urdff: unknown key",
-            "allowed: urdf, tool_frame",
-            "Did you mean 'urdf'?",
-        ],
+        "robot: {urdff: a}",
+        r"robot.urdff: unknown key.*allowed: urdf, tool_frame.*Did you mean 'urdf'\?",
+    ),
+    ("robot: {limits: 10}", "robot.limits: wrong type; found 10; allowed: a mapping"),
+    (
+        "robot: {limits: {torqe: 1}}",
+        r"robot.limits.torqe: unknown key.*allowed: torque, velocity.*position, power.*Did you mean 'torque'\?",
     ),
     (
-        {"robot": {"limits": 10}},
-        ["task: robot.limits: wrong type; found 10; allowed: a mapping"],
-    ),
-    (
-        {"robot": {"limits": {"torqe": 1}}},
-        [
-            "task: robot.limits.torqe: unknown key",
-            "allowed: torque, velocity",
-            "position, power",
-            "Did you mean 'torque'?",
-        ],
-    ),
-    (
-        {"robot": {"limits": {"scale": {"torqe": 1}}}},
-        [
-            "robot.limits.scale.torqe: unknown key",
-            "allowed: torque, velocity, acceleration",
-            "Did you mean 'torque'?",
-        ],
-    ),
-    (
-        {"robot": {"limits": {"torque": "10"}}},
-        ["robot.limits.torque: ", "found '10' (a string)", "a number > 0"],
-    ),
-    (
-        {"robot": {"limits": {"torque": True}}},
-        ["robot.limits.torque: ", "found true (a boolean)"],
-    ),
-    (
-        {"robot": {"limits": {"torque": 0}}},
-        ["robot.limits.torque: out of range; found 0; allowed: > 0"],
-    ),
-    (
-        {"robot": {"limits": {"velocity": {"j1": -1}}}},
-        ["robot.limits.velocity.j1: out of range; found -1"],
-    ),
-    (
-        {"robot": {"limits": {"velocity": {1: 1}}}},
-        ["robot.limits.velocity[1]: a name must be a string"],
-    ),
-    (
-        {"robot": {"limits": {"acceleration": [float("nan")]}}},
-        ["limits.acceleration[0]: not a finite number"],
-    ),
-    (
-        {"robot": {"limits": {"acceleration": "urdf"}}},
-        ["robot.limits.acceleration: ", "found 'urdf'"],
-    ),
-    (
-        {"robot": {"limits": {"position": [[1, -1]]}}},
-        ["limits.position[0]: ", "found [1.0, -1.0]", "low < high"],
-    ),
-    (
-        {"robot": {"limits": {"position": [[1]]}}},
-        ["limits.position[0][1]: the list is too short"],
-    ),
-    (
-        {"robot": {"limits": {"position": {"j": [1, 2, 3]}}}},
-        ["limits.position.j: too many items", "at most 2"],
-    ),
-    (
-        {"robot": {"limits": {"scale": {"torque": 0}}}},
-        ["robot.limits.scale.torque: out of range", "> 0"],
-    ),
-    ({"robot": {"gravity": [0, 0]}}, ["robot.gravity[2]: the list is too short"]),
-    (
-        {"robot": {"gravity": [0, 0, float("inf")]}},
-        ["robot.gravity[2]: not a finite number; found inf"],
-    ),
-    (
-        {"search": {"slower": "150 %"}},
-        [
-            "search.slower: out of range; found 1.5",
-            "<= 1",
-        ],
-    ),
-    (
-        {"search": {"slower": 1.5}},
-        ["search.slower: out of range; found 1.5; allowed: <= 1"],
-    ),
-    (
-        {"search": {"slower": 0.1, "least_motion": False}},
-        [
-            "search.slower: a slower motion is possible only with least_motion: true",
-            "least_motion: true",
-        ],
-    ),
-    (
-        {"refinement": {"tolerance": 1e-6}},
-        ["refinement.tolerance: out of range; found 1e-06; allowed: >= 1e-05"],
-    ),
-    (
-        {"robot": {"friction": {"viscous": -1}}},
-        ["robot.friction.viscous: out of range; found -1; allowed: >= 0"],
-    ),
-    (
-        {"robot": {"friction": {"coulomb_velocity": 0}}},
-        ["coulomb_velocity: out of range; found 0; allowed: > 0"],
-    ),
-    ({"robot": 3}, ["task: robot: wrong type; found 3; allowed: a mapping"]),
-    ({"start": {"joints": []}}, ["start.joints: too few items", "at least 1"]),
-    (
-        {"start": {"joints": [1, "2"]}},
-        ["start.joints[1]: wrong type; found '2' (a string); allowed: a number"],
-    ),
-    ({"start": {}}, ["start.joints: this key is required, and missing"]),
-    (
-        {"end": "fre"},
-        ["task: end: ", "found 'fre'", "not defined in postures", "allowed: free"],
-    ),
-    (
-        {"task_space": ["x", "yaw", "roll"]},
-        ["task_space: only one row of rotation", "for example [x, y, z, yaw]"],
-    ),
-    ({"task_space": ["axis", "x", "y"]}, ["task_space: only one", "it comes last"]),
-    (
-        {"task_space": ["x", "x"]},
-        ["task_space: a name occurs twice", "found ['x', 'x']"],
-    ),
-    (
-        {"task_space": ["x", "w"]},
-        ["task_space[1]: not one of the allowed values; found 'w'", "'yaw'"],
-    ),
-    ({"task_space": "poze"}, ["found 'poze'", "Did you mean 'pose'?"]),
-    ({"task_space": "pose_free_rol"}, ["Did you mean 'pose_free_roll'?"]),
-    ({"search": {"effort": "fas"}}, ["found 'fas'", "Did you mean 'fast'?"]),
-    ({"task_space": "poses"}, ["task_space: ", "found 'poses'", "pose_free_roll"]),
-    ({"path": []}, ["task: path: too few items"]),
-    (
-        {"path": [{"lien": {"to": [1, 0]}}]},
-        ["path[0]: a segment needs exactly one kind", "Did you mean 'line'?"],
-    ),
-    (
-        {"path": [LINE | {"arc": {}}]},
-        ["path[0]: a segment needs exactly one kind", "keys line, arc"],
-    ),
-    (
-        {"path": [{"line": {"to": [1], "by": [1]}}]},
-        ["path[0].line: a line needs exactly one", "{length, angle_deg}"],
-    ),
-    (
-        {"path": [{"arc": {"via": [1], "center": [1]}}]},
-        ["path[0].arc: an arc needs exactly one of its forms"],
-    ),
-    (
-        {"path": [{"line": {"to": ["1", 0]}}]},
-        ["path[0].line.to[0]: wrong type; found '1' (a string)"],
-    ),
-    (
-        {"path": [{"line": {"length": 1}}]},
-        ["path[0].line.angle_deg: this key is required"],
-    ),
-    (
-        {"path": [{"line": {"length": -1, "angle_deg": 0}}]},
-        ["path[0].line.length: out of range; found -1"],
-    ),
-    (
-        {"path": [{"line": {"length": 1, "angle": 2, "angle_deg": 2}}]},
-        [
-            "path[0].line.angle: unknown key; found angle; allowed: length, angle_deg. Did you mean 'angle_deg'?"
-        ],
-    ),
-    (
-        {"path": [{"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}}]},
-        ["path[0].circle.normal: a direction cannot have zero length"],
-    ),
-    (
-        {"path": [{"circle": {"center": [0, 0], "turns": 0}}]},
-        ["path[0].circle.turns: ", "zero length"],
-    ),
-    (
-        {"path": [{"circle": {"center": [0, 0], "yaw": "on"}}]},
-        ["path[0].circle.yaw: ", "'fixed' or 'tangent'"],
-    ),
-    (
-        {"path": [{"spline": {"through": []}}]},
-        ["path[0].spline.through: too few items"],
-    ),
-    (
-        {"path": [{"spline": {"through": [[1, 2]], "relative": 1}}]},
-        ["spline.relative: ", "true or false"],
-    ),
-    (
-        {"path": [LINE | {"blend": -0.1}, LINE]},
-        ["path[0].blend: out of range; found -0.1; allowed: > 0"],
-    ),
-    (
-        {"path": [LINE, LINE | {"blend": 0.1}]},
-        ["path[1].blend: the last segment", "found 0.1"],
-    ),
-    ({"redundant_joints": ["a", "a"]}, ["redundant_joints: a name occurs twice"]),
-    (
-        {"redundant_joints": "j3"},
-        [
-            "redundant_joints: wrong form; found 'j3' (a string); allowed: auto, or a list of joint names"
-        ],
-    ),
-    (
-        {"spline": {"degree": 2}},
-        ["spline.degree: rest: full", "found 2", "allowed: >= 3, or rest: velocity"],
-    ),
-    (
-        {"spline": {"degree": 8}},
-        ["spline.degree: out of range; found 8; allowed: <= 7"],
-    ),
-    (
-        {"spline": {"intervals": 20.5}},
-        ["spline.intervals: wrong type; found 20.5; allowed: a whole number"],
-    ),
-    *(
+        "robot: {limits: {scale: {torqe: 1}}}",
         (
-            {"spline": spline},
-            [
-                "spline.intervals: knots: free needs a number of intervals",
-                "12, or knots: uniform",
-            ],
-        )
-        for spline in ({"knots": "free"}, {"intervals": "auto", "knots": "free"})
+            r"robot.limits.scale.torqe: unknown key.*allowed: torque, velocity, acceleration.*Did you mean "
+            r"'torque'\?"
+        ),
     ),
     (
-        {"spline": {"intervals": 3}},
-        ["spline.intervals: out of range; found 3; allowed: >= 4"],
+        "robot: {limits: {torque: '10'}}",
+        r"robot.limits.torque: .*found '10' \(a string\).*a number > 0",
     ),
     (
-        {"spline": {"rest": "none"}},
-        ["spline.rest: not one of the allowed values", "'full' or 'jerk'"],
+        "robot: {limits: {torque: true}}",
+        r"robot.limits.torque: .*found true \(a boolean\)",
     ),
     (
-        {"spline": {"rest": "jerk"}},
-        [
-            "spline.degree: rest: jerk",
-            "needs 3 continuous derivatives",
-            "found 3",
-            "allowed: >= 4, or rest: velocity or full",
-        ],
+        "robot: {limits: {torque: 0}}",
+        "robot.limits.torque: out of range; found 0; allowed: > 0",
     ),
     (
-        {"spline": {"rest": "jerk", "degree": 4, "intervals": 4}},
-        [
-            "spline.intervals: rest: jerk leaves splines of degree 4 no freedom",
-            "found 4; allowed: >= 5, or auto",
-        ],
+        "robot: {limits: {velocity: {j1: -1}}}",
+        "robot.limits.velocity.j1: out of range; found -1",
     ),
     (
-        {"robot": {"urdf": "a.urdf", "limits": {"jerk": -1}}},
-        ["robot.limits.jerk", "found -1"],
+        "robot: {limits: {velocity: {1: 1}}}",
+        r"robot.limits.velocity\[1\]: a name must be a string",
     ),
     (
-        {"robot": {"urdf": "a.urdf", "limits": {"torque_rate": "urdf"}}},
-        ["robot.limits.torque_rate", "'urdf'"],
+        "robot: {limits: {acceleration: [.nan]}}",
+        r"limits.acceleration\[0\]: not a finite number",
     ),
-    ({"solver": {"name": ""}}, ["solver.name: the string is empty"]),
-    ({"solver": {"time_limit": 0}}, ["solver.time_limit: out of range"]),
     (
-        {"refinement": {"density": 9}},
-        ["refinement.density: out of range; found 9; allowed: >= 10"],
+        "robot: {limits: {acceleration: urdf}}",
+        "robot.limits.acceleration: .*found 'urdf'",
+    ),
+    (
+        "robot: {limits: {position: [[1, -1]]}}",
+        r"limits.position\[0\]: .*found \[1.0, -1.0\].*low < high",
+    ),
+    (
+        "robot: {limits: {position: [[1]]}}",
+        r"limits.position\[0\]\[1\]: the list is too short",
+    ),
+    (
+        "robot: {limits: {position: {j: [1, 2, 3]}}}",
+        "limits.position.j: too many items.*at most 2",
+    ),
+    (
+        "robot: {limits: {scale: {torque: 0}}}",
+        "robot.limits.scale.torque: out of range.*> 0",
+    ),
+    ("robot: {gravity: [0, 0]}", r"robot.gravity\[2\]: the list is too short"),
+    (
+        "robot: {gravity: [0, 0, .inf]}",
+        r"robot.gravity\[2\]: not a finite number; found inf",
+    ),
+    ("search: {slower: 150 %}", "search.slower: out of range; found 1.5.*<= 1"),
+    ("search: {slower: 1.5}", "search.slower: out of range; found 1.5; allowed: <= 1"),
+    (
+        "search: {slower: 0.1, least_motion: false}",
+        "search.slower: a slower motion is possible only with least_motion: true.*least_motion: true",
+    ),
+    (
+        "refinement: {tolerance: 1.0e-06}",
+        "refinement.tolerance: out of range; found 1e-06; allowed: >= 1e-05",
+    ),
+    (
+        "robot: {friction: {viscous: -1}}",
+        "robot.friction.viscous: out of range; found -1; allowed: >= 0",
+    ),
+    (
+        "robot: {friction: {coulomb_velocity: 0}}",
+        "coulomb_velocity: out of range; found 0; allowed: > 0",
+    ),
+    ("robot: 3", "robot: wrong type; found 3; allowed: a mapping"),
+    ("start: {joints: []}", "start.joints: too few items.*at least 1"),
+    (
+        "start: {joints: [1, '2']}",
+        r"start.joints\[1\]: wrong type; found '2' \(a string\); allowed: a number",
+    ),
+    ("start: {}", "start.joints: this key is required, and missing"),
+    ("end: fre", "end: .*not defined in postures; found 'fre'.*allowed: free"),
+    (
+        "task_space: [x, yaw, roll]",
+        r"task_space: only one row of rotation.*for example \[x, y, z, yaw\]",
+    ),
+    ("task_space: [axis, x, y]", "task_space: only one.*it comes last"),
+    ("task_space: [x, x]", r"task_space: a name occurs twice.*found \['x', 'x'\]"),
+    (
+        "task_space: [x, w]",
+        r"task_space\[1\]: not one of the allowed values; found 'w'.*'yaw'",
+    ),
+    ("task_space: poze", r"found 'poze'.*Did you mean 'pose'\?"),
+    ("task_space: pose_free_rol", r"Did you mean 'pose_free_roll'\?"),
+    ("search: {effort: fas}", r"found 'fas'.*Did you mean 'fast'\?"),
+    ("task_space: poses", "task_space: .*found 'poses'.*pose_free_roll"),
+    ("path: []", "path: too few items"),
+    (
+        "path: [{lien: {to: [1, 0]}}]",
+        r"path\[0\]: a segment needs exactly one kind.*Did you mean 'line'\?",
+    ),
+    (
+        "path: [{line: {to: [1, 0]}, arc: {}}]",
+        r"path\[0\]: a segment needs exactly one kind.*keys line, arc",
+    ),
+    (
+        "path: [{line: {to: [1], by: [1]}}]",
+        r"path\[0\].line: a line needs exactly one.*\{length, angle_deg\}",
+    ),
+    (
+        "path: [{arc: {via: [1], center: [1]}}]",
+        r"path\[0\].arc: an arc needs exactly one of its forms",
+    ),
+    (
+        "path: [{line: {to: ['1', 0]}}]",
+        r"path\[0\].line.to\[0\]: wrong type; found '1' \(a string\)",
+    ),
+    ("path: [{line: {length: 1}}]", r"path\[0\].line.angle_deg: this key is required"),
+    (
+        "path: [{line: {length: -1, angle_deg: 0}}]",
+        r"path\[0\].line.length: out of range; found -1",
+    ),
+    (
+        "path: [{line: {length: 1, angle: 2, angle_deg: 2}}]",
+        (
+            r"path\[0\].line.angle: unknown key; found angle; allowed: length, angle_deg. Did you mean "
+            r"'angle_deg'\?"
+        ),
+    ),
+    (
+        "path: [{circle: {center: [1, 0, 0], normal: [0, 0, 0]}}]",
+        r"path\[0\].circle.normal: a direction cannot have zero length",
+    ),
+    (
+        "path: [{circle: {center: [0, 0], turns: 0}}]",
+        r"path\[0\].circle.turns: .*zero length",
+    ),
+    (
+        "path: [{circle: {center: [0, 0], yaw: 'on'}}]",
+        r"path\[0\].circle.yaw: .*'fixed' or 'tangent'",
+    ),
+    ("path: [{spline: {through: []}}]", r"path\[0\].spline.through: too few items"),
+    (
+        "path: [{spline: {through: [[1, 2]], relative: 1}}]",
+        "spline.relative: .*true or false",
+    ),
+    (
+        "path: [{line: {to: [1, 0]}, blend: -0.1}, {line: {to: [1, 0]}}]",
+        r"path\[0\].blend: out of range; found -0.1; allowed: > 0",
+    ),
+    (
+        "path: [{line: {to: [1, 0]}}, {line: {to: [1, 0]}, blend: 0.1}]",
+        r"path\[1\].blend: the last segment.*found 0.1",
+    ),
+    ("redundant_joints: [a, a]", "redundant_joints: a name occurs twice"),
+    (
+        "redundant_joints: j3",
+        r"redundant_joints: wrong form; found 'j3' \(a string\); allowed: auto, or a list of joint names",
+    ),
+    (
+        "spline: {degree: 2}",
+        "spline.degree: rest: full.*found 2.*allowed: >= 3, or rest: velocity",
+    ),
+    ("spline: {degree: 8}", "spline.degree: out of range; found 8; allowed: <= 7"),
+    (
+        "spline: {intervals: 20.5}",
+        "spline.intervals: wrong type; found 20.5; allowed: a whole number",
+    ),
+    (
+        "spline: {knots: free}",
+        "spline.intervals: knots: free needs a number of intervals.*12, or knots: uniform",
+    ),
+    (
+        "spline: {intervals: auto, knots: free}",
+        "spline.intervals: knots: free needs a number of intervals.*12, or knots: uniform",
+    ),
+    (
+        "spline: {intervals: 3}",
+        "spline.intervals: out of range; found 3; allowed: >= 4",
+    ),
+    (
+        "spline: {rest: none}",
+        "spline.rest: not one of the allowed values.*'full' or 'jerk'",
+    ),
+    (
+        "spline: {rest: jerk}",
+        (
+            "spline.degree: rest: jerk.*needs 3 continuous derivatives.*found 3.*allowed: >= 4, or rest: "
+            "velocity or full"
+        ),
+    ),
+    (
+        "spline: {rest: jerk, degree: 4, intervals: 4}",
+        "spline.intervals: rest: jerk leaves splines of degree 4 no freedom.*found 4; allowed: >= 5, or auto",
+    ),
+    ("robot: {urdf: a.urdf, limits: {jerk: -1}}", "robot.limits.jerk.*found -1"),
+    (
+        "robot: {urdf: a.urdf, limits: {torque_rate: urdf}}",
+        "robot.limits.torque_rate.*'urdf'",
+    ),
+    ("solver: {name: ''}", "solver.name: the string is empty"),
+    ("solver: {time_limit: 0}", "solver.time_limit: out of range"),
+    (
+        "refinement: {density: 9}",
+        "refinement.density: out of range; found 9; allowed: >= 10",
     ),
 ]
 
 
-@pytest.mark.parametrize(
-    ("change", "expected"), MISTAKES, ids=[json.dumps(change) for change, _ in MISTAKES]
-)
-def test_every_mistake_is_named(change, expected):
-    error = refused(minimal(**change))
-    assert "mistakes" not in str(error), "one mistake, one complaint"
-    for text in expected:
-        assert text in str(error)
+@pytest.mark.parametrize(("change", "message"), MISTAKES)
+def test_the_error_names_the_key_what_was_found_and_what_is_allowed(change, message):
+    with pytest.raises(TaskError, match=message) as caught:
+        load_task(minimal(**yaml.safe_load(change)))
+    assert "mistakes" not in str(caught.value), "one mistake, one complaint"
 
 
 def test_degree_two_is_accepted_where_only_the_velocity_vanishes():

@@ -1,7 +1,9 @@
 """The JSON Schema agrees with the loader on what a task looks like."""
 
 import pytest
+import yaml
 
+from brachis.errors import TaskError
 from brachis.task import json_schema, load_task
 from brachis.task.units import unit_of
 
@@ -63,35 +65,27 @@ DYNAMICS = {
 @pytest.mark.parametrize(
     "change",
     [
-        {},
-        {"task_space": "position"},
-        {"end": {"joints": [1]}},
-        {"path": {"line": {"by": [1]}}},
-        {"path": [[0], [1], [2]]},
-        {"solver": "ipopt"},
-        {"search": {"slower": "1 %"}},
-        {"spline": {"tolerance": "1 %"}},
-        {"robot": DYNAMICS},
-        {
-            "robot": {
-                "urdf": "robot.urdf",
-                "limits": {
-                    "torque": {"j1": [-5, 7], "j2": 3},
-                    "velocity": [[-1, 2], 3],
-                },
-            }
-        },
-        {
-            "robot": {
-                "urdf": "robot.urdf",
-                "mounting": {"xyz": [1, 2, 3], "rpy_deg": [0, 30, 0]},
-            }
-        },
+        "",
+        "task_space: position",
+        "end: {joints: [1]}",
+        "path: {line: {by: [1]}}",
+        "path: [[0], [1], [2]]",
+        "solver: ipopt",
+        "search: {slower: 1 %}",
+        "spline: {tolerance: 1 %}",
+        (
+            "robot: {urdf: robot.urdf, payload: {mass: 2, inertia: {ixx: 1, iyy: 1, izz: 1}}, tool_offset: {xyz: "
+            "[0, 0, 0.1]}, mounting: wall, speed_override: 50 %, friction: {viscous: null, coulomb: urdf, "
+            "rotor_inertia: 0.0001, gear_ratio: {j1: 100}}}"
+        ),
+        "robot: {urdf: robot.urdf, limits: {torque: {j1: [-5, 7], j2: 3}, velocity: [[-1, 2], 3]}}",
+        "robot: {urdf: robot.urdf, mounting: {xyz: [1, 2, 3], rpy_deg: [0, 30, 0]}}",
     ],
 )
 def test_the_schema_accepts_what_the_loader_accepts(validator, change):
-    load_task(task(**change))
-    assert validator.is_valid(task(**change))
+    content = task(**(yaml.safe_load(change) or {}))
+    load_task(content)
+    assert validator.is_valid(content)
 
 
 def test_the_schema_accepts_a_saved_task(validator):
@@ -101,23 +95,26 @@ def test_the_schema_accepts_a_saved_task(validator):
 @pytest.mark.parametrize(
     "change",
     [
-        {"pth": []},
-        {"brachis": 2},
-        {"robot": {"mounting": "roof"}},
-        {"robot": {"limits": {"torque": {"j1": [-5]}}}},
-        {"robot": {"payload": {"com": [0, 0, 0]}}},
-        {"path": []},
-        {"path": [{"lien": {"to": [1]}}]},
-        {"path": [{"line": {"to": [1], "by": [1]}}]},
-        {"path": [{"line": {"to": "1"}}]},
-        {"robot": {"limits": {"torque": -1}}},
-        {"task_space": "posse"},
-        {"spline": {"degree": 8}},
-        {"search": {"slower": "150 %"}},
+        "pth: []",
+        "brachis: 2",
+        "robot: {mounting: roof}",
+        "robot: {limits: {torque: {j1: [-5]}}}",
+        "robot: {payload: {com: [0, 0, 0]}}",
+        "path: []",
+        "path: [{lien: {to: [1]}}]",
+        "path: [{line: {to: [1], by: [1]}}]",
+        "path: [{line: {to: '1'}}]",
+        "robot: {limits: {torque: -1}}",
+        "task_space: posse",
+        "spline: {degree: 8}",
+        "search: {slower: 150 %}",
     ],
 )
 def test_the_schema_refuses_what_the_loader_refuses(validator, change):
-    assert not validator.is_valid(task(**change))
+    content = task(**yaml.safe_load(change))
+    assert not validator.is_valid(content)
+    with pytest.raises(TaskError):
+        load_task(content)
 
 
 def test_the_schema_tells_an_editor_what_keys_mean():

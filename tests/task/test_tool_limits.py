@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 
 import brachis
 from brachis.errors import TaskError
@@ -19,66 +20,59 @@ PART = {"speed": 1.0, "s": [0.25, 0.75]}
     ("tool", "where", "said"),
     [
         (
-            {"process_speed": {"speed": 0.1, "s": [0.6, 0.3]}},
+            "process_speed: {speed: 0.1, s: [0.6, 0.3]}",
             "process_speed[0].s",
             "begin < end",
         ),
         (
-            {"process_speed": {"speed": 0.1, "s": [-0.1, 0.3]}},
+            "process_speed: {speed: 0.1, s: [-0.1, 0.3]}",
             "process_speed[0].s[0]",
             ">= 0",
         ),
         (
-            {"process_speed": {"speed": 0.1, "s": [0.1, 0.3], "tolerance": 0.01}},
+            "process_speed: {speed: 0.1, s: [0.1, 0.3], tolerance: 0.01}",
             "process_speed[0].tolerance",
             "unknown key",
         ),
         (
-            {"process_speed": {"speed": 0.503, "s": [0.1, 0.3]}, "speed": 0.5},
+            "{process_speed: {speed: 0.503, s: [0.1, 0.3]}, speed: 0.5}",
             "process_speed[0].speed",
             "at most 0.5 m/s",
         ),
         (
-            {"process_speed": [PART, {"speed": 0.1, "s": [0.6, 0.9]}]},
+            "process_speed: [{speed: 1.0, s: [0.25, 0.75]}, {speed: 0.1, s: [0.6, 0.9]}]",
             "process_speed[1].s",
             "begin above 0.75",
         ),
         (
-            {"process_speed": PART, "speed": 0.5},
+            "{process_speed: {speed: 1.0, s: [0.25, 0.75]}, speed: 0.5}",
             "process_speed[0].speed",
             "at most 0.5 m/s",
         ),
         (
-            {
-                "process_speed": PART,
-                "speed": {"s": [0.2, 0.4, 0.5], "speed": [2.0, 1.0, 0.2]},
-            },
+            "{process_speed: {speed: 1.0, s: [0.25, 0.75]}, speed: {s: [0.2, 0.4, 0.5], speed: [2.0, 1.0, 0.2]}}",
             "process_speed[0].speed",
             "at most 0.2 m/s",
         ),
-        ({"speed": {"s": [0.0, 0.5], "speed": [1.0]}}, "tool_limits.speed.speed", "2"),
+        ("speed: {s: [0.0, 0.5], speed: [1.0]}", "tool_limits.speed.speed", "2"),
         (
-            {"speed": {"s": [0.5, 0.2], "speed": [1.0, 1.0]}},
+            "speed: {s: [0.5, 0.2], speed: [1.0, 1.0]}",
             "tool_limits.speed.s[1]",
             ">= 0.5",
         ),
         (
-            {"speed": {"s": [0.5, 0.5, 0.5], "speed": [1.0, 2.0, 1.0]}},
+            "speed: {s: [0.5, 0.5, 0.5], speed: [1.0, 2.0, 1.0]}",
             "tool_limits.speed.s",
             "a step",
         ),
-        (
-            {"speed": {"s": [0.5, 1.5], "speed": [1.0, 1.0]}},
-            "tool_limits.speed.s[1]",
-            "1",
-        ),
-        ({"acceleration": 0.0}, "tool_limits.acceleration", "1e-06"),
-        ({"angular_speed": "fast"}, "tool_limits.angular_speed", "number"),
+        ("speed: {s: [0.5, 1.5], speed: [1.0, 1.0]}", "tool_limits.speed.s[1]", "1"),
+        ("acceleration: 0.0", "tool_limits.acceleration", "1e-06"),
+        ("angular_speed: fast", "tool_limits.angular_speed", "number"),
     ],
 )
-def test_what_makes_no_limit_is_refused_with_its_key(tool, where, said):
+def test_the_error_names_the_key_of_what_makes_no_limit(tool, where, said):
     with pytest.raises(TaskError) as caught:
-        brachis.load_task({**TASK, "tool_limits": tool})
+        brachis.load_task({**TASK, "tool_limits": yaml.safe_load(tool)})
     assert where in str(caught.value)
     assert said in str(caught.value)
 

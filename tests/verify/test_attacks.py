@@ -15,6 +15,7 @@ from brachis.task.limit_models import ToolLimits
 from brachis.trajectory import Pieces
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
+from support.motions import with_limits
 
 MIDDLE = 60
 
@@ -51,13 +52,6 @@ def changed(trajectory, name, place, by):
     array = np.array(getattr(trajectory, name))
     array[place] += by
     return replace(trajectory, **{name: array})
-
-
-def with_limits(trajectory, **limits):
-    robot = trajectory.robot
-    other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
-    changed = replace(robot.limits.with_magnitudes(**other), **limits)
-    return replace(trajectory, robot=replace(robot, limits=changed))
 
 
 def with_node(trajectory, t, **offsets):

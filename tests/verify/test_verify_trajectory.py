@@ -7,10 +7,10 @@ import pytest
 
 from brachis.errors import InputError
 from brachis.robot import Robot
-from brachis.robot.limits import MAGNITUDES
 from brachis.task import Posture
 from brachis.trajectory import Pieces
 from brachis.verify import VerifyOptions, verify_trajectory
+from support.motions import with_limits
 
 MIDDLE = 60
 
@@ -32,13 +32,6 @@ def faster(trajectory, factor):
         qddot=t.qddot * factor**2,
         qddot_before=t.qddot_before * factor**2,
     )
-
-
-def with_limits(trajectory, **limits):
-    robot = trajectory.robot
-    other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
-    changed = replace(robot.limits.with_magnitudes(**other), **limits)
-    return replace(trajectory, robot=replace(robot, limits=changed))
 
 
 def with_task(trajectory, **parts):

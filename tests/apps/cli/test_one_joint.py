@@ -58,20 +58,26 @@ def test_plot(kind, run, files, tmp_path):
 
 
 def test_export_verify_inspect(run, files, tmp_path):
-    outcome = run(
-        "export", files / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 0.01
-    )
-    assert outcome.code == 0, outcome.err
-    with (tmp_path / "motion.csv").open() as stream:
-        rows = list(csv.reader(stream))
-    assert [len(row) for row in rows] == [5] * len(rows)
+    table = tmp_path / "motion.csv"
+    for command in (
+        ("export", files / "result.npz", "--out", table, "--dt", 0.01),
+        ("export", files, "--out", table, "--dt", 0.01),  # the motion's folder
+    ):
+        outcome = run(*command)
+        assert outcome.code == 0, outcome.err
+    with table.open() as stream:
+        assert {len(row) for row in csv.reader(stream)} == {5}
     outcome = run("verify", files / "result.npz", "--json")
     assert outcome.code == 0, outcome.err
     assert json.loads(outcome.out)["passed"] is True
     outcome = run("inspect", files / "robot.urdf", "--posture", "0.2", "--json")
     assert outcome.code == 0, outcome.err
-    (found,) = json.loads(outcome.out)["decompositions"]
-    assert found["solver"] != "-"
+    (choice,) = json.loads(outcome.out)["decompositions"]
+    assert choice["solver"] != "-"
+    outcome = run("verify", tmp_path)
+    assert outcome.code == 2
+    message = "this folder contains no motion; allowed: result.npz or unverified.npz"
+    assert message in outcome.err
 
 
 @pytest.mark.parametrize("name", ["task.yaml", "result.npz"])

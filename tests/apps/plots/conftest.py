@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brachis.robot import Robot
-from brachis.robot.limits import MAGNITUDES
+from support import motions
 
 SPATIAL_JOINTS = {
     "rail": ("prismatic", "0 1 0", "0 0 0.2"),
@@ -68,13 +68,4 @@ def spatial_trajectory(line_trajectory):
 @pytest.fixture(scope="session")
 def with_limits():
     """A trajectory's copy whose robot has other limits."""
-
-    def change(trajectory, **limits):
-        robot = trajectory.robot
-        other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
-        changed = dataclasses.replace(robot.limits.with_magnitudes(**other), **limits)
-        return dataclasses.replace(
-            trajectory, robot=dataclasses.replace(robot, limits=changed)
-        )
-
-    return change
+    return motions.with_limits

@@ -189,47 +189,44 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
 
 @pytest.mark.usefixtures("nothing_runs")
 @pytest.mark.parametrize(
-    ("change", "expected"),
+    ("change", "message"),
     [
         (
-            {"grid": {"path.0.line.lenght": [1, 2]}},
-            ["sweep: path.0.line.lenght", "(6)", "Did you mean 'length'"],
+            "grid: {path.0.line.lenght: [1, 2]}",
+            r"sweep: path.0.line.lenght.*\(6\).*Did you mean 'length'",
         ),
-        ({"grid": {"path.1.line.length": [1, 2]}}, ["path is a list of 1", "path.1"]),
+        ("grid: {path.1.line.length: [1, 2]}", "path is a list of 1.*path.1"),
         (
-            {"grid": {"robot.limits.torque.scale": [1, 2]}},
-            ["robot.limits.torque is a value without keys", "found 10"],
-        ),
-        (
-            {"grid": {"start.joints.3": [0.1]}},
-            ["start.joints is a list of 3", "allowed: 0 to 2"],
+            "grid: {robot.limits.torque.scale: [1, 2]}",
+            "robot.limits.torque is a value without keys.*found 10",
         ),
         (
-            {"grid": {"robot.limits.acceleration.j9": [1.0, 2.0]}},
-            ["joint named 'j9'", "j1, j2, j3"],
-        ),
-        ({"grid": {"spline.degree": []}}, ["grid.spline.degree", "too few items"]),
-        ({"grid": {"spline.degree": {"linera": [1, 2, 3]}}}, ["Did you mean 'linear'"]),
-        (
-            {"random": {"count": 2, "keys": {"start.joints.0": {"uniform": [1, 0]}}}},
-            ["low < high", "found [1"],
+            "grid: {start.joints.3: [0.1]}",
+            "start.joints is a list of 3.*allowed: 0 to 2",
         ),
         (
-            {"rows": [{"path.0.line.angle_deg": 1.0}]},
-            ["path.0.line.angle_deg is varied twice", "in grid and in rows"],
+            "grid: {robot.limits.acceleration.j9: [1.0, 2.0]}",
+            "joint named 'j9'.*j1, j2, j3",
         ),
-        ({"gird": {}}, ["gird", "Did you mean 'grid'"]),
-        ({"task": 3}, ["this is not a task", "found 3"]),
-        ({"task": "nothing.yaml"}, ["nothing.yaml", "the file does not exist"]),
-        ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
+        ("grid: {spline.degree: []}", "grid.spline.degree.*too few items"),
+        ("grid: {spline.degree: {linera: [1, 2, 3]}}", "Did you mean 'linear'"),
+        (
+            "random: {count: 2, keys: {start.joints.0: {uniform: [1, 0]}}}",
+            r"found \[1.*low < high",
+        ),
+        (
+            "rows: [{path.0.line.angle_deg: 1.0}]",
+            "path.0.line.angle_deg is varied twice.*in grid and in rows",
+        ),
+        ("gird: {}", "gird.*Did you mean 'grid'"),
+        ("task: 3", "this is not a task.*found 3"),
+        ("task: nothing.yaml", "nothing.yaml.*the file does not exist"),
+        ("fixed: {spline.degre: 3}", "Did you mean 'degree'"),
     ],
 )
-def test_what_is_wrong_is_refused_before_anything_runs(
-    content, tmp_path, change, expected
-):
-    with pytest.raises(TaskError) as caught:
-        brachis.sweep({**content, **change}, tmp_path / "out")
-    assert [part for part in expected if part not in str(caught.value)] == []
+def test_a_mistake_is_an_error_before_anything_runs(content, tmp_path, change, message):
+    with pytest.raises(TaskError, match=message):
+        brachis.sweep({**content, **yaml.safe_load(change)}, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

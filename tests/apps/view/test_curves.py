@@ -6,16 +6,8 @@ import pytest
 from brachis.apps.view.panel import shown_panels
 from brachis.robot import Robot
 from brachis.task import ToolLimits
+from support.motions import with_limits
 from support.shown import ROBOTS
-
-
-def with_limits(motion, **limits):
-    return dataclasses.replace(
-        motion,
-        robot=dataclasses.replace(
-            motion.robot, limits=dataclasses.replace(motion.robot.limits, **limits)
-        ),
-    )
 
 
 def curves_of(motion):
