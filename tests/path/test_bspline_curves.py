@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError, TaskError
@@ -64,8 +65,8 @@ def test_all_forms_of_poses_give_the_same_path():
             fit_path(form.pop("points"), tolerance=allowed, **form), start, POSE_ROWS
         )
         targets.append(path.sample(S).target)
-        np.testing.assert_allclose(targets[-1], targets[0], atol=1e-9)
-    np.testing.assert_allclose(
+        assert_allclose(targets[-1], targets[0], atol=1e-9)
+    assert_allclose(
         targets[0][[0, -1]], [pose(position[i], turns[i]) for i in (0, -1)], atol=1e-9
     )
 
@@ -80,11 +81,9 @@ def test_a_relative_curve_is_moved_and_turned():
     )
     start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
     moved = build_path(segments, pose(start, turn), POSE_ROWS).sample(S).target
-    np.testing.assert_allclose(
-        moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9
-    )
+    assert_allclose(moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9)
     change = (turn * turns[0].inv()).as_matrix()
-    np.testing.assert_allclose(
+    assert_allclose(
         moved[:, 3:].reshape(-1, 3, 3),
         change @ recorded[:, 3:].reshape(-1, 3, 3),
         atol=1e-9,
@@ -122,9 +121,7 @@ def test_speeds_follow_the_path_over_its_blends():
         [np.argmin(np.linalg.norm(position - place, axis=1)) for place in middle]
     )
     clear = np.abs(nearest - 450) > 2
-    np.testing.assert_allclose(
-        np.interp(S, table.s, table.speed)[clear], speed[nearest[clear]]
-    )
+    assert_allclose(np.interp(S, table.s, table.speed)[clear], speed[nearest[clear]])
 
 
 def test_stretches_without_speed_have_no_table():

@@ -5,6 +5,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import PathError
 from brachis.path import build_path
@@ -30,7 +31,7 @@ def assert_derivatives(curve, step=1e-5):
     assert np.abs((difference - exact[1:]) / scale).max() < 1e-6
     for order in range(4):
         fewer = exact[: order + 1]
-        np.testing.assert_allclose(
+        assert_allclose(
             curve.derivatives(sigma, order),
             fewer,
             rtol=1e-9,
@@ -83,7 +84,7 @@ def test_derivatives_are_the_slopes_of_those_below(name):
     curve = curve_of(yaml.safe_load(segment), start, rows)
     assert_derivatives(curve)
     first = curve.derivatives(np.zeros(1), 0)[0, 0]
-    np.testing.assert_allclose(first, start, atol=1e-12)
+    assert_allclose(first, start, atol=1e-12)
     assert curve.knots[0] == 0
     assert curve.knots[-1] == pytest.approx(curve.length)
 
@@ -92,7 +93,7 @@ def test_derivatives_of_a_blend():
     start, end = np.random.default_rng(2).standard_normal((2, 4, 3))
     curve = septic(start, end, 1.7)
     assert_derivatives(curve)
-    np.testing.assert_allclose(
+    assert_allclose(
         curve.derivatives(np.array([0.0, 1.7])), np.stack([start, end], 1), atol=1e-12
     )
 
@@ -118,13 +119,13 @@ def test_an_arc_keeps_its_radius_and_turns_by_its_angle(center, angle, aside):
     )
     assert curve.length == pytest.approx(radius * np.deg2rad(abs(angle)))
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 30), 1)
-    np.testing.assert_allclose(np.linalg.norm(z - center, axis=1), radius, rtol=1e-9)
-    np.testing.assert_allclose((z - center) @ normal, 0, atol=1e-9)
-    np.testing.assert_allclose(np.linalg.norm(velocity, axis=1), 1.0)
+    assert_allclose(np.linalg.norm(z - center, axis=1), radius, rtol=1e-9)
+    assert_allclose((z - center) @ normal, 0, atol=1e-9)
+    assert_allclose(np.linalg.norm(velocity, axis=1), 1.0)
     turned = np.cos(np.deg2rad(angle)) * outward + np.sin(np.deg2rad(angle)) * np.cross(
         normal, outward
     )
-    np.testing.assert_allclose(z[-1], center + turned, atol=1e-8)
+    assert_allclose(z[-1], center + turned, atol=1e-8)
 
 
 @given(st.floats(0.05, 0.95), st.floats(0.1, 6.2), st.booleans(), st.integers(2, 3))
@@ -143,7 +144,7 @@ def test_an_arc_passes_via_and_then_ends(fraction, angle, clockwise, rows):
     curve = curve_of({"arc": {"via": via, "to": end}}, on_circle(0.0), XYZ[:rows])
     assert curve.length == pytest.approx(1.5 * angle, rel=1e-6)
     z = curve.derivatives(np.array([fraction, 1.0]) * curve.length, 0)[0]
-    np.testing.assert_allclose(z, [via, end], atol=1e-6)
+    assert_allclose(z, [via, end], atol=1e-6)
 
 
 @pytest.mark.parametrize("turns", [1, -1.25])
@@ -156,12 +157,10 @@ def test_yaw_turns_with_the_tangent(turns):
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 40), 1)
     # By the right-hand rule about y, which turns z towards x.
     heading = -np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
-    np.testing.assert_allclose(z[:, 2] - 0.7, heading - heading[0], atol=1e-12)
+    assert_allclose(z[:, 2] - 0.7, heading - heading[0], atol=1e-12)
     assert z[-1, 2] - 0.7 == pytest.approx(-2 * np.pi * turns)
     fixed = curve_of({"circle": {"center": [0, 0], "turns": turns}}, [2, 0, 0.7], XYW)
-    np.testing.assert_array_equal(
-        fixed.derivatives(np.array([0.0, 1.0]), 0)[0, :, 2], 0.7
-    )
+    assert_array_equal(fixed.derivatives(np.array([0.0, 1.0]), 0)[0, :, 2], 0.7)
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 12])
@@ -170,8 +169,8 @@ def test_a_spline_passes_its_waypoints_and_is_c4(count):
     points = np.cumsum(rng.uniform(0.1, 1.0, (count, 2)), axis=0)
     curve = curve_of({"spline": {"through": points}}, [0, 0], XY)
     knots = curve.knots
-    np.testing.assert_allclose(curve.derivatives(knots, 0)[0, 1:], points, atol=1e-12)
-    np.testing.assert_allclose(
+    assert_allclose(curve.derivatives(knots, 0)[0, 1:], points, atol=1e-12)
+    assert_allclose(
         np.diff(knots), np.linalg.norm(np.diff([[0, 0], *points], axis=0), axis=1)
     )
     h = 1e-9
@@ -188,9 +187,7 @@ def test_a_spline_passes_its_waypoints_and_is_c4(count):
 )
 def test_a_spline_bears_short_chords(points):
     curve = curve_of({"spline": {"through": points}}, [0, 0], XY)
-    np.testing.assert_allclose(
-        curve.derivatives(curve.knots, 0)[0, 1:], points, atol=1e-10
-    )
+    assert_allclose(curve.derivatives(curve.knots, 0)[0, 1:], points, atol=1e-10)
 
 
 def test_a_spline_whose_start_is_stated():
@@ -202,9 +199,7 @@ def test_a_spline_whose_start_is_stated():
     moved = {"through": [[4.5, 4], [5, 5]], "starts_at": [4, 3], "relative": True}
     sigma = np.linspace(0, plain.length, 9)
     for curve in (stated, curve_of({"spline": moved}, [1, -1], XY)):
-        np.testing.assert_allclose(
-            curve.derivatives(sigma), plain.derivatives(sigma), atol=1e-12
-        )
+        assert_allclose(curve.derivatives(sigma), plain.derivatives(sigma), atol=1e-12)
 
 
 def test_a_centre_of_few_digits_is_moved_into_the_plane_of_the_arc():
@@ -218,8 +213,8 @@ def test_a_centre_of_few_digits_is_moved_into_the_plane_of_the_arc():
     )
     path = build_path([arc], start, ["x", "y", "z"])
     around = path.sample(np.linspace(0.0, 1.0, 9)).target
-    np.testing.assert_allclose(around[:, 2], start[2], atol=1e-15)
-    np.testing.assert_allclose(around[[0, -1]], [start, start], atol=1e-12)
+    assert_allclose(around[:, 2], start[2], atol=1e-15)
+    assert_allclose(around[[0, -1]], [start, start], atol=1e-12)
     wrong = arc.model_copy(
         update={"arc": arc.arc.model_copy(update={"center": (0.3, 0.0, 0.18)})}
     )
@@ -240,9 +235,9 @@ def test_a_helix_climbs_by_its_pitch():
     length = 2.5 * np.hypot(2 * np.pi * 0.2, 0.1)
     assert curve.length == pytest.approx(length)
     start, turn, end = curve.derivatives(np.array([0.0, length / 2.5, length]), 0)[0]
-    np.testing.assert_allclose(start, [0.5, 0.0, 1.0], atol=1e-12)
-    np.testing.assert_allclose(turn, [0.5, 0.0, 1.1], atol=1e-12)
-    np.testing.assert_allclose(end, [0.1, 0.0, 1.25], atol=1e-12)
+    assert_allclose(start, [0.5, 0.0, 1.0], atol=1e-12)
+    assert_allclose(turn, [0.5, 0.0, 1.1], atol=1e-12)
+    assert_allclose(end, [0.1, 0.0, 1.25], atol=1e-12)
     tangents = curve.derivatives(np.linspace(0.0, length, 20), 1)[1]
-    np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1.0)
+    assert_allclose(np.linalg.norm(tangents, axis=1), 1.0)
     assert tangents[0, 1] < 0.0, "against the right-hand rule about the normal"

@@ -5,6 +5,8 @@ import itertools
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import PathError, TaskError
@@ -21,34 +23,40 @@ WORKPIECE = pin.SE3(
 )
 FLAT = {"xyz": [0.3, 0.4, 0.7], "rpy_deg": [0.0, 0.0, 30.0]}
 S = np.linspace(0.0, 1.0, 30)
-SEGMENTS = [
-    {
-        "line": {"by": [0.3, 0, 0]},
-        "orientation": {"rotate": {"axis": [0, 0, 1], "angle_deg": 50}},
-        "blend": 0.05,
-    },
-    {
-        "line": {"to": [0.5, 0.4, 0.1]},
-        "orientation": {"to": {"kuka_abc_deg": [80, 10, 20]}},
-        "blend": 0.05,
-    },
-    {
-        "arc": {"center": [0.5, 0.3, 0.1], "angle_deg": 90, "normal": [0, 0, 1]},
-        "orientation": "tangent",
-        "blend": 0.05,
-    },
-    {
-        "line": {"by": [-0.2, 0, 0.1]},
-        "orientation": {"tangent": {"up": [0, 1, 0]}},
-        "blend": 0.05,
-    },
-    {
-        "spline": {
-            "through": [[0.6, 0.2, 0.4], [0.8, 0.1, 0.4]],
-            "orientations": [{"rpy_deg": [9, 0, 90]}] * 2,
-        }
-    },
-]
+SEGMENTS = yaml.safe_load("""
+- line:
+    by: [0.3, 0, 0]
+  orientation:
+    rotate:
+      axis: [0, 0, 1]
+      angle_deg: 50
+  blend: 0.05
+- line:
+    to: [0.5, 0.4, 0.1]
+  orientation:
+    to:
+      kuka_abc_deg: [80, 10, 20]
+  blend: 0.05
+- arc:
+    center: [0.5, 0.3, 0.1]
+    angle_deg: 90
+    normal: [0, 0, 1]
+  orientation: tangent
+  blend: 0.05
+- line:
+    by: [-0.2, 0, 0.1]
+  orientation:
+    tangent:
+      up: [0, 1, 0]
+  blend: 0.05
+- spline:
+    through:
+    - [0.6, 0.2, 0.4]
+    - [0.8, 0.1, 0.4]
+    orientations:
+    - rpy_deg: [9, 0, 90]
+    - rpy_deg: [9, 0, 90]
+""")
 
 
 def written(path, **keys):
@@ -82,17 +90,13 @@ def test_every_kind_of_segment_and_orientation_is_in_the_frame():
     for found, wanted in zip(
         placements(world.target), placements(local.target), strict=True
     ):
-        np.testing.assert_allclose(
-            found.homogeneous, (WORKPIECE * wanted).homogeneous, atol=1e-12
-        )
+        assert_allclose(found.homogeneous, (WORKPIECE * wanted).homogeneous, atol=1e-12)
     for name in (
         "xi",
         "xi_ds",
         "xi_dds",
     ):  # twists are those of the tool frame, whatever the frame of the path
-        np.testing.assert_allclose(
-            getattr(world, name), getattr(local, name), atol=1e-9
-        )
+        assert_allclose(getattr(world, name), getattr(local, name), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -117,16 +121,14 @@ def test_rows_are_turned_and_moved(rows):
     points[:, axes] = local.target[:, : len(axes)]
     expected = points @ rotation.T + placement.xyz
     target = world.sample(S).target
-    np.testing.assert_allclose(target[:, : len(axes)], expected[:, axes], atol=1e-12)
+    assert_allclose(target[:, : len(axes)], expected[:, axes], atol=1e-12)
     if "yaw" in names:
-        np.testing.assert_allclose(
-            target[:, 2], local.target[:, 2] + np.radians(30.0), atol=1e-12
-        )
+        assert_allclose(target[:, 2], local.target[:, 2] + np.radians(30.0), atol=1e-12)
     step = 1e-6
     slopes = (world.sample(S + step).target - world.sample(S - step).target) / (
         2.0 * step
     )
-    np.testing.assert_allclose(world.sample(S).xi, slopes, atol=1e-6)
+    assert_allclose(world.sample(S).xi, slopes, atol=1e-6)
 
 
 def tool_of(motion, frame):
@@ -174,17 +176,11 @@ def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path):
         for each in tool_of(Trajectory.load(tmp_path / "result.npz"), robot.tool_frame)
     ]
     for each in in_workpiece:
-        np.testing.assert_allclose(
-            each.translation[1:], start.translation[1:], atol=1e-7
-        )
+        assert_allclose(each.translation[1:], start.translation[1:], atol=1e-7)
         turned = pin.log3(each.rotation @ start.rotation.T)
         way = each.translation[0] - start.translation[0]
-        np.testing.assert_allclose(
-            turned, [0.0, 0.0, np.radians(20.0) * way / 0.1], atol=1e-6
-        )
-    np.testing.assert_allclose(
-        in_workpiece[-1].translation, [0.12, 0.03, 0.05], atol=1e-7
-    )
+        assert_allclose(turned, [0.0, 0.0, np.radians(20.0) * way / 0.1], atol=1e-6)
+    assert_allclose(in_workpiece[-1].translation, [0.12, 0.03, 0.05], atol=1e-7)
 
 
 def test_a_path_says_its_frame():
@@ -211,7 +207,7 @@ def test_frames_may_be_nested_as_deep_as_one_likes():
     }
     task = written(SEGMENTS, frames=frames, path_frame=names[-1])
     whole = pin.SE3(pin.exp6(count * pin.log6(place)))
-    np.testing.assert_allclose(
+    assert_allclose(
         place_frame(task.frames, names[-1]).transform.homogeneous,
         whole.homogeneous,
         atol=1e-9,
@@ -279,6 +275,6 @@ def test_a_placement_may_be_a_transform(angles):
     given = pin.SE3(pin.rpy.rpyToMatrix(*angles), np.array([1.0, 2.0, 3.0]))
     placement = Placement.model_validate(given)
     assert placement.xyz == (1.0, 2.0, 3.0)
-    np.testing.assert_allclose(
+    assert_allclose(
         pin.rpy.rpyToMatrix(*np.radians(placement.rpy_deg)), given.rotation, atol=1e-12
     )

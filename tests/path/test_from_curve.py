@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 
 from brachis import InputError, bspline_segment
@@ -46,7 +47,7 @@ def test_splines_are_taken_exactly(knots):
     found = along(bspline_segment(curve), curve(first))
     for order in range(4):
         expected = curve(first + U * (last - first), nu=order) * (last - first) ** order
-        np.testing.assert_allclose(
+        assert_allclose(
             found[order], expected, atol=1e-9 * (1.0 + np.abs(expected).max())
         )
 
@@ -59,7 +60,7 @@ def test_piecewise_polynomials_and_parts_of_them():
         [0.0, 2.0],
     )
     found = along(bspline_segment(cubic, (0.5, 1.0)), cubic(0.5))
-    np.testing.assert_allclose(found[0], cubic(0.5 + 0.5 * U), atol=1e-13)
+    assert_allclose(found[0], cubic(0.5 + 0.5 * U), atol=1e-13)
 
 
 def test_functions_are_met_within_the_tolerance():
@@ -69,9 +70,7 @@ def test_functions_are_met_within_the_tolerance():
     for tolerance in (1e-6, 1e-10):
         segment = bspline_segment(curve, (0.0, 2.0), tolerance=tolerance)
         found = along(segment, curve(0.0))[0]
-        np.testing.assert_allclose(
-            found, np.transpose(curve(2.0 * U)), atol=2.0 * tolerance
-        )
+        assert_allclose(found, np.transpose(curve(2.0 * U)), atol=2.0 * tolerance)
     assert len(segment["bspline"]["knots"]) < 300
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose
 
 from brachis.errors import BrachisError, PathError, TaskError
 from brachis.path import build_path
@@ -42,7 +43,7 @@ def test_a_spline_passes_its_waypoints():
     path = build([{"spline": {"through": [[0.5, 0.5, 0.5], [0.1, 0.9, 0.2]]}}])
     chord = np.linalg.norm([0.4, 0.3, 0.2])
     whole = chord + np.linalg.norm([0.4, 0.4, 0.3])
-    np.testing.assert_allclose(at(path, chord / whole), [[0.5, 0.5, 0.5]], atol=1e-12)
+    assert_allclose(at(path, chord / whole), [[0.5, 0.5, 0.5]], atol=1e-12)
 
 
 def test_joints_may_stand_in_another_order(tmp_path):
@@ -58,10 +59,10 @@ def test_joints_may_stand_in_another_order(tmp_path):
         ]
     )
     s = np.linspace(0.0, 1.0, 7)
-    np.testing.assert_allclose(at(named, s), at(plain, s), atol=1e-14)
+    assert_allclose(at(named, s), at(plain, s), atol=1e-14)
     file = tmp_path / "path.csv"
     file.write_text("x,a,b\n0.3,0.1,0.2\n0.7,0.5,0.6\n0.2,0.1,0.9\n")
-    np.testing.assert_allclose(
+    assert_allclose(
         at(build([{"csv": {"file": str(file)}}]), s), at(plain, s), atol=1e-14
     )
 
@@ -74,9 +75,9 @@ def test_a_column_of_joints_in_degrees_is_named(tmp_path):
 
 def test_bsplines_are_taken_as_they_are():
     path = build([{"bspline": CLAMPED}])
-    np.testing.assert_allclose(at(path, [0.0, 1.0]), [START, [1, 1, 1]], atol=1e-15)
+    assert_allclose(at(path, [0.0, 1.0]), [START, [1, 1, 1]], atol=1e-15)
     moved = build([{"bspline": {**CLAMPED, "relative": True}}], [1.1, 0.2, 0.3])
-    np.testing.assert_allclose(at(moved, 1.0), [[2, 1, 1]], atol=1e-15)
+    assert_allclose(at(moved, 1.0), [[2, 1, 1]], atol=1e-15)
     with pytest.raises(PathError, match="starts elsewhere"):
         build([{"bspline": CLAMPED}], [0.2, 0.2, 0.3])
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import PathError, TaskError
@@ -92,9 +93,9 @@ def test_a_part_leaves_leads_at_stops_and_ends(parts, boundary, held):
     given = problem(STOPPING, parts, boundary)
     speeds = [leg for leg in given.legs if leg.speed is not None]
     found = [(leg.speed, 0.6 * leg.begin, 0.6 * leg.end) for leg in speeds]
-    np.testing.assert_allclose(found, held, atol=1e-9)
+    assert_allclose(found, held, atol=1e-9)
     again = Problem.of(given.robot, load_task(given.task.to_dict()))
-    np.testing.assert_allclose(
+    assert_allclose(
         [(leg.begin, leg.end) for leg in again.legs],
         [(leg.begin, leg.end) for leg in given.legs],
         atol=1e-12,
@@ -124,7 +125,7 @@ def test_segments_have_speeds(path, expected):
     length = planned.path.total
     speeds = [leg for leg in planned.legs if leg.speed is not None]
     legs = [(leg.speed, length * leg.begin, length * leg.end) for leg in speeds]
-    np.testing.assert_allclose(legs, expected, atol=1e-4)
+    assert_allclose(legs, expected, atol=1e-4)
 
 
 def test_speeds_of_segments_and_of_parts():
@@ -150,7 +151,7 @@ def test_a_file_has_a_speed_between_its_stops(tmp_path):
     found = [(leg.begin, leg.end, leg.speed) for leg in given.legs]
     lead = LEAD * 0.05 / 0.2
     expected = [(lead, 0.5 - lead, 0.05), (0.5 + lead, 1.0 - lead, 0.05)]
-    np.testing.assert_allclose([leg for leg in found if leg[2]], expected)
+    assert_allclose([leg for leg in found if leg[2]], expected)
 
 
 def test_a_speed_replaces_the_feed_rates_of_points():
@@ -257,7 +258,7 @@ def test_rates_where_legs_meet():
     assert [path.breaks[0] for path in given.leg_paths] == [
         leg.begin for leg in given.legs
     ]
-    np.testing.assert_allclose(
+    assert_allclose(
         given.leg_paths[0].sample([given.legs[0].end]).xi, [[0.6, 0.0, 0.0]], atol=1e-12
     )
 

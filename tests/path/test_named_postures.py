@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import InputError, PathError, StartError, TaskError
@@ -47,13 +48,13 @@ def test_a_line_ends_at_the_tool_s_place(space, frame):
     names = dict(zip(robot.joint_names, HOME, strict=True))
     for home in (HOME, names):
         end = end_of(problem(space, home=home, **frame))
-        np.testing.assert_allclose(end[:3], place.translation, atol=1e-12)
+        assert_allclose(end[:3], place.translation, atol=1e-12)
         if space != "position":
-            np.testing.assert_allclose(end[3:], place.rotation.ravel(), atol=1e-12)
+            assert_allclose(end[3:], place.rotation.ravel(), atol=1e-12)
 
 
 def test_of_joints_it_ends_in_the_posture():
-    np.testing.assert_allclose(end_of(problem("joints")), HOME, atol=1e-14)
+    assert_allclose(end_of(problem("joints")), HOME, atol=1e-14)
 
 
 @pytest.mark.parametrize("turn", [0.5, 3.0, -3.0])
@@ -80,7 +81,7 @@ def test_a_plan_begins_and_ends_in_named_postures():
     )
     assert result.verified
     for q in result.trajectory.q[[0, -1]]:
-        np.testing.assert_allclose(q, [0.5, -2.1, 2.1], atol=1e-9)
+        assert_allclose(q, [0.5, -2.1, 2.1], atol=1e-9)
     assert result.trajectory.task.start == "home"
 
 
@@ -88,9 +89,9 @@ def test_a_change_of_a_posture_moves_start_and_path():
     task = problem("position").task
     moved = load_task(task, changes={"postures.home": AWAY, "postures.away": HOME})
     given = Problem.of(brachis.robots.iiwa14, moved)
-    np.testing.assert_allclose(given.start, HOME)
+    assert_allclose(given.start, HOME)
     place = given.robot.tool_placement(AWAY).translation
-    np.testing.assert_allclose(end_of(given), place, atol=1e-12)
+    assert_allclose(end_of(given), place, atol=1e-12)
     assert load_task(moved.to_dict()) == moved
     assert unit_of("postures.home.joint_1") == "rad (m)"
     assert unit_of("frames.user1.xyz") == unit_of("scene.0.position") == "m"

@@ -220,31 +220,32 @@ def test_all_corners_are_named():
 
 
 @pytest.mark.parametrize(
-    ("segments", "rows", "expected"),
+    ("segments", "rows", "message"),
     [
         (
-            [RIGHT, {"arc": {"center": [1, 0.5], "angle_deg": 90}}],
-            XY,
+            "[{line: {by: [1, 0]}}, {arc: {center: [1, 0.5], angle_deg: 90}}]",
+            ["x", "y"],
             "a curvature jump of 2 1/m",
         ),
         (
-            [
-                {"arc": {"center": [0, 1], "angle_deg": 90}},
-                {"arc": {"center": [0.5, 1], "angle_deg": 90}},
-            ],
-            XY,
+            "[{arc: {center: [0, 1], angle_deg: 90}}, {arc: {center: [0.5, 1], angle_deg: 90}}]",
+            ["x", "y"],
             "a curvature jump of 1 1/m",
         ),
         (
-            [{"line": {"by": [1, 0, 1]}}, {"line": {"by": [1, 0, 3]}}],
-            XYW,
+            "[{line: {by: [1, 0, 1]}}, {line: {by: [1, 0, 3]}}]",
+            ["x", "y", "yaw"],
             "in yaw alone",
         ),
-        ([{"spline": {"through": [[1, 1], [2, 0]]}}, RIGHT], XY, "a corner of "),
+        (
+            "[{spline: {through: [[1, 1], [2, 0]]}}, {line: {by: [1, 0]}}]",
+            ["x", "y"],
+            "a corner of ",
+        ),
     ],
 )
-def test_what_jumps_at_a_join(segments, rows, expected):
-    assert expected in str(refused(segments, rows))
+def test_the_error_says_what_jumps_at_a_join(segments, rows, message):
+    assert message in str(refused(yaml.safe_load(segments), rows))
 
 
 @pytest.mark.parametrize(

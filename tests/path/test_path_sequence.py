@@ -2,17 +2,29 @@
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from support.poses import row_path
 
-MIXED = [
-    {"line": {"length": 1.0, "angle_deg": 0}, "blend": 0.2},
-    {"line": {"length": 0.6, "angle_deg": 120}, "blend": 0.3},
-    {"arc": {"center": [0.2, 0.5], "angle_deg": 100, "yaw": "tangent"}, "blend": 0.1},
-    {"spline": {"through": [[0.4, 0.3, 0.5], [0.9, 0.8, 0.1]], "relative": True}},
-]
+MIXED = yaml.safe_load("""
+- line: {length: 1.0, angle_deg: 0}
+  blend: 0.2
+- line: {length: 0.6, angle_deg: 120}
+  blend: 0.3
+- arc:
+    center: [0.2, 0.5]
+    angle_deg: 100
+    yaw: tangent
+  blend: 0.1
+- spline:
+    through:
+    - [0.4, 0.3, 0.5]
+    - [0.9, 0.8, 0.1]
+    relative: true
+""")
 
 
 @pytest.fixture
@@ -30,7 +42,7 @@ def test_derivatives_by_s(mixed):
         difference = (getattr(after, lower) - getattr(before, lower)) / (2 * h)
         assert exact.shape == (s.size, 3)
         assert np.abs(exact).max() > 1
-        np.testing.assert_allclose(difference, exact, atol=1e-6 * np.abs(exact).max())
+        assert_allclose(difference, exact, atol=1e-6 * np.abs(exact).max())
 
 
 def test_three_derivatives_continue_across_all_joins(mixed):
@@ -48,12 +60,12 @@ def test_three_derivatives_continue_across_all_joins(mixed):
 
 def test_ends_and_length(mixed):
     ends = mixed.sample([0.0, 1.0]).target
-    np.testing.assert_allclose(ends[0], [0, 0, 0.3])
+    assert_allclose(ends[0], [0, 0, 0.3])
     corner = np.array([1 - 0.3, 0.6 * np.sin(np.deg2rad(120))])
     center = np.array([0.2, 0.5])
     angle = np.deg2rad(100)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    np.testing.assert_allclose(
+    assert_allclose(
         ends[1, :2], center + turn @ (corner - center) + [0.9, 0.8], atol=1e-12
     )
     assert ends[1, 2] == pytest.approx(0.3 + angle + 0.1)
@@ -67,9 +79,7 @@ def test_a_blend_leaves_the_rest_of_the_segments_alone():
     corner = [{"line": {"to": [1, 0]}, "blend": 0.25}, {"line": {"to": [1, 1]}}]
     path = row_path(corner, [0, 0], ["x", "y"])
     sample = path.sample(path.breaks)
-    np.testing.assert_allclose(
-        sample.target, [[0, 0], [0.75, 0], [1, 0.25], [1, 1]], atol=1e-12
-    )
+    assert_allclose(sample.target, [[0, 0], [0.75, 0], [1, 0.25], [1, 1]], atol=1e-12)
     inside = path.sample(np.linspace(path.breaks[1], path.breaks[2], 50)).target
     assert np.all(inside[:, 0] <= 1)
     assert np.all(inside[:, 1] >= 0)
@@ -93,20 +103,14 @@ def test_a_blend_keeps_its_speed(turn, size, length):
 @pytest.mark.parametrize(
     "segments",
     [
-        [{"line": {"to": [1, 0.5]}}, {"line": {"to": [3, 1.5]}}],
-        [
-            {"arc": {"center": [1, 0], "angle_deg": 70}},
-            {"arc": {"center": [1, 0], "angle_deg": 50}},
-        ],
-        [
-            {"line": {"to": [1, 1]}},
-            {"spline": {"through": [[2, 2], [2.5, 2.5], [4, 4]]}},
-        ],
-        [{"line": {"to": [0.333333, 0.666667]}}, {"line": {"to": [1, 2]}}],
+        "[{line: {to: [1, 0.5]}}, {line: {to: [3, 1.5]}}]",
+        "[{arc: {center: [1, 0], angle_deg: 70}}, {arc: {center: [1, 0], angle_deg: 50}}]",
+        "[{line: {to: [1, 1]}}, {spline: {through: [[2, 2], [2.5, 2.5], [4, 4]]}}]",
+        "[{line: {to: [0.333333, 0.666667]}}, {line: {to: [1, 2]}}]",
     ],
 )
 def test_smooth_continuations_need_no_blend(segments):
-    path = row_path(segments, [0, 0], ["x", "y"])
+    path = row_path(yaml.safe_load(segments), [0, 0], ["x", "y"])
     assert len(path.pieces) == 2
     assert (
         np.abs(
@@ -118,8 +122,8 @@ def test_smooth_continuations_need_no_blend(segments):
 
 def test_one_row_and_yaw_alone():
     path = row_path([{"line": {"by": [-2]}}], [0.5], ["z"])
-    np.testing.assert_allclose(path.sample([0, 0.5, 1]).target[:, 0], [0.5, -0.5, -1.5])
+    assert_allclose(path.sample([0, 0.5, 1]).target[:, 0], [0.5, -0.5, -1.5])
     assert path.length == pytest.approx(2)
     turning = row_path([{"line": {"by": [0, 0, 2]}}], [0, 0, 0], ["x", "y", "yaw"])
-    np.testing.assert_allclose(turning.sample([0.5]).xi, [[0, 0, 2]])
+    assert_allclose(turning.sample([0.5]).xi, [[0, 0, 2]])
     assert turning.length == 0

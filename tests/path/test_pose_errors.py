@@ -109,47 +109,48 @@ def test_a_jump_of_the_turning_rate_is_told_in_words():
 
 
 @pytest.mark.parametrize(
-    ("segments", "expected"),
+    ("segments", "message"),
     [
         (
-            [RIGHT | {"orientation": TURN}, RIGHT | {"orientation": TILT}],
-            ["the tool's turning rate jumps by 2.221 rad/m"],
+            (
+                "[{line: {by: [1, 0, 0]}, orientation: {rotate: {axis: [0, 0, 1], angle_deg: 90}}}, {line: {by: [1, "
+                "0, 0]}, orientation: {rotate: {axis: [1, 0, 0], angle_deg: 90}}}]"
+            ),
+            "the tool's turning rate jumps by 2.221 rad/m",
         ),
         (
-            [{"turn": TURN}, {"turn": TILT}],
-            [
-                "the tool's turning rate jumps by 1.414 rad/rad",
-                "Set profile: smooth where",
-            ],
+            (
+                "[{turn: {rotate: {axis: [0, 0, 1], angle_deg: 90}}}, {turn: {rotate: {axis: [1, 0, 0], angle_deg: "
+                "90}}}]"
+            ),
+            "the tool's turning rate jumps by 1.414 rad/rad.*Set profile: smooth where",
         ),
         (
-            [
-                {"turn": TURN},
-                {"turn": {"rotate": TURN["rotate"] | {"profile": "smooth"}}},
-            ],
-            ["the tool's turning rate jumps by 1 rad/rad"],
+            (
+                "[{turn: {rotate: {axis: [0, 0, 1], angle_deg: 90}}}, {turn: {rotate: {axis: [0, 0, 1], angle_deg: "
+                "90, profile: smooth}}}]"
+            ),
+            "the tool's turning rate jumps by 1 rad/rad",
         ),
         (
-            [{"turn": TURN}, RIGHT],
-            ["a stop: ", "Turn the tool along a segment, by its orientation"],
+            "[{turn: {rotate: {axis: [0, 0, 1], angle_deg: 90}}}, {line: {by: [1, 0, 0]}}]",
+            "a stop: .*Turn the tool along a segment, by its orientation",
         ),
-        ([RIGHT, {"turn": TURN}], ["a stop: ", "or set path[0].stop: true"]),
         (
-            [
-                {
-                    "arc": {"center": [0, 1, 0], "angle_deg": 90, "normal": [0, 0, 1]},
-                    "orientation": "tangent",
-                },
-                {"arc": {"center": [0, 1, 0], "angle_deg": 90, "normal": [0, 0, 1]}},
-            ],
-            ["the tool's turning rate jumps by 1 rad/m"],
+            "[{line: {by: [1, 0, 0]}}, {turn: {rotate: {axis: [0, 0, 1], angle_deg: 90}}}]",
+            r"a stop: .*or set path\[0\].stop: true",
+        ),
+        (
+            (
+                "[{arc: {center: [0, 1, 0], angle_deg: 90, normal: [0, 0, 1]}, orientation: tangent}, {arc: {center: "
+                "[0, 1, 0], angle_deg: 90, normal: [0, 0, 1]}}]"
+            ),
+            "the tool's turning rate jumps by 1 rad/m",
         ),
     ],
 )
-def test_what_jumps_at_a_join(segments, expected):
-    message = str(error_of(segments))
-    for text in expected:
-        assert text in message
+def test_the_error_says_what_jumps_at_a_join(segments, message):
+    assert re.search(message, str(error_of(yaml.safe_load(segments))))
 
 
 def test_a_blend_beside_a_turn_on_the_spot():

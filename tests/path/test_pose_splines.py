@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from support.poses import START, TURNED, pose_path, rotations
@@ -42,17 +43,17 @@ def at_waypoints(path):
 @pytest.mark.parametrize("count", [1, 2, 3, 6])
 def test_waypoints_are_passed(count):
     target = at_waypoints(through(count))
-    np.testing.assert_allclose(target[-count:, :3], POINTS[:count], atol=1e-12)
+    assert_allclose(target[-count:, :3], POINTS[:count], atol=1e-12)
     expected = np.stack([one.as_matrix().ravel() for one in ATTITUDES[: count + 1]])
-    np.testing.assert_allclose(target[:, 3:], expected, atol=1e-12)
+    assert_allclose(target[:, 3:], expected, atol=1e-12)
 
 
 def test_one_waypoint_is_a_line_with_a_uniform_turn():
     sample = through(1).sample(np.linspace(0, 1, 9))
-    np.testing.assert_allclose(
+    assert_allclose(
         sample.xi[:, 3:], np.broadcast_to(STEPS[0].as_rotvec(), (9, 3)), atol=1e-12
     )
-    np.testing.assert_allclose(
+    assert_allclose(
         np.linalg.norm(sample.xi[:, :3], axis=1), np.linalg.norm(POINTS[0] - START)
     )
 
@@ -80,9 +81,9 @@ def test_orientations_on_a_circle_are_close_to_it():
         np.linspace(0, 1, 100)
     )
     expected = np.broadcast_to([0, 1.5 * np.pi, 0, 0, 0, 1.5 * np.pi], (100, 6))
-    np.testing.assert_allclose(sample.xi, expected, atol=0.15)
+    assert_allclose(sample.xi, expected, atol=0.15)
     heading = np.unwrap(rotations(sample.target).as_rotvec()[:, 2])
-    np.testing.assert_allclose(
+    assert_allclose(
         np.unwrap(np.arctan2(sample.target[:, 1], sample.target[:, 0])),
         heading,
         atol=2e-3,
@@ -96,9 +97,7 @@ def test_relative_waypoints():
         [{"spline": {"through": shifts, "orientations": turned, "relative": True}}]
     )
     s = np.linspace(0, 1, 20)
-    np.testing.assert_allclose(
-        relative.sample(s).target, through(6).sample(s).target, atol=1e-12
-    )
+    assert_allclose(relative.sample(s).target, through(6).sample(s).target, atol=1e-12)
 
 
 def test_waypoints_relative_to_a_stated_start():
@@ -113,7 +112,7 @@ def test_waypoints_relative_to_a_stated_start():
     }
     s = np.linspace(0, 1, 20)
     moved = pose_path([{"spline": spline}]).sample(s).target
-    np.testing.assert_allclose(moved, through(6).sample(s).target, atol=1e-12)
+    assert_allclose(moved, through(6).sample(s).target, atol=1e-12)
 
 
 def test_a_stated_start_may_be_off_by_rounding():
@@ -123,9 +122,7 @@ def test_a_stated_start_may_be_off_by_rounding():
         starts_oriented=written(TURNED * Rotation.from_rotvec([0, 9e-5, 0])),
     )
     s = np.linspace(0, 1, 20)
-    np.testing.assert_allclose(
-        stated.sample(s).target, through(6).sample(s).target, atol=1e-12
-    )
+    assert_allclose(stated.sample(s).target, through(6).sample(s).target, atol=1e-12)
 
 
 def test_a_spline_on_the_spot():
@@ -134,19 +131,17 @@ def test_a_spline_on_the_spot():
         [{"spline": {"through": [START] * 6, "orientations": orientations}}]
     )
     target = at_waypoints(path)
-    np.testing.assert_allclose(
+    assert_allclose(
         target[:, 3:],
         np.stack([one.as_matrix().ravel() for one in ATTITUDES]),
         atol=1e-12,
     )
-    np.testing.assert_allclose(
-        target[:, :3], np.broadcast_to(START, (7, 3)), atol=1e-12
-    )
+    assert_allclose(target[:, :3], np.broadcast_to(START, (7, 3)), atol=1e-12)
     curve = path.pieces[0].curve
-    np.testing.assert_allclose(np.diff(curve.knots), STEPS.magnitude(), atol=1e-12)
+    assert_allclose(np.diff(curve.knots), STEPS.magnitude(), atol=1e-12)
     once = pose_path(
         [{"spline": {"through": [START], "orientations": orientations[:1]}}]
     ).sample([0.0, 1.0])
-    np.testing.assert_allclose(
+    assert_allclose(
         once.xi, np.broadcast_to([0, 0, 0, *STEPS[0].as_rotvec()], (2, 6)), atol=1e-12
     )

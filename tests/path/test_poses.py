@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from brachis.path import build_path
@@ -37,57 +39,158 @@ ATTITUDES = [
     {"quaternion_wxyz": [-0.5, 0.5, -0.5, -0.5]},
 ]
 
-SEGMENTS = {
-    "fixed": [ALONG],
-    "rotate": [ALONG | {"orientation": ROTATE}],
-    "rotate smoothly": [ALONG | {"orientation": SMOOTH}],
-    "rotate along an arc": [VIA | {"orientation": ROTATE}],
-    "rotate along a spline": [SPLINE | {"orientation": SMOOTH}],
-    "to": [ALONG | {"orientation": {"to": {"rpy_deg": [10, -80, 20]}}}],
-    "to, smoothly": [
-        ALONG
-        | {"orientation": {"to": {"rotation_vector": [2, 0, 1], "profile": "smooth"}}}
-    ],
-    "tangent of a circle": [CIRCLE | {"orientation": "tangent"}],
-    "tangent of an arc, other up": [
-        VIA | {"orientation": {"tangent": {"up": [1, 1, 1]}}}
-    ],
-    "tangent of a spline": [SPLINE | {"orientation": "tangent"}],
-    "orientations": [{"spline": SPLINE["spline"] | {"orientations": ATTITUDES}}],
-    "two orientations": [
-        {
-            "spline": {
-                "through": [[0.8, 0.1, 0.5], [1, 0.4, 0.3]],
-                "orientations": ATTITUDES[:2],
-            }
-        },
-    ],
-    "one orientation": [
-        {"spline": {"through": [[0.8, 0.1, 0.5]], "orientations": ATTITUDES[:1]}}
-    ],
-    "orientations on the spot": [
-        {"spline": {"through": [START] * 3, "orientations": ATTITUDES}}
-    ],
-    "turn": [{"turn": ROTATE}],
-    "turn to": [{"turn": {"to": {"rpy_deg": [10, -80, 20], "profile": "smooth"}}}],
-    "two turns": [
-        {"turn": SMOOTH},
-        {"turn": {"to": {"rpy_deg": [10, -80, 20], "profile": "smooth"}}},
-    ],
-    "blends": [
-        ALONG | {"orientation": ROTATE, "blend": 0.2},
-        {"line": {"by": [0, 0.8, 0.1]}, "blend": 0.2},
-        {
-            "line": {"by": [0, 0, 0.7]},
-            "orientation": {"to": {"rpy_deg": [10, 80, 20]}},
-            "blend": 0.2,
-        },
-        {
-            "spline": {"through": [[0.4, 0.2, 0.4], [0.9, 0, 0.5]], "relative": True},
-            "orientation": "tangent",
-        },
-    ],
-}
+SEGMENTS = yaml.safe_load("""
+fixed:
+- line:
+    by: [0.6, 0, 0.3]
+rotate:
+- line:
+    by: [0.6, 0, 0.3]
+  orientation:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+rotate smoothly:
+- line:
+    by: [0.6, 0, 0.3]
+  orientation:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+      frame: tool
+      profile: smooth
+rotate along an arc:
+- arc:
+    via: [0.7, 0.3, 0.3]
+    to: [0.9, 0.2, 0.5]
+  orientation:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+rotate along a spline:
+- spline:
+    through:
+    - [0.6, 0.3, 0.2]
+    - [0.9, 0.4, 0.4]
+    - [1.1, 0.8, 0.3]
+  orientation:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+      frame: tool
+      profile: smooth
+to:
+- line:
+    by: [0.6, 0, 0.3]
+  orientation:
+    to:
+      rpy_deg: [10, -80, 20]
+to, smoothly:
+- line:
+    by: [0.6, 0, 0.3]
+  orientation:
+    to:
+      rotation_vector: [2, 0, 1]
+      profile: smooth
+tangent of a circle:
+- circle:
+    center: [0.2, 0.1, 0.3]
+    normal: [0, 1, 1]
+    turns: -1.25
+  orientation: tangent
+tangent of an arc, other up:
+- arc:
+    via: [0.7, 0.3, 0.3]
+    to: [0.9, 0.2, 0.5]
+  orientation:
+    tangent:
+      up: [1, 1, 1]
+tangent of a spline:
+- spline:
+    through:
+    - [0.6, 0.3, 0.2]
+    - [0.9, 0.4, 0.4]
+    - [1.1, 0.8, 0.3]
+  orientation: tangent
+orientations:
+- spline:
+    through:
+    - [0.6, 0.3, 0.2]
+    - [0.9, 0.4, 0.4]
+    - [1.1, 0.8, 0.3]
+    orientations:
+    - rpy_deg: [20, 40, 60]
+    - rotation_vector: [0.2, 0.9, 1.5]
+    - quaternion_wxyz: [-0.5, 0.5, -0.5, -0.5]
+two orientations:
+- spline:
+    through:
+    - [0.8, 0.1, 0.5]
+    - [1, 0.4, 0.3]
+    orientations:
+    - rpy_deg: [20, 40, 60]
+    - rotation_vector: [0.2, 0.9, 1.5]
+one orientation:
+- spline:
+    through:
+    - [0.8, 0.1, 0.5]
+    orientations:
+    - rpy_deg: [20, 40, 60]
+orientations on the spot:
+- spline:
+    through:
+    - [0.5, 0.1, 0.3]
+    - [0.5, 0.1, 0.3]
+    - [0.5, 0.1, 0.3]
+    orientations:
+    - rpy_deg: [20, 40, 60]
+    - rotation_vector: [0.2, 0.9, 1.5]
+    - quaternion_wxyz: [-0.5, 0.5, -0.5, -0.5]
+turn:
+- turn:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+turn to:
+- turn:
+    to:
+      rpy_deg: [10, -80, 20]
+      profile: smooth
+two turns:
+- turn:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+      frame: tool
+      profile: smooth
+- turn:
+    to:
+      rpy_deg: [10, -80, 20]
+      profile: smooth
+blends:
+- line:
+    by: [0.6, 0, 0.3]
+  orientation:
+    rotate:
+      axis: [1, 2, -2]
+      angle_deg: 140
+  blend: 0.2
+- line:
+    by: [0, 0.8, 0.1]
+  blend: 0.2
+- line:
+    by: [0, 0, 0.7]
+  orientation:
+    to:
+      rpy_deg: [10, 80, 20]
+  blend: 0.2
+- spline:
+    through:
+    - [0.4, 0.2, 0.4]
+    - [0.9, 0, 0.5]
+    relative: true
+  orientation: tangent
+""")
 
 
 @pytest.fixture(params=SEGMENTS)
@@ -106,7 +209,7 @@ def test_the_twist_is_that_of_the_poses(path):
     exact = path.sample(s)
     assert exact.target.shape == (s.size, 12)
     assert exact.xi.shape == exact.xi_ds.shape == exact.xi_dds.shape == (s.size, 6)
-    np.testing.assert_allclose(
+    assert_allclose(
         twist_by_difference(path, s, h), exact.xi, atol=1e-8 * size(exact.xi)
     )
 
@@ -119,22 +222,18 @@ def test_derivatives_of_the_twist(path):
         difference = central_difference(
             lambda s, name=lower: getattr(path.sample(s), name), s, h
         )
-        np.testing.assert_allclose(
-            difference, exact, atol=1e-7 * size(exact), err_msg=upper
-        )
+        assert_allclose(difference, exact, atol=1e-7 * size(exact), err_msg=upper)
 
 
 def test_targets_are_poses(path):
     matrices = path.sample(np.linspace(0, 1, 50)).target[:, 3:].reshape(-1, 3, 3)
-    np.testing.assert_allclose(
+    assert_allclose(
         matrices @ np.swapaxes(matrices, 1, 2),
         np.broadcast_to(np.eye(3), (50, 3, 3)),
         atol=1e-12,
     )
-    np.testing.assert_allclose(np.linalg.det(matrices), 1.0)
-    np.testing.assert_allclose(
-        path.sample([0.0]).target[0], pose(START, TURNED), atol=1e-12
-    )
+    assert_allclose(np.linalg.det(matrices), 1.0)
+    assert_allclose(path.sample([0.0]).target[0], pose(START, TURNED), atol=1e-12)
 
 
 def one_sided(path):
@@ -164,9 +263,9 @@ def test_a_smooth_turn_joins_a_constant_orientation():
     assert len(path.pieces) == 3
     sample = path.sample(path.breaks)
     for what in (sample.xi, sample.xi_ds, sample.xi_dds):
-        np.testing.assert_allclose(what[:, 3:], 0.0, atol=1e-9)
+        assert_allclose(what[:, 3:], 0.0, atol=1e-9)
     turned = (TURNED.inv() * rotations(sample.target)).magnitude()
-    np.testing.assert_allclose(turned, np.deg2rad([0, 0, 140, 140]), atol=1e-12)
+    assert_allclose(turned, np.deg2rad([0, 0, 140, 140]), atol=1e-12)
 
 
 def test_the_same_uniform_turn_may_go_on():
@@ -189,16 +288,14 @@ def test_a_rotation_has_a_constant_angular_velocity(frame):
         np.linspace(0, 1, 30)
     )
     in_tool = TURNED.inv().apply(axis) if frame == "path" else axis
-    np.testing.assert_allclose(
+    assert_allclose(
         sample.xi[:, 3:],
         np.broadcast_to(-np.deg2rad(400) * in_tool, (30, 3)),
         atol=1e-12,
     )
     turned = Rotation.from_rotvec(-np.deg2rad(400) * axis)
     expected = turned * TURNED if frame == "path" else TURNED * turned
-    np.testing.assert_allclose(
-        sample.target[-1, 3:], expected.as_matrix().ravel(), atol=1e-12
-    )
+    assert_allclose(sample.target[-1, 3:], expected.as_matrix().ravel(), atol=1e-12)
 
 
 @pytest.mark.parametrize("profile", ["uniform", "smooth"])
@@ -215,14 +312,14 @@ def test_to_ends_there_by_the_shortest_way(profile):
     whole = (TURNED.inv() * target).as_rotvec()
     assert np.linalg.norm(whole) < np.pi
     share = s if profile == "uniform" else 35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7
-    np.testing.assert_allclose(turned, share[:, None] * whole, atol=1e-12)
+    assert_allclose(turned, share[:, None] * whole, atol=1e-12)
 
 
 def test_to_where_the_tool_is_already():
     sample = pose_path(
         [ALONG | {"orientation": {"to": {"rotation_vector": [0.3, -0.5, 0.8]}}}]
     ).sample([0.0, 0.5, 1.0])
-    np.testing.assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
+    assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
 
 
 def test_along_the_tangent_the_tool_keeps_to_the_velocity_and_has_no_roll():
@@ -234,24 +331,22 @@ def test_along_the_tangent_the_tool_keeps_to_the_velocity_and_has_no_roll():
     for in_tool in (sample.xi[:, :3], level):
         direction = in_tool / np.linalg.norm(in_tool, axis=1)[:, None]
         same = np.broadcast_to(direction[0], (50, 3))
-        np.testing.assert_allclose(direction, same, atol=1e-12)
+        assert_allclose(direction, same, atol=1e-12)
     assert np.ptp(tangent[:, 2]) > 0.1
 
 
 def test_a_line_along_its_tangent_does_not_turn():
     sample = pose_path([ALONG | {"orientation": "tangent"}]).sample([0.0, 0.5, 1.0])
-    np.testing.assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
+    assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
 
 
 def test_a_turn_moves_nothing_but_the_orientation():
     path = pose_path([{"turn": ROTATE}, {"turn": ROTATE}])
     sample = path.sample(np.linspace(0, 1, 9))
     assert path.length == 0.0
-    np.testing.assert_array_equal(sample.target[:, :3], np.broadcast_to(START, (9, 3)))
-    np.testing.assert_array_equal(sample.xi[:, :3], 0.0)
-    np.testing.assert_allclose(
-        np.linalg.norm(sample.xi[:, 3:], axis=1), np.deg2rad(280)
-    )
+    assert_array_equal(sample.target[:, :3], np.broadcast_to(START, (9, 3)))
+    assert_array_equal(sample.xi[:, :3], 0.0)
+    assert_allclose(np.linalg.norm(sample.xi[:, 3:], axis=1), np.deg2rad(280))
 
 
 def test_positions_are_those_of_the_task_space_of_positions():
@@ -262,7 +357,7 @@ def test_positions_are_those_of_the_task_space_of_positions():
     ]
     alone = pose_path(plain)
     s = np.linspace(0, 1, 50)
-    np.testing.assert_allclose(
+    assert_allclose(
         poses.sample(s).target[:, :3], alone.sample(s).target[:, :3], atol=1e-12
     )
     assert poses.length == pytest.approx(alone.length)
@@ -281,7 +376,7 @@ def test_a_blend_of_a_turn_that_goes_on_keeps_close_to_it():
     turned = np.unwrap(
         (rotations(path.sample(s).target) * TURNED.inv()).as_rotvec()[:, 2]
     )
-    np.testing.assert_allclose(turned, np.deg2rad(1000) * s, atol=0.1)
+    assert_allclose(turned, np.deg2rad(1000) * s, atol=0.1)
 
 
 def path_in_frames(world, shift, tool):
@@ -310,9 +405,9 @@ def test_blends_and_splines_do_not_depend_on_the_frames(seed):
     here = path_in_frames(same, np.zeros(3), same).sample(s).target
     there = path_in_frames(world, shift, tool).sample(s).target
     expected = world.apply(here[:, :3]) + shift
-    np.testing.assert_allclose(there[:, :3], expected, atol=1e-9)
+    assert_allclose(there[:, :3], expected, atol=1e-9)
     turned = (world * rotations(here) * tool).as_matrix()
-    np.testing.assert_allclose(there[:, 3:], turned.reshape(-1, 9), atol=1e-9)
+    assert_allclose(there[:, 3:], turned.reshape(-1, 9), atol=1e-9)
 
 
 def test_the_start_is_freed_of_rounding():
@@ -321,8 +416,8 @@ def test_the_start_is_freed_of_rounding():
     path = build_path(segments, rounded, POSE_ROWS)
     target = path.sample([0.0]).target[0]
     matrix = target[3:].reshape(3, 3)
-    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-15)
-    np.testing.assert_allclose(target, rounded, atol=1e-6)
+    assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-15)
+    assert_allclose(target, rounded, atol=1e-6)
 
 
 def test_nan_stays_nan_and_the_path_continues_beyond_its_ends(path):
@@ -330,6 +425,6 @@ def test_nan_stays_nan_and_the_path_continues_beyond_its_ends(path):
     assert np.all(np.isnan(sample.target[1, :3]))
     assert not np.any(np.isnan(sample.xi_dds[0]))
     outside = path.sample([-1e-7, 0.0, 1.0, 1.0 + 1e-7])
-    np.testing.assert_allclose(
+    assert_allclose(
         np.diff(outside.xi, axis=0)[[0, 2]], 0.0, atol=1e-4 * size(outside.xi)
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import PathError
 from brachis.path import build_path
@@ -29,7 +30,7 @@ def path_of(segments, space="position", frame=None):
 
 def test_a_path_has_corners_at_its_stops_alone():
     path = path_of([{**RIGHT, "stop": True}, {**UP, "dwell": 0.5}, RIGHT])
-    np.testing.assert_allclose(path.stops, [3 / 7, 4 / 7], atol=1e-15)
+    assert_allclose(path.stops, [3 / 7, 4 / 7], atol=1e-15)
     assert len(path_of([RIGHT, RIGHT]).stops) == 0
     with pytest.raises(PathError, match=r"path\[1\].blend .* or path\[1\].stop: true"):
         path_of([{**RIGHT, "stop": True}, UP, RIGHT])
@@ -41,7 +42,7 @@ def test_the_tool_turns_on_the_spot_at_a_stop():
     path = path_of([{**RIGHT, "stop": True}, {**TURN, "stop": True}, UP], "pose")
     assert len(path.stops) == 2
     sample = path.sample(path.stops)
-    np.testing.assert_allclose(sample.target[:, :3], [[0.8, 0, 0.4]] * 2, atol=1e-15)
+    assert_allclose(sample.target[:, :3], [[0.8, 0, 0.4]] * 2, atol=1e-15)
     assert np.abs(sample.xi[0, :3]).max() < 1e-12
     assert np.abs(sample.xi[1, 3:]).max() < 1e-12
 
@@ -64,14 +65,14 @@ def test_a_part_of_a_path_is_the_path(space, frame):
     part = path.between(begin, end)
     assert part.breaks[[0, -1]].tolist() == [begin, end]
     inside = (path.knots > begin) & (path.knots < end)
-    np.testing.assert_array_equal(part.knots[1:-1], path.knots[inside])
-    np.testing.assert_array_equal(part.stops, path.stops)
+    assert_array_equal(part.knots[1:-1], path.knots[inside])
+    assert_array_equal(part.stops, path.stops)
     s = np.linspace(begin, end, 1000)
     one, other = path.sample(s), part.sample(s)
     for name in ("target", "xi", "xi_ds", "xi_dds"):
         expected = getattr(one, name)
         off = 1e-11 * np.abs(expected).max()
-        np.testing.assert_allclose(getattr(other, name), expected, atol=off)
+        assert_allclose(getattr(other, name), expected, atol=off)
 
 
 def test_a_part_goes_on_as_it_begins_and_ends():
@@ -79,11 +80,11 @@ def test_a_part_goes_on_as_it_begins_and_ends():
     first, last = path.stops
     middle = path.between(first, last)
     sample = middle.sample([first, last, first - 0.1, last + 0.1])
-    np.testing.assert_allclose(sample.xi, [[0.0, 0.0, 0.7]] * 4, atol=1e-12)
-    np.testing.assert_allclose(sample.target[2:, 2], [0.4 - 0.07, 0.5 + 0.07])
+    assert_allclose(sample.xi, [[0.0, 0.0, 0.7]] * 4, atol=1e-12)
+    assert_allclose(sample.target[2:, 2], [0.4 - 0.07, 0.5 + 0.07])
     assert len(middle.stops) == 0
     assert middle.length == pytest.approx(0.1)
     # The path itself has the side behind the stop.
-    np.testing.assert_allclose(path.sample([last]).xi, [[0.7, 0.0, 0.0]], atol=1e-12)
+    assert_allclose(path.sample([last]).xi, [[0.7, 0.0, 0.0]], atol=1e-12)
     before = path.between(0.0, first).sample([first]).xi
-    np.testing.assert_allclose(before, [[0.7, 0.0, 0.0]], atol=1e-12)
+    assert_allclose(before, [[0.7, 0.0, 0.0]], atol=1e-12)

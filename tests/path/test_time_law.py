@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import PathError
@@ -40,10 +41,10 @@ def test_it_is_linear_on_lines_and_circles(segment, length):
     assert law.spline.k == 1
     assert law.duration == pytest.approx(0.5 * length / 0.1, rel=1e-12)
     s, *rates = law.at(np.linspace(0.0, law.duration, 5))
-    np.testing.assert_allclose(s, np.linspace(0.2, 0.7, 5), atol=1e-14)
-    np.testing.assert_allclose(rates[0], 0.1 / length, rtol=1e-12)
+    assert_allclose(s, np.linspace(0.2, 0.7, 5), atol=1e-14)
+    assert_allclose(rates[0], 0.1 / length, rtol=1e-12)
     assert np.abs(rates[1:]).max() == 0.0
-    np.testing.assert_allclose(law.ends[-1], [0.7, 0.1 / length, 0, 0], rtol=1e-12)
+    assert_allclose(law.ends[-1], [0.7, 0.1 / length, 0, 0], rtol=1e-12)
 
 
 def test_a_free_leg_has_none():
@@ -94,7 +95,7 @@ def test_derivatives_equal_differences_and_continue(case):
     slopes = (after - before)[:3] / (2.0 * h)
     for order in range(3):
         size = np.abs(now[order + 1]).max()
-        np.testing.assert_allclose(slopes[order], now[order + 1], atol=2e-4 * size)
+        assert_allclose(slopes[order], now[order + 1], atol=2e-4 * size)
     knots = np.unique(law.spline.t)[1:-1]
     tiny = 1e-12 * law.duration
     jump = np.abs(law.at(knots + tiny) - law.at(knots - tiny)).max(axis=1)
@@ -142,6 +143,6 @@ def test_its_ends_are_exact(case):
             slope * rate[2],
             (bend * rate[2] + slope**2) * rate[2],
         ]
-        np.testing.assert_allclose(law.ends[end], expected, rtol=1e-4, atol=1e-6)
+        assert_allclose(law.ends[end], expected, rtol=1e-4, atol=1e-6)
         spline = law.at(np.array([0.0, law.duration]))[:, end]
-        np.testing.assert_allclose(law.ends[end], spline, rtol=1e-5, atol=1e-6)
+        assert_allclose(law.ends[end], spline, rtol=1e-5, atol=1e-6)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 import brachis
@@ -491,39 +492,42 @@ def test_a_robot_in_mm_is_told_before_its_posture_fails():
     ("limits", "told_of", "sound"),
     [
         (
-            {"torque": 320000.0},
+            "torque: 320000.0",
             "torque.joint_1: the torque limit looks like mNm",
-            {"torque": 320.0},
+            "torque: 320.0",
         ),
         (
-            {"torque": 10000.0},
+            "torque: 10000.0",
             "torque.joint_6: the torque limit looks like mNm",
-            {"torque": 1000.0},
+            "torque: 1000.0",
         ),
         (
-            {"velocity": 50.0},
+            "velocity: 50.0",
             "velocity.joint_1: the velocity limit looks like degrees",
-            {"velocity": 10.0},
+            "velocity: 10.0",
         ),
         (
-            {"acceleration": 573.0},
+            "acceleration: 573.0",
             "acceleration.joint_1: the acceleration limit looks like",
-            {"acceleration": 50.0},
+            "acceleration: 50.0",
         ),
         (
-            {"position": {"joint_1": [-45.0, 45.0]}},
+            "position: {joint_1: [-45.0, 45.0]}",
             "position.joint_1: the position range looks like degrees",
-            {"position": {"joint_1": [-6.0, 6.0]}},
+            "position: {joint_1: [-6.0, 6.0]}",
         ),
         (
-            {"torque_speed": {"joint_1": [[0, 320], [10, 320], [20, 0]]}},
-            "torque_speed.joint_1: the last speed of the curve looks like rpm; found 20 rad/s; usual: below 7.42 rad/s",
-            {"torque_speed": {"joint_1": [[0, 320], [1, 320], [2, 0]]}},
+            "torque_speed: {joint_1: [[0, 320], [10, 320], [20, 0]]}",
+            (
+                "torque_speed.joint_1: the last speed of the curve looks like rpm; found 20 rad/s; usual: below 7.42 "
+                "rad/s"
+            ),
+            "torque_speed: {joint_1: [[0, 320], [1, 320], [2, 0]]}",
         ),
         (
-            {"torque_speed": {"joint_1": [[0, 320000], [2, 0]]}},
+            "torque_speed: {joint_1: [[0, 320000], [2, 0]]}",
             "torque_speed.joint_1: the torque of the curve looks like mNm",
-            {"torque_speed": {"joint_1": [[0, 600], [2, 0]]}},
+            "torque_speed: {joint_1: [[0, 600], [2, 0]]}",
         ),
     ],
 )
@@ -531,9 +535,9 @@ def test_limits_beside_those_of_the_urdf(limits, told_of, sound):
     robot = brachis.robots.iiwa14
     assert any(
         str(remark).startswith(f"robot.limits.{told_of}")
-        for remark in of_robot(robot.with_limits(**limits))
+        for remark in of_robot(robot.with_limits(**yaml.safe_load(limits)))
     )
-    assert of_robot(robot.with_limits(**sound)) == ()
+    assert of_robot(robot.with_limits(**yaml.safe_load(sound))) == ()
 
 
 @pytest.mark.parametrize(

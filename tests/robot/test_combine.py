@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from numpy.testing import assert_array_equal
 
 import brachis
 from brachis.errors import InputError, TaskError
@@ -39,20 +41,6 @@ def line(**robot):
     }
 
 
-def test_limits_that_a_task_scales_hold_for_a_given_robot():
-    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    task["robot"]["limits"]["scale"]["velocity"] = 0.5
-    task |= {"spline": {"intervals": 10}, "search": {"effort": "single"}}
-    from_file = brachis.plan(task)
-    given = brachis.plan(Robot.from_urdf(RAIL), task)
-    assert given.t_end == pytest.approx(from_file.t_end, rel=1e-6)
-    assert given.t_end > 0.5  # 0.427 s without the scale
-    assert brachis.plan(given.task).t_end == pytest.approx(given.t_end, rel=1e-6)
-    assert brachis.plan(Robot.from_urdf(RAIL), given.task).t_end == pytest.approx(
-        given.t_end, rel=1e-6
-    )
-
-
 def test_every_part_of_the_task_counts():
     settings = asked(
         gravity=[0, -9.81, 0],
@@ -74,10 +62,10 @@ def test_every_part_of_the_task_counts():
     alone = robot_for(SCARA, settings)
     assert made.settings == alone.settings
     assert made.model == alone.model
-    np.testing.assert_array_equal(made.limits.torque, 3.5)
+    assert_array_equal(made.limits.torque, 3.5)
     for part in ("limits", "friction"):
         for name, values in vars(getattr(alone, part)).items():
-            np.testing.assert_array_equal(getattr(getattr(made, part), name), values)
+            assert_array_equal(getattr(getattr(made, part), name), values)
 
 
 def test_frames_and_locked_joints_of_the_task_count():
@@ -111,9 +99,7 @@ def test_a_robot_stays_as_it_is_where_the_task_adds_nothing():
 def test_limits_are_combined_joint_by_joint():
     robot = scara({"j1": 5.0})
     made = robot_for(robot, asked(limits={"torque": {"j2": 6}}))
-    np.testing.assert_array_equal(
-        made.limits.torque, [5.0, 6.0, robot.limits.torque[2]]
-    )
+    assert_array_equal(made.limits.torque, [5.0, 6.0, robot.limits.torque[2]])
     assert made.settings.limits.torque == {"j1": 5.0, "j2": 6.0}
     assert np.isinf(made.limits.velocity).all()
 
@@ -121,14 +107,14 @@ def test_limits_are_combined_joint_by_joint():
 @pytest.mark.parametrize(
     ("settings", "key"),
     [
-        ({"gravity": [0, 0, -1.6]}, "robot.gravity"),
-        ({"tool_frame": "link2"}, "robot.tool_frame"),
-        ({"limits": {"torque": {"j2": 20}}}, "robot.limits.torque.j2"),
-        ({"limits": {"torque": 20}}, "robot.limits.torque.j1"),
-        ({"limits": {"velocity": 20}}, "robot.limits.velocity.j1"),
-        ({"limits": {"scale": {"torque": 0.5}}}, "robot.limits.scale.torque"),
-        ({"friction": {"coulomb": {"j3": 1.0}}}, "robot.friction.coulomb.j3"),
-        ({"locked_joints": {"j3": 0.5}}, "robot.locked_joints.j3"),
+        ("gravity: [0, 0, -1.6]", "robot.gravity"),
+        ("tool_frame: link2", "robot.tool_frame"),
+        ("limits: {torque: {j2: 20}}", "robot.limits.torque.j2"),
+        ("limits: {torque: 20}", "robot.limits.torque.j1"),
+        ("limits: {velocity: 20}", "robot.limits.velocity.j1"),
+        ("limits: {scale: {torque: 0.5}}", "robot.limits.scale.torque"),
+        ("friction: {coulomb: {j3: 1.0}}", "robot.friction.coulomb.j3"),
+        ("locked_joints: {j3: 0.5}", "robot.locked_joints.j3"),
     ],
 )
 def test_a_contradiction_is_refused_with_its_key(settings, key):
@@ -141,7 +127,7 @@ def test_a_contradiction_is_refused_with_its_key(settings, key):
         "robot.locked_joints.j3": {"locked_joints": {"j3": 0.4}},
     }
     with pytest.raises(TaskError, match="contradict") as caught:
-        robot_for(scara(**options.get(key, {})), asked(**settings))
+        robot_for(scara(**options.get(key, {})), asked(**yaml.safe_load(settings)))
     assert caught.value.where == key
 
 
@@ -186,8 +172,8 @@ def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():
         result.t_end, rel=1e-6
     )
     made = robot_for(weak, asked(limits={"acceleration": 50}))
-    np.testing.assert_array_equal(made.limits.torque, [4.0, 5.0, 90.0])
-    np.testing.assert_array_equal(made.limits.acceleration, 50.0)
+    assert_array_equal(made.limits.torque, [4.0, 5.0, 90.0])
+    assert_array_equal(made.limits.acceleration, 50.0)
     with pytest.raises(TaskError, match="contradict") as caught:
         robot_for(weak, asked(limits={"torque": 10}))
     assert caught.value.where == "robot.limits.torque.j1"
@@ -199,8 +185,8 @@ def test_replaced_friction_is_kept():
         robot, friction=replace(robot.friction, viscous=np.array([1.0, 0.0, 2.0]))
     )
     made = robot_for(stiff, asked(limits={"acceleration": 50}))
-    np.testing.assert_array_equal(made.friction.viscous, [1.0, 0.0, 2.0])
-    np.testing.assert_array_equal(made.friction.v_eps, 0.01)
+    assert_array_equal(made.friction.viscous, [1.0, 0.0, 2.0])
+    assert_array_equal(made.friction.v_eps, 0.01)
 
 
 def test_a_changed_model_is_not_lost():
@@ -226,4 +212,4 @@ def test_transcribe_combines_as_well():
         line(gravity=[0, 0, 0], limits={"torque": 3, "velocity": None})
     )
     problem, _ = brachis.transcribe(Robot.from_urdf(SCARA), task)
-    np.testing.assert_array_equal(problem.phases[0].joint_map.robot.limits.torque, 3.0)
+    assert_array_equal(problem.phases[0].joint_map.robot.limits.torque, 3.0)

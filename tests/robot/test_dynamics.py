@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import InputError
 from brachis.robot import Robot, dynamics
@@ -73,19 +74,17 @@ def test_scara_joint_names_and_forward_kinematics(scara_urdf):
     assert robot.joint_names == ("j1", "j2", "j3")
     assert robot.tool_frame == "tool"
     assert np.all(np.isinf(robot.limits.position_upper))
-    np.testing.assert_array_equal(robot.limits.torque, [10.0] * 3)
+    assert_array_equal(robot.limits.torque, [10.0] * 3)
     for q in np.random.default_rng(0).uniform(-7.0, 7.0, (20, 3)):
         theta = np.cumsum(q)
         placement = robot.tool_placement(q)
-        np.testing.assert_allclose(
+        assert_allclose(
             placement.translation,
             [np.cos(theta).sum(), np.sin(theta).sum(), 0.0],
             atol=1e-14,
         )
         tool = placement.rotation[:, 0]
-        np.testing.assert_allclose(
-            tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14
-        )
+        assert_allclose(tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14)
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
@@ -96,11 +95,9 @@ def test_scara_is_three_slender_rods(scara_urdf, gravity):
     expected = np.array(
         [RodArm.torque(*state, gravity) for state in zip(q, qdot, qddot, strict=True)]
     )
-    np.testing.assert_allclose(
-        dynamics.torque(robot, q, qdot, qddot), expected, atol=1e-6
-    )
+    assert_allclose(dynamics.torque(robot, q, qdot, qddot), expected, atol=1e-6)
     matrices = np.array([RodArm.mass_matrix(posture) for posture in q])
-    np.testing.assert_allclose(exact.qddot, matrices, atol=1e-12)
+    assert_allclose(exact.qddot, matrices, atol=1e-12)
 
 
 def test_friction_formula():
@@ -113,7 +110,7 @@ def test_friction_formula():
     added = dynamics.torque(robot, q, qdot, qddot) - dynamics.torque(
         rigid, q, qdot, qddot
     )
-    np.testing.assert_allclose(added, expected, atol=1e-12)
+    assert_allclose(added, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -133,7 +130,7 @@ def test_derivatives_against_central_differences(pattern, plane):
                 moved[place] = state[place] + sign * h * np.eye(3)[joint]
                 sides.append(dynamics.torque(robot, *moved))
             difference = (sides[0] - sides[1]) / (2.0 * h)
-            np.testing.assert_allclose(
+            assert_allclose(
                 block[:, :, joint], difference, atol=2e-8 * np.abs(block).max()
             )
 
@@ -145,7 +142,7 @@ def test_coulomb_derivative_is_finite_far_from_rest():
     by_qdot = dynamics.torque_derivatives(robot, q, fast, qddot).qdot
     without = dynamics.torque_derivatives(planar_robot("RRR"), q, fast, qddot).qdot
     assert np.all(np.isfinite(by_qdot))
-    np.testing.assert_allclose(by_qdot, without, atol=1e-12)
+    assert_allclose(by_qdot, without, atol=1e-12)
 
 
 def test_one_joint_alone():
@@ -156,10 +153,8 @@ def test_one_joint_alone():
         ),
     )
     q, qdot, qddot = states(1)
-    np.testing.assert_allclose(
-        dynamics.torque(robot, q, qdot, qddot), 2.0 * qddot, atol=1e-12
-    )
-    np.testing.assert_allclose(
+    assert_allclose(dynamics.torque(robot, q, qdot, qddot), 2.0 * qddot, atol=1e-12)
+    assert_allclose(
         dynamics.torque_derivatives(robot, q, qdot, qddot).qddot,
         np.full((12, 1, 1), 2.0),
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis import LimitSpec
 from brachis.errors import InputError, LimitError, TaskError, UnknownNameError
@@ -43,9 +44,7 @@ def with_limit(limits=None, **changes):
     ids=str,
 )
 def test_forms_of_a_limit(value, expected):
-    np.testing.assert_array_equal(
-        limits_of(torque=value, acceleration=9.0).torque, expected
-    )
+    assert_array_equal(limits_of(torque=value, acceleration=9.0).torque, expected)
 
 
 @pytest.mark.parametrize(
@@ -62,8 +61,8 @@ def test_forms_of_a_limit(value, expected):
 )
 def test_forms_of_a_range(value, lower, upper):
     limits = limits_of(position=value)
-    np.testing.assert_array_equal(limits.position_lower, lower)
-    np.testing.assert_array_equal(limits.position_upper, upper)
+    assert_array_equal(limits.position_lower, lower)
+    assert_array_equal(limits.position_upper, upper)
 
 
 def test_scale_comes_last():
@@ -72,10 +71,10 @@ def test_scale_comes_last():
         acceleration=4.0,
         scale={"torque": 0.5, "velocity": 0.1, "acceleration": 0.25},
     )
-    np.testing.assert_allclose(limits.torque, 5.0)
-    np.testing.assert_allclose(limits.velocity, [0.3, 0.31, 0.32])
-    np.testing.assert_allclose(limits.acceleration, 1.0)
-    np.testing.assert_array_equal(
+    assert_allclose(limits.torque, 5.0)
+    assert_allclose(limits.velocity, [0.3, 0.31, 0.32])
+    assert_allclose(limits.acceleration, 1.0)
+    assert_array_equal(
         limits_of(torque=None, acceleration=1.0, scale={"torque": 0.5}).torque,
         [INF] * 3,
     )
@@ -115,7 +114,7 @@ def test_what_a_program_says_of_limits_is_what_a_task_keeps():
     )
     again = robot_from_settings(robot.settings, urdf_text=robot.urdf)
     assert again.settings.limits == robot.settings.limits
-    np.testing.assert_array_equal(again.limits.torque, robot.limits.torque)
+    assert_array_equal(again.limits.torque, robot.limits.torque)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +129,7 @@ def test_what_a_task_could_not_keep_is_refused(wrong):
 
 def test_infinite_figures_in_lists_leave_limits_open():
     free = limits_of(velocity=[1.0, np.inf, None])
-    np.testing.assert_array_equal(free.velocity, [1.0, np.inf, np.inf])
+    assert_array_equal(free.velocity, [1.0, np.inf, np.inf])
 
 
 def test_a_limit_that_scaling_would_mend_is_refused():
@@ -220,8 +219,8 @@ def test_limits_at_the_bounds_are_taken():
     limits = limits_of(
         velocity=1e-6, torque=1e12, position={"j1": [-1e6, 1e6], "j2": [0.2, None]}
     )
-    np.testing.assert_array_equal(limits.velocity, 1e-6)
-    np.testing.assert_array_equal(limits.torque, 1e12)
+    assert_array_equal(limits.velocity, 1e-6)
+    assert_array_equal(limits.torque, 1e12)
     assert limits.position_upper[1] == INF
 
 
@@ -286,13 +285,11 @@ def test_pairs_of_limits(value, lower, upper):
     robot = planar_robot(
         "RRR", limits=LimitSpec(torque=value, acceleration=9.0, scale={"torque": 0.5})
     )
-    np.testing.assert_array_equal(robot.limits.torque_lower, 0.5 * np.array(lower))
-    np.testing.assert_array_equal(robot.limits.torque_upper, 0.5 * np.array(upper))
-    np.testing.assert_array_equal(
-        robot.limits.torque, 0.5 * np.minimum(upper, -np.array(lower))
-    )
+    assert_array_equal(robot.limits.torque_lower, 0.5 * np.array(lower))
+    assert_array_equal(robot.limits.torque_upper, 0.5 * np.array(upper))
+    assert_array_equal(robot.limits.torque, 0.5 * np.minimum(upper, -np.array(lower)))
     again = robot_from_settings(robot.settings, urdf_text=robot.urdf)
-    np.testing.assert_array_equal(again.limits.torque_lower, robot.limits.torque_lower)
+    assert_array_equal(again.limits.torque_lower, robot.limits.torque_lower)
 
 
 @pytest.mark.parametrize(

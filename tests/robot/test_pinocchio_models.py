@@ -1,8 +1,5 @@
 """Robots from models of Pinocchio; the model itself says what is right."""
 
-import sys
-from types import ModuleType
-
 import coal
 import numpy as np
 import pinocchio as pin
@@ -206,48 +203,3 @@ def test_solids_are_taken_over(tmp_path):
         UrdfError, match=r"geometry: floor: .*found halfspace; allowed: a box"
     ):
         brachis.Robot.from_pinocchio(model, geometry=geometry)
-
-
-def load_robot_description(name):
-    """Load a description as ``robot_descriptions.loaders.pinocchio`` does."""
-    description = sys.modules[f"robot_descriptions.{name}"]
-    folders = [description.PACKAGE_PATH, description.REPOSITORY_PATH]
-    return pin.RobotWrapper.BuildFromURDF(description.URDF_PATH, folders)
-
-
-def test_robot_descriptions(tmp_path, monkeypatch):
-    """A module has the shape that those of robot_descriptions have; they clone repositories when imported."""
-    package = tmp_path / "repository" / "tx90_description"
-    (package / "urdf").mkdir(parents=True)
-    text = brachis.robots.path_of("tx90l_rail").read_text()
-    mesh = "package://tx90_description/meshes/link.obj"
-    text = text.replace(
-        '<box size="0.2 4.4 0.1"/>', f'<mesh filename="{mesh}" scale="0.01 0.01 0.01"/>'
-    )
-    assert mesh in text
-    (package / "meshes").mkdir()
-    (package / "meshes/link.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
-    )
-    (package / "urdf/robot.urdf").write_text(text)
-    description = ModuleType("robot_descriptions.tx90_description")
-    description.REPOSITORY_PATH = str(package.parent)
-    description.PACKAGE_PATH = str(package)
-    description.URDF_PATH = str(package / "urdf/robot.urdf")
-    monkeypatch.setitem(sys.modules, description.__name__, description)
-    task = brachis.load_task(brachis.examples.tx90l_rail_line).to_dict()
-    del task["robot"]
-    task["collisions"] = {"mode": "check"}
-    wrapper = load_robot_description("tx90_description")
-    robots = (
-        brachis.Robot.from_urdf(description.URDF_PATH),
-        brachis.Robot.from_pinocchio(wrapper.model, geometry=wrapper.collision_model),
-    )
-    ends = []
-    for robot in robots:
-        result = brachis.plan(
-            robot, task, redundant_joints=["rail"], effort="single", intervals=10
-        )
-        assert result.verified
-        ends.append(result.t_end)
-    assert ends[1] == pytest.approx(ends[0], rel=1e-9)

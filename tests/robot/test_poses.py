@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import InputError
 from brachis.robot import Robot, bind, dynamics, task_map_of
@@ -19,8 +20,8 @@ def test_a_pose_has_six_rows_and_twelve_coordinates():
     placement = robot.tool_placement(np.array(START))
     value = space.value(np.array(START))
     assert value.shape == (12,)
-    np.testing.assert_array_equal(value[:3], placement.translation)
-    np.testing.assert_array_equal(value[3:].reshape(3, 3), placement.rotation)
+    assert_array_equal(value[:3], placement.translation)
+    assert_array_equal(value[3:].reshape(3, 3), placement.rotation)
     assert isinstance(task_map_of(robot, space.rows), Pose)
 
 
@@ -36,7 +37,7 @@ def test_difference_of_poses_is_the_displacement_in_the_second_ones_frame():
         shift, turn = size * rng.normal(size=3), size * rng.normal(size=3) / 2.0
         moved = pose * pin.SE3(pin.exp3(turn), shift)
         found = space.difference(coordinates(moved), coordinates(pose))
-        np.testing.assert_allclose(
+        assert_allclose(
             found, np.append(shift, turn), atol=1e-14 if size < 1.0 else 1e-12
         )
 
@@ -67,8 +68,8 @@ def test_the_virtual_joint_has_no_inertia_and_no_limits():
     rng = np.random.default_rng(3)
     q, qdot, qddot = rng.normal(size=(3, 5, robot.n))
     tau = dynamics.torque(robot, q, qdot, qddot)
-    np.testing.assert_allclose(tau[:, -1], 0.0, atol=1e-12)
-    np.testing.assert_allclose(
+    assert_allclose(tau[:, -1], 0.0, atol=1e-12)
+    assert_allclose(
         tau[:, :-1],
         dynamics.torque(fixed, q[:, :-1], qdot[:, :-1], qddot[:, :-1]),
         rtol=1e-12,
@@ -88,10 +89,10 @@ def test_the_virtual_joint_has_no_inertia_and_no_limits():
 
 def test_a_posture_may_leave_the_virtual_joint_out():
     robot = bind(rail_arm(), "pose_free_roll")[0]
-    np.testing.assert_array_equal(robot.posture(list(START), "start"), [*START, 0.0])
+    assert_array_equal(robot.posture(list(START), "start"), [*START, 0.0])
     named = dict(zip(robot.joint_names, START, strict=False))
-    np.testing.assert_array_equal(robot.posture(named, "start"), [*START, 0.0])
-    np.testing.assert_array_equal(robot.posture([*START, 0.4], "start"), [*START, 0.4])
+    assert_array_equal(robot.posture(named, "start"), [*START, 0.0])
+    assert_array_equal(robot.posture([*START, 0.4], "start"), [*START, 0.4])
     with pytest.raises(InputError):
         robot.posture(list(START[:-1]), "start")
 

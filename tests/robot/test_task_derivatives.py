@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.robot import bind, task_map_of
 from support.chains import gantry_robot, planar_robot
@@ -52,7 +53,7 @@ def test_jacobian(pattern, plane, rows):
     task_map, q, _, _ = case(pattern, plane, rows)
     exact = jacobian_at(task_map, q)
     assert exact.shape == (len(q), len(rows), len(pattern))
-    np.testing.assert_allclose(exact, by_joint(task_map.values, q), atol=1e-9)
+    assert_allclose(exact, by_joint(task_map.values, q), atol=1e-9)
 
 
 @pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
@@ -62,7 +63,7 @@ def test_bias_is_the_acceleration_at_constant_joint_velocity(pattern, plane, row
     values = [task_map.values(q + t * qdot) for t in (-h, 0.0, h)]
     expected = (values[0] - 2.0 * values[1] + values[2]) / h**2
     assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(bias_at(task_map, q, qdot), expected, atol=1e-5)
+    assert_allclose(bias_at(task_map, q, qdot), expected, atol=1e-5)
 
 
 def check_derivatives(task_map, q, qdot, qddot):
@@ -76,11 +77,11 @@ def check_derivatives(task_map, q, qdot, qddot):
         return np.einsum("kmn,kn->km", jacobian_at(task_map, posture), qddot) + bias
 
     exact = task_map.derivatives(task_map.twists(q), qdot, qddot)
-    np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
-    np.testing.assert_allclose(
+    assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
+    assert_allclose(
         exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7
     )
-    np.testing.assert_allclose(
+    assert_allclose(
         exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7
     )
     assert (
@@ -106,10 +107,10 @@ def test_one_joint_alone():
     robot = gantry_robot([(0.6, 0.0, 0.8)])
     task_map = task_map_of(robot, ["x"])
     q = np.array([[0.3], [0.4]])
-    np.testing.assert_allclose(jacobian_at(task_map, q), np.full((2, 1, 1), 0.6))
-    np.testing.assert_allclose(bias_at(task_map, q, q), np.zeros((2, 1)), atol=1e-15)
+    assert_allclose(jacobian_at(task_map, q), np.full((2, 1, 1), 0.6))
+    assert_allclose(bias_at(task_map, q, q), np.zeros((2, 1)), atol=1e-15)
     for part in vars(task_map.derivatives(task_map.twists(q), q, q)).values():
-        np.testing.assert_allclose(part, np.zeros((2, 1, 1)), atol=1e-15)
+        assert_allclose(part, np.zeros((2, 1, 1)), atol=1e-15)
 
 
 def pose_case(space):
@@ -133,7 +134,7 @@ def test_jacobian_of_a_pose_gives_the_body_twist(space):
     task_map, q, qdot, _ = pose_case(space)
     jacobian = jacobian_at(task_map, q)
     assert jacobian.shape == (len(q), 6, q.shape[1])
-    np.testing.assert_allclose(
+    assert_allclose(
         np.einsum("kmn,kn->km", jacobian, qdot), twist(task_map, q, qdot), atol=1e-6
     )
 
@@ -153,9 +154,7 @@ def test_acceleration_of_a_pose_is_the_derivative_of_the_body_twist(space):
     exact = np.einsum("kmn,kn->km", jacobian_at(task_map, q), qddot) + bias_at(
         task_map, q, qdot
     )
-    np.testing.assert_allclose(
-        exact, (velocity(h) - velocity(-h)) / (2.0 * h), atol=1e-7
-    )
+    assert_allclose(exact, (velocity(h) - velocity(-h)) / (2.0 * h), atol=1e-7)
 
 
 @pytest.mark.parametrize("space", ["pose", "pose_free_roll"])

@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.errors import InputError
@@ -30,7 +31,7 @@ def test_position_rows_are_world_coordinates_in_the_order_asked(rows):
     assert space.units == ("m",) * len(rows)
     q = np.array([0.3, -0.4, 0.5])
     named = dict(zip("xyz", robot.tool_placement(q).translation, strict=True))
-    np.testing.assert_array_equal(space.value(q), [named[row] for row in rows])
+    assert_array_equal(space.value(q), [named[row] for row in rows])
 
 
 MOUNTS = {"roll": (0.0, np.pi / 2, 0.0), "pitch": (np.pi / 2, 0.0, 0.0), "yaw": ZERO}
@@ -52,7 +53,7 @@ def test_an_angle_turns_about_its_axis_by_the_right_hand_rule(angle, rows):
         first = rng.normal(size=3)
         value = space.of_placements(first[None], (about.matrix() @ upright)[None])[0]
         named = dict(zip("xyz", first, strict=True))
-        np.testing.assert_allclose(value[:-1], [named[row] for row in rows])
+        assert_allclose(value[:-1], [named[row] for row in rows])
         base = space.of_placements(first[None], upright[None])[0]
         assert space.difference(value, base)[-1] == pytest.approx(turn)
 
@@ -61,10 +62,10 @@ def test_sizes_of_displacements_of_positions_and_angles_apart(scara):
     position, angle = task_map_of(scara, ["x", "y", "yaw"]).norms(
         np.array([[3.0, 4.0, -0.5], [0.0, 0.0, 2.0]])
     )
-    np.testing.assert_allclose(position, [5.0, 0.0])
-    np.testing.assert_allclose(angle, [0.5, 2.0])
+    assert_allclose(position, [5.0, 0.0])
+    assert_allclose(angle, [0.5, 2.0])
     position, angle = task_map_of(scara, ["y"]).norms(np.array([[-3.0]]))
-    np.testing.assert_array_equal([position, angle], [[3.0], [0.0]])
+    assert_array_equal([position, angle], [[3.0], [0.0]])
 
 
 def test_a_map_survives_pickling(scara):
@@ -72,7 +73,7 @@ def test_a_map_survives_pickling(scara):
     again = pickle.loads(pickle.dumps(space))  # noqa: S301
     q = np.array([[0.3, -0.4, 0.5]])
     assert (again.rows, again.tool_axis) == (space.rows, space.tool_axis)
-    np.testing.assert_allclose(again.twists(q), space.twists(q), atol=1e-14)
+    assert_allclose(again.twists(q), space.twists(q), atol=1e-14)
 
 
 @pytest.mark.parametrize(

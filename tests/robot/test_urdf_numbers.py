@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis import LimitSpec
 from brachis.errors import UrdfError
@@ -121,8 +122,8 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
     assert [body.joint for body in bodies] == list(robot.joint_names)
     for body, inertia in zip(bodies, list(robot.model.inertias)[1:], strict=True):
         assert body.mass == pytest.approx(inertia.mass, rel=1e-14)
-        np.testing.assert_allclose(body.com, inertia.lever, atol=1e-14)
-        np.testing.assert_allclose(body.inertia, inertia.inertia, atol=1e-14)
+        assert_allclose(body.com, inertia.lever, atol=1e-14)
+        assert_allclose(body.inertia, inertia.inertia, atol=1e-14)
     if text is TEXT:
         assert bodies[0].links == ("link1", "aside")
         assert bodies[0].mass == 3.5
@@ -233,7 +234,7 @@ def test_joints_and_links_may_share_their_names(link):
     plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
     q = np.array([0.3, -0.4])
     placed = robot.tool_placement(q).homogeneous
-    np.testing.assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
+    assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
     held = Robot.from_urdf("f.urdf", **own, locked_joints={robot.joint_names[0]: 0.3})
     placed = held.tool_placement(q[1:]).homogeneous
-    np.testing.assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
+    assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis import LimitSpec
 from brachis.errors import (
@@ -53,7 +54,7 @@ def test_forward_kinematics_are_those_of_the_file():
         pin.framesForwardKinematics(
             model, data, np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
         )
-        np.testing.assert_allclose(
+        assert_allclose(
             robot.tool_placement(q).homogeneous, data.oMf[frame].homogeneous, atol=1e-14
         )
 
@@ -63,8 +64,8 @@ def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
     assert robot.limits.position_lower[0] == -np.inf
     assert robot.limits.position_upper[0] == np.inf
     assert robot.limits.position_lower[1] == -3.0
-    np.testing.assert_array_equal(robot.limits.torque, [80.0, 70.0])
-    np.testing.assert_array_equal(robot.limits.velocity, [3.0, 3.1])
+    assert_array_equal(robot.limits.torque, [80.0, 70.0])
+    assert_array_equal(robot.limits.velocity, [3.0, 3.1])
 
 
 def test_gripper_off_the_chain_is_locked_and_its_mass_is_carried():
@@ -84,9 +85,7 @@ def test_gripper_off_the_chain_is_locked_and_its_mass_is_carried():
         locked = None if held == 0.02 else {"finger": held}
         robot = load([TURN, TURN], tool_frame="palm", more=single, locked_joints=locked)
         levers[held] = robot.model.inertias[2].mass * robot.model.inertias[2].lever
-    np.testing.assert_allclose(
-        levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14
-    )
+    assert_allclose(levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14)
 
 
 def test_branching_urdf_needs_a_tool_frame():
@@ -157,7 +156,7 @@ def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
     locked = {"a": -0.5, "b": 0.25, "c": 0.3}
     given = load([TURN], more=free, tool_frame="tool", locked_joints=locked)
     for own, other in zip(followed.model.inertias, given.model.inertias, strict=True):
-        np.testing.assert_allclose(own.lever, other.lever, atol=1e-14)
+        assert_allclose(own.lever, other.lever, atol=1e-14)
 
 
 def test_a_joint_that_mimics_itself_is_refused():
@@ -193,8 +192,8 @@ def test_moments_without_mass_are_left_out_with_a_warning():
     bare, haunted = (load([TURN, TURN], more=more) for more in ("", ghost))
     q = np.array([[0.3, -0.7]])
     args = q, 2.0 * q, 30.0 * q
-    np.testing.assert_array_equal(torque(haunted, *args), torque(bare, *args))
-    np.testing.assert_array_equal(torques(haunted, *args), torques(bare, *args))
+    assert_array_equal(torque(haunted, *args), torque(bare, *args))
+    assert_array_equal(torques(haunted, *args), torques(bare, *args))
     (issue,) = of_robot(haunted)
     assert issue.where == "URDF link ghost"
     assert issue.found == "0.1 kg m^2"
@@ -335,7 +334,7 @@ def test_base_frame_in_the_middle_holds_what_lies_before_it():
     assert part.joint_names == ("j2", "j3")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
         held = whole.tool_placement(np.array([0.0, *q]))
-        np.testing.assert_allclose(
+        assert_allclose(
             part.tool_placement(q).homogeneous, held.homogeneous, atol=1e-14
         )
 
@@ -349,13 +348,13 @@ def test_locked_joint_on_the_chain():
     zero = np.zeros(3)
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
         full = np.array([q[0], 0.7, q[1]])
-        np.testing.assert_allclose(
+        assert_allclose(
             part.tool_placement(q).homogeneous,
             whole.tool_placement(full).homogeneous,
             atol=1e-14,
         )
         held = pin.rnea(whole.model, whole.model.createData(), full, zero, zero)[[0, 2]]
-        np.testing.assert_allclose(
+        assert_allclose(
             pin.rnea(part.model, part.model.createData(), q, zero[:2], zero[:2]),
             held,
             atol=1e-12,

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.errors import InputError, StartError
@@ -18,23 +20,26 @@ from brachis.verify.mechanics import joint_placements
 from support.mujoco_models import mujoco_model
 
 ROBOTS = Path(__file__).parents[2] / "robots"
-BODIES = [
-    {"name": "box", "box": [0.2, 0.3, 0.4], "position": [0.5, 0.1, 0.6]},
-    {"name": "ball", "sphere": 0.1, "position": [-0.3, 0.4, 0.5]},
-    {"name": "floor", "half_space": {"normal": [0, 0, 2], "offset": -0.5}},
-    {
-        "name": "rod",
-        "capsule": {"radius": 0.05, "length": 0.3},
-        "position": [0.2, -0.5, 0.4],
-        "rpy_deg": [90, 20, 0],
-    },
-    {
-        "name": "drum",
-        "cylinder": {"radius": 0.1, "length": 0.3},
-        "position": [0.2, 0.5, 0.9],
-        "rpy_deg": [30, 60, 10],
-    },
-]
+BODIES = yaml.safe_load("""
+- name: box
+  box: [0.2, 0.3, 0.4]
+  position: [0.5, 0.1, 0.6]
+- name: ball
+  sphere: 0.1
+  position: [-0.3, 0.4, 0.5]
+- name: floor
+  half_space:
+    normal: [0, 0, 2]
+    offset: -0.5
+- name: rod
+  capsule: {radius: 0.05, length: 0.3}
+  position: [0.2, -0.5, 0.4]
+  rpy_deg: [90, 20, 0]
+- name: drum
+  cylinder: {radius: 0.1, length: 0.3}
+  position: [0.2, 0.5, 0.9]
+  rpy_deg: [30, 60, 10]
+""")
 NAMES = ("iiwa14", "tx90l_rail", "ur10_rail", "gen3_rails", "arm8", "scara3")
 
 
@@ -79,14 +84,10 @@ def test_joints_and_solids_stand_where_pinocchio_and_the_text_say(name):
     placed = Chain.of(robot.model).place(q)
     for k, data in enumerate(robot.place_joints(q)):
         for joint, placement in enumerate(data.oMi):
-            np.testing.assert_allclose(
-                placed[0][k, joint], placement.rotation, atol=1e-12
-            )
-            np.testing.assert_allclose(
-                placed[1][k, joint], placement.translation, atol=1e-12
-            )
+            assert_allclose(placed[0][k, joint], placement.rotation, atol=1e-12)
+            assert_allclose(placed[1][k, joint], placement.translation, atol=1e-12)
     for mine, other in zip(placed, joint_placements(robot, q), strict=True):
-        np.testing.assert_allclose(mine, other, atol=1e-12)
+        assert_allclose(mine, other, atol=1e-12)
     found = scene_of(robot, given)
     for solid, joint, placed in zip(
         found.solids, found.joints, found.placements, strict=True
@@ -95,7 +96,7 @@ def test_joints_and_solids_stand_where_pinocchio_and_the_text_say(name):
             frame = robot.model.frames[robot.model.getFrameId(solid.link)]
             expected = frame.placement.homogeneous @ solid.placement
             assert joint == frame.parentJoint
-            np.testing.assert_allclose(placed, expected, atol=1e-12)
+            assert_allclose(placed, expected, atol=1e-12)
 
 
 def test_distances_of_balls_and_planes_are_those_of_formulas():
@@ -116,7 +117,7 @@ def test_distances_of_balls_and_planes_are_those_of_formulas():
     }
     for pair, expected in apart.items():
         own = [each == pair for each in names]
-        np.testing.assert_allclose(near.distance[own], expected, atol=1e-9)
+        assert_allclose(near.distance[own], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -224,8 +225,8 @@ def test_padding_makes_links_larger():
         ["link_6" in found.names(pair) for pair in range(len(found.pairs))] * 5
     )
     is_apart = everything(padded, placed).distance > 0.0
-    np.testing.assert_allclose(apart[own & is_apart], 0.02, atol=1e-8)
-    np.testing.assert_allclose(apart[~own], 0.0, atol=1e-8)
+    assert_allclose(apart[own & is_apart], 0.02, atol=1e-8)
+    assert_allclose(apart[~own], 0.0, atol=1e-8)
 
 
 def test_padded_balls_are_found_from_as_far_away_as_they_are_large(tmp_path):
@@ -251,7 +252,7 @@ def test_the_closest_pair_of_each_posture_is_found():
     placed = Chain.of(robot.model).place(postures(robot))
     every = everything(found, placed)
     closest = found.find_closest(placed)
-    np.testing.assert_array_equal(closest.posture, np.arange(40))
+    assert_array_equal(closest.posture, np.arange(40))
     for k in range(40):
         least = every.distance[every.posture == k].min()
         assert closest.distance[k] == pytest.approx(least, abs=1e-12)
@@ -264,7 +265,7 @@ def test_only_pairs_that_come_close_are_kept():
     q = postures(robot)
     kept = limit.restrict_to(q)
     assert 0 < len(kept.lower) < len(limit.lower)
-    np.testing.assert_allclose(kept.lower * UNIT, 0.01)
+    assert_allclose(kept.lower * UNIT, 0.01)
     assert limit.restrict_to(q[:0]) is None
 
 
@@ -277,7 +278,7 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
     apart = np.argmax(distances.min(axis=1))
     added = limit.keep_inside(q[[apart]]).lower - limit.lower
     room = distances[apart] - limit.lower
-    np.testing.assert_allclose(added, np.clip(room, 0.0, limit.inset), atol=1e-12)
+    assert_allclose(added, np.clip(room, 0.0, limit.inset), atol=1e-12)
     close = np.argmin(distances.min(axis=1))
     column = np.argmin(distances[close])
     assert distances[close, column] < limit.lower[column]
@@ -287,25 +288,22 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
 
 
 @pytest.mark.parametrize(
-    ("body", "says"),
+    ("body", "message"),
     [
-        ({"box": [1, 1, 1], "sphere": 1.0}, "exactly one shape"),
-        ({"name": "post"}, "exactly one shape"),
-        ({"box": [1, 1]}, "box"),
-        ({"sphere": -1.0}, "sphere"),
-        ({"half_space": {"normal": [0, 0, 0]}}, "cannot have zero length"),
-        ({"half_space": {"normal": [0, 0, 1]}, "link": "tool"}, "fixed to the world"),
-        ({"sphere": 1.0, "link": "tol"}, "tool"),
-        (
-            {"half_space": {"normal": [0, 0, 1]}, "position": [0, 0, 1]},
-            "no other place",
-        ),
-        ({"mesh": "missing.stl"}, "missing.stl"),
+        ("{box: [1, 1, 1], sphere: 1.0}", "exactly one shape"),
+        ("name: post", "exactly one shape"),
+        ("box: [1, 1]", "box"),
+        ("sphere: -1.0", "sphere"),
+        ("half_space: {normal: [0, 0, 0]}", "cannot have zero length"),
+        ("{half_space: {normal: [0, 0, 1]}, link: tool}", "fixed to the world"),
+        ("{sphere: 1.0, link: tol}", "tool"),
+        ("{half_space: {normal: [0, 0, 1]}, position: [0, 0, 1]}", "no other place"),
+        ("mesh: missing.stl", "missing.stl"),
     ],
 )
-def test_wrong_bodies_are_refused(body, says):
-    with pytest.raises(InputError, match=says):
-        scene(bodies=[body])
+def test_the_error_says_what_is_wrong_with_a_body(body, message):
+    with pytest.raises(InputError, match=message):
+        scene(bodies=[yaml.safe_load(body)])
 
 
 def test_names_are_unique_and_known():
@@ -371,7 +369,7 @@ def test_a_robot_without_collision_geometry_is_refused_or_gets_capsules(tmp_path
     joint = pin.SE3(first.placement)
     middle = data.oMi[2].act(joint.translation)
     ends = data.oMi[2].translation, data.oMi[3].translation
-    np.testing.assert_allclose(middle, 0.5 * (ends[0] + ends[1]), atol=1e-9)
+    assert_allclose(middle, 0.5 * (ends[0] + ends[1]), atol=1e-9)
 
 
 def test_an_error_names_the_first_pairs_that_are_too_close():

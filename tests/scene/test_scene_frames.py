@@ -4,6 +4,8 @@ import jsonschema
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import TaskError
@@ -63,7 +65,7 @@ def test_a_body_moves_with_its_frame(x):
         load_task(task(frames={"table": table, "user1": USER}).to_dict()),
     ):
         placed = scene(moved).placements[-1]
-        np.testing.assert_allclose(placed, expected.homogeneous, atol=1e-12)
+        assert_allclose(placed, expected.homogeneous, atol=1e-12)
 
 
 def test_the_plane_of_a_half_space_is_in_its_frame():
@@ -72,7 +74,7 @@ def test_the_plane_of_a_half_space_is_in_its_frame():
     frame = transform(TABLE) * transform(USER)
     point = frame.act(0.1 * np.array([0.0, 0.6, 0.8]))
     normal = frame.rotation @ [0.0, 0.6, 0.8]
-    np.testing.assert_allclose(solid.geometry.n, normal, atol=1e-12)
+    assert_allclose(solid.geometry.n, normal, atol=1e-12)
     assert solid.geometry.d == pytest.approx(normal @ point, abs=1e-12)
 
 
@@ -103,8 +105,8 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
     cell, post, _ = found.placements[found.own :]
     user = transform(TABLE) * transform(USER)
     top = user * transform({"xyz": [0, 0, 0.3]})
-    np.testing.assert_allclose(cell, top.homogeneous, atol=1e-12)
-    np.testing.assert_allclose(post, transform(TABLE).homogeneous, atol=1e-12)
+    assert_allclose(cell, top.homogeneous, atol=1e-12)
+    assert_allclose(post, transform(TABLE).homogeneous, atol=1e-12)
     assert found.solids[-1].link == "tool"
 
 
@@ -112,27 +114,27 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
     ("keys", "message"),
     [
         (
-            {"frames": {"table": TABLE}},
+            "frames: {table: {xyz: [0.5, -0.2, 0.3], rpy_deg: [20.0, -35.0, 110.0]}}",
             r"scene\[0\]\.frame: this frame is not defined in frames; found 'user1' .*allowed: table",
         ),
         (
-            {"frames": {"user1": {"frame": "tabel"}, "table": TABLE}},
+            "frames: {user1: {frame: tabel}, table: {xyz: [0.5, -0.2, 0.3], rpy_deg: [20.0, -35.0, 110.0]}}",
             r"frames\.user1\.frame: this frame is not defined .*'tabel' .*allowed: user1, table",
         ),
         (
-            {"frames": {"a": {"frame": "user1"}, "user1": {"frame": "a"}}},
+            "frames: {a: {frame: user1}, user1: {frame: a}}",
             r"frames\.a\.frame: the frame is placed in itself; found 'a in user1 in a'",
         ),
         (
-            {"scene": [{"sphere": 0.1, "frame": "user1", "link": "tool"}]},
+            "scene: [{sphere: 0.1, frame: user1, link: tool}]",
             r"scene\[0\]\.frame: .*frame of its link.*allowed: either link or frame",
         ),
         (
-            {"scene": {"file": "cell.yaml", "frames": "user1"}},
-            r"scene: frames: unknown key; .*allowed: file, frame",
+            "scene: {file: cell.yaml, frames: user1}",
+            "scene: frames: unknown key; .*allowed: file, frame",
         ),
     ],
 )
 def test_what_is_wrong_is_named(keys, message):
     with pytest.raises(TaskError, match=message):
-        task(**keys)
+        task(**yaml.safe_load(keys))

@@ -149,3 +149,23 @@ def with_limits(trajectory, **limits):
     magnitudes = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
     changed = replace(robot.limits.with_magnitudes(**magnitudes), **limits)
     return replace(trajectory, robot=replace(robot, limits=changed))
+
+
+def motion_between(motion, robot, q, **parts):
+    """A motion of a robot between two postures, (2, n), at rest in both: one polynomial piece of 1.1 s."""
+    rest = np.zeros_like(q)
+    parts = {"task_space": "joints", "redundant_joints": ()} | parts
+    task = motion.task.model_copy(update={"task_space": parts.pop("task_space")})
+    return replace(
+        motion,
+        task=task,
+        robot=robot,
+        urdf=robot.urdf,
+        times=np.array([0.0, 1.1]),
+        phase_ends=np.array([1.1]),
+        q=q,
+        qdot=rest,
+        qddot=rest,
+        qddot_before=rest,
+        **parts,
+    )

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import TaskError
@@ -54,12 +55,10 @@ def test_quaternions():
     spline = spline_of(task())
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
     given = [one.quaternion_wxyz for one in spline.orientations or ()]
-    np.testing.assert_allclose(given, QUATERNIONS[1:], atol=1e-15)
+    assert_allclose(given, QUATERNIONS[1:], atol=1e-15)
     assert spline.starts_at == tuple(POINTS[0].tolist())
     assert spline.starts_oriented is not None
-    np.testing.assert_allclose(
-        spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15
-    )
+    assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
     assert not spline.relative
 
 
@@ -68,9 +67,7 @@ def test_rotation_vectors_in_any_order_of_columns():
     spline = spline_of(task("pose_free_roll", orientation="rotation_vector"))
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
     assert spline.starts_oriented is not None
-    np.testing.assert_allclose(
-        spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15
-    )
+    assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
 
 
 def test_positions_alone_leave_the_orientation_to_the_segment():
@@ -102,7 +99,7 @@ def test_rows(rows):
     write(",".join(names), POINTS[:, : len(names)])
     made = task(rows)
     path = build_path(made.path, POINTS[0, : len(names)], names)
-    np.testing.assert_allclose(
+    assert_allclose(
         path.sample([0.0, 1.0]).target, POINTS[[0, -1], : len(names)], atol=1e-12
     )
 
@@ -143,7 +140,7 @@ def test_poses_on_the_spot():
     sample = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0]).sample(
         [0.0, 1.0]
     )
-    np.testing.assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
+    assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
 
 
 MISTAKES = [
@@ -309,7 +306,7 @@ def test_angles_of_the_makers_are_read(convention):
         for one in (spline.starts_oriented, *(spline.orientations or ()))
         if one is not None
     ]
-    np.testing.assert_allclose(turns, QUATERNIONS, atol=1e-12)
+    assert_allclose(turns, QUATERNIONS, atol=1e-12)
 
 
 def test_the_tools_axis_leaves_the_roll_open():
@@ -322,7 +319,7 @@ def test_the_tools_axis_leaves_the_roll_open():
         one.rotation for one in (spline.starts_oriented, *(spline.orientations or ()))
     ]
     for turn, axis in zip(turns, axes, strict=True):
-        np.testing.assert_allclose(turn.apply([0.0, 0.0, 1.0]), axis, atol=1e-12)
+        assert_allclose(turn.apply([0.0, 0.0, 1.0]), axis, atol=1e-12)
     for one, other, axis in zip(turns, turns[1:], axes, strict=False):
         assert (other * one.inv()).as_rotvec() @ axis == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(
@@ -349,7 +346,7 @@ def test_a_tool_that_points_down_may_stay_so():
     spline = spline_of(task("pose_free_roll"))
     assert spline.starts_oriented is not None
     down = spline.starts_oriented.rotation.apply([0.0, 0.0, 1.0])
-    np.testing.assert_allclose(down, [0.0, 0.0, -1.0], atol=1e-12)
+    assert_allclose(down, [0.0, 0.0, -1.0], atol=1e-12)
     assert set(spline.orientations or ()) == {spline.starts_oriented}
 
 
@@ -364,7 +361,7 @@ def test_quaternions_of_numbered_columns():
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, TURNS.as_quat()]))
     assert given == spline_of(task(orientation="quaternion_xyzw")).starts_oriented
     assert given is not None
-    np.testing.assert_allclose(given.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
+    assert_allclose(given.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
 
 
 AMBIGUOUS = [

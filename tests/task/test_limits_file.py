@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_array_equal
 
 import brachis
 from brachis import robots
@@ -65,9 +66,7 @@ def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(loaded)
     ).robot
     assert own.limits.torque == {"j1": 5.0, "j2": 1.0, "j3": (-7.0, 8.0)}
     assert own.limits.acceleration is None
-    np.testing.assert_array_equal(
-        robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0]
-    )
+    assert_array_equal(robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0])
     assert loaded({"limits": {"torque": 3}}).robot.limits.torque == 3.0
 
 
@@ -83,8 +82,8 @@ def test_a_program_reads_the_file_too(tmp_path):
     robot = Robot.from_urdf(
         ROOT / "robots/scara3/robot.urdf", limits=brachis.read_limits(path)
     )
-    np.testing.assert_array_equal(robot.limits.torque_lower, [-5.0, -6.0, -7.0])
-    np.testing.assert_array_equal(robot.limits.acceleration, 20.0)
+    assert_array_equal(robot.limits.torque_lower, [-5.0, -6.0, -7.0])
+    assert_array_equal(robot.limits.acceleration, 20.0)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +144,7 @@ def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):
         loaded({"limits": {"total_power": 50}}, limits=limits).robot
     )
     assert robot.limits.total_power == 50.0
-    np.testing.assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])
+    assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])
 
 
 MOVEIT = """
@@ -230,10 +229,10 @@ def test_a_file_of_moveit_is_read(loaded, tmp_path):
         ROOT / "robots/scara3/robot.urdf",
         limits=read_limits(tmp_path / "joint_limits.yaml"),
     )
-    np.testing.assert_array_equal(
+    assert_array_equal(
         robot.limits.velocity, [1.0, np.inf, robot.urdf_limits[2].velocity * 0.5]
     )
-    np.testing.assert_array_equal(robot.limits.acceleration, [3.75, 5.0, np.inf])
+    assert_array_equal(robot.limits.acceleration, [3.75, 5.0, np.inf])
 
 
 @pytest.mark.parametrize(
@@ -245,13 +244,9 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
     robot = robot_from_settings(
         loaded({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot
     )
-    np.testing.assert_array_equal(
-        robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6]
-    )
-    np.testing.assert_array_equal(robot.limits.torque[1:], [150.0] * 5 + [28.0])
-    np.testing.assert_array_equal(
-        robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0])
-    )
+    assert_array_equal(robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6])
+    assert_array_equal(robot.limits.torque[1:], [150.0] * 5 + [28.0])
+    assert_array_equal(robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0]))
     assert (
         robot_from_settings(loaded({**ur, "locked_joints": {"rail": 0.0}}).robot).n == 6
     )
@@ -365,7 +360,7 @@ def test_joints_that_a_file_of_moveit_leaves_out_have_the_limits_of_the_urdf(
     robot = robot_from_settings(loaded({"limits_file": "joint_limits.yaml"}).robot)
     ours, _, theirs = robot.urdf_limits
     expected = [ours.velocity, 5.0, theirs.velocity]
-    np.testing.assert_array_equal(robot.limits.velocity, expected)
+    assert_array_equal(robot.limits.velocity, expected)
     more = text + "".join(f"  {name}: {{max_velocity: 5}}\n" for name in ("j7", "j9"))
     (tmp_path / "joint_limits.yaml").write_text(more, encoding="utf-8")
     task = loaded({"limits_file": "joint_limits.yaml"})

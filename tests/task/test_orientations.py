@@ -2,12 +2,9 @@
 
 import json
 
-import numpy as np
 import pytest
 import yaml
-from scipy.spatial.transform import Rotation as SciPyRotation
 
-import brachis
 from brachis.errors import TaskError
 from brachis.task import (
     ToolPose,
@@ -207,28 +204,6 @@ def free(path_start, space="pose"):
     return load_task(
         written(LINE, space=space) | {"start": "free", "path_start": path_start}
     )
-
-
-def test_a_path_may_start_at_a_pose_in_any_convention():
-    turn = SciPyRotation.from_euler("xyz", [20, -35, 110], degrees=True)
-    forms = {
-        "quaternion_wxyz": np.roll(turn.as_quat(), 1),
-        "quaternion_xyzw": turn.as_quat(),
-        "rotation_vector": turn.as_rotvec(),
-        "rpy_deg": [20, -35, 110],
-        "kuka_abc_deg": turn.as_euler("ZYX", degrees=True),
-        "staubli_xyz_deg": turn.as_euler("XYZ", degrees=True),
-        "fanuc_wpr_deg": [20, -35, 110],
-    }
-    space = brachis.task_map_of(brachis.robots.iiwa14, "pose")
-    for key, values in forms.items():
-        task = free({"position": [1, 2, 3], key: values})
-        assert load_task(json.loads(json.dumps(task.to_dict()))) == task
-        assert task.path_start is not None
-        found = space.read(task.path_start, "path_start")
-        np.testing.assert_allclose(
-            found, [1, 2, 3, *turn.as_matrix().ravel()], atol=1e-14
-        )
 
 
 def test_another_start_of_the_path_takes_the_place_of_the_first_one():

@@ -1,6 +1,7 @@
 """Stops and dwells at the ends of segments, as a task writes them."""
 
 import pytest
+import yaml
 
 from brachis.errors import TaskError
 from brachis.task import load_task
@@ -32,18 +33,18 @@ def test_a_dwell_is_a_stop():
 @pytest.mark.parametrize(
     ("keys", "where", "said"),
     [
-        ({"stop": True, "blend": 0.01}, "blend", "so its corner is not rounded"),
-        ({"dwell": 0.5, "blend": 0.01}, "blend", "so its corner is not rounded"),
-        ({"stop": False, "dwell": 0.5}, "stop", "a dwell needs a stop"),
-        ({"dwell": 0.0005}, "dwell", "0.001 s"),
-        ({"dwell": -0.5}, "dwell", ">= 0"),
-        ({"dwell": "long"}, "dwell", "number"),
-        ({"stop": 1}, "stop", "true or false"),
+        ("{stop: true, blend: 0.01}", "blend", "so its corner is not rounded"),
+        ("{dwell: 0.5, blend: 0.01}", "blend", "so its corner is not rounded"),
+        ("{stop: false, dwell: 0.5}", "stop", "a dwell needs a stop"),
+        ("dwell: 0.0005", "dwell", "0.001 s"),
+        ("dwell: -0.5", "dwell", ">= 0"),
+        ("dwell: long", "dwell", "number"),
+        ("stop: 1", "stop", "true or false"),
     ],
 )
 def test_what_is_no_stop_is_refused_with_its_key(keys, where, said):
     with pytest.raises(TaskError) as caught:
-        task(**keys)
+        task(**yaml.safe_load(keys))
     assert f"path[0].{where}: " in str(caught.value)
     assert said in str(caught.value)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.apps.bottleneck import find_reference
@@ -27,8 +28,8 @@ def test_planar_line(scara):
     torque = motion.torque(t) / motion.robot.limits.torque
     assert np.abs(torque).max() <= 1.0 + 1e-4
     ends = np.array([0.0, motion.t_end])
-    np.testing.assert_allclose(motion.path_coordinate(ends), [0.0, 1.0], atol=1e-9)
-    np.testing.assert_allclose(motion.velocity(ends), 0.0, atol=1e-9)
+    assert_allclose(motion.path_coordinate(ends), [0.0, 1.0], atol=1e-9)
+    assert_allclose(motion.velocity(ends), 0.0, atol=1e-9)
     words = str(report)
     assert "best value known, not a proven bound" in words
     assert f"reference {reference.t_end:.4f} s" in words
@@ -63,4 +64,4 @@ def test_end_posture_is_kept(slide):
     given = brachis.plan(free.trajectory.robot, {**free.task.to_dict(), "end": end})
     motion = find_reference(given.candidate).candidate.trajectory
     end = motion.position(motion.t_end)
-    np.testing.assert_allclose(end, [0.1, LENGTH - 0.1], atol=1e-9)
+    assert_allclose(end, [0.1, LENGTH - 0.1], atol=1e-9)

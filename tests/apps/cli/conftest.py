@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shlex
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,8 +37,10 @@ def own_interrupts(rough_figures):  # noqa: ARG001
 
 @pytest.fixture
 def run(capfd):
-    def run(*arguments, columns=200):
-        code = code_of(*arguments, columns=columns)
+    def run(*words, columns=200):
+        """Run a command as it is typed, or word by word."""
+        command = words if len(words) != 1 else shlex.split(words[0])
+        code = code_of(*command, columns=columns)
         streams = capfd.readouterr()
         return Outcome(code, streams.out, streams.err)
 

@@ -14,7 +14,7 @@ from .conftest import SCARA
 
 def test_in_plain_words(run, task, write):
     task["spline"]["intervals"] = 20
-    outcome = run("bottleneck", write(task))
+    outcome = run(f"bottleneck {write(task)}")
     assert outcome.code == 0, outcome.err
     assert outcome.err.startswith(
         "brachis: warning: spline.intervals: the same joint path"
@@ -38,7 +38,7 @@ def test_in_plain_words(run, task, write):
 
 def test_check_and_reference(run, task, write):
     task["spline"]["intervals"] = 10
-    outcome = run("bottleneck", write(task), "--check", "--reference")
+    outcome = run(f"bottleneck {write(task)} --check --reference")
     assert outcome.code == 0, outcome.err
     checked = re.findall(
         r"checked, (\S+) torque \+1 %: predicted (\S+) ms, solved again (\S+) ms",
@@ -54,7 +54,7 @@ def test_check_and_reference(run, task, write):
 
 
 def test_json(run, task, write):
-    outcome = run("bottleneck", write(task), "--json")
+    outcome = run(f"bottleneck {write(task)} --json")
     data = json.loads(outcome.out, parse_constant=pytest.fail)
     assert data["verified"] is True
     report = data["bottleneck"]
@@ -70,7 +70,7 @@ def test_json(run, task, write):
 
 def test_files(run, task, write, tmp_path):
     out = tmp_path / "out"
-    outcome = run("bottleneck", write(task), "--out", out, "--verbose")
+    outcome = run(f"bottleneck {write(task)} --out {out} --verbose")
     assert outcome.code == 0, outcome.err
     assert outcome.err.endswith(" s: drawing timeline.png\n")
     assert f"wrote {out / 'timeline.png'}" in outcome.out
@@ -82,9 +82,9 @@ def test_files(run, task, write, tmp_path):
 
 def test_unverified_motion(run, task, write, tmp_path, request):
     out = tmp_path / "out"
-    run("bottleneck", write(task), "--out", out)
+    run(f"bottleneck {write(task)} --out {out}")
     request.getfixturevalue("too_strict")
-    outcome = run("bottleneck", write(task), "--out", out)
+    outcome = run(f"bottleneck {write(task)} --out {out}")
     assert outcome.code == 1
     assert "did not pass the verification" in outcome.err
     assert sorted(path.name for path in out.iterdir()) == [
@@ -102,7 +102,7 @@ def test_a_search_ended_early_is_told(run, task, write, monkeypatch):
             honest(*given, **more), interrupted=True
         ),
     )
-    outcome = run("bottleneck", write(task))
+    outcome = run(f"bottleneck {write(task)}")
     assert outcome.code == 0
     assert "ended early" in outcome.err
 
@@ -110,10 +110,10 @@ def test_a_search_ended_early_is_told(run, task, write, monkeypatch):
 def test_a_saved_motion_is_explained_without_solving_again(run, task, write, tmp_path):
     out = tmp_path / "out"
     task["spline"]["intervals"] = 10
-    assert run("plan", write(task), "--out", out, "--no-figures").code == 0
+    assert run(f"plan {write(task)} --out {out} --no-figures").code == 0
     motion = out / "result.npz"
     t_end = brachis.Trajectory.load(motion).t_end
-    outcome = run("bottleneck", motion, "--verbose", "--out", out)
+    outcome = run(f"bottleneck {motion} --verbose --out {out}")
     assert outcome.code == 0, outcome.err
     assert outcome.out.startswith(f"end time t_E: {t_end:.4f} s")
     assert "more torque at j1" in outcome.out
@@ -125,6 +125,6 @@ def test_a_saved_motion_is_explained_without_solving_again(run, task, write, tmp
 
 
 def test_a_saved_motion_keeps_its_urdf(run, tmp_path):
-    outcome = run("bottleneck", tmp_path / "result.npz", "--urdf", SCARA)
+    outcome = run(f"bottleneck {tmp_path / 'result.npz'} --urdf {SCARA}")
     assert outcome.code == 2
     assert "this option cannot be used with a saved motion" in outcome.err

@@ -28,7 +28,7 @@ EXAMPLES = {
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("option", ["-h", "--help"])
 def test_help_of_every_command_has_an_example(command, option, run):
-    outcome = run(command, option, columns=60)
+    outcome = run(f"{command} {option}", columns=60)
     assert outcome.code == 0
     assert f"Usage: brachis {command} " in outcome.out
     examples = outcome.out.split("Examples:\n")[1].splitlines()
@@ -81,7 +81,7 @@ def test_help_of_the_program(run):
 
 
 def test_help_of_plot_lists_every_figure(run):
-    text = run("plot", "--help", columns=80).out
+    text = run("plot --help", columns=80).out
     assert all(kind in text.split("--kind")[1] for kind in plots.PLOTS)
 
 
@@ -103,64 +103,45 @@ def test_completion(words, expected):
     assert done.stdout.split() == expected
 
 
-WRONG = {
-    "a typo": (
-        ("plna", "task.yaml"),
-        ["no such command 'plna'", "Did you mean 'plan'?", "see brachis --help"],
+TASK = ROOT / "examples/01_scara_line.yaml"
+WRONG = [
+    (
+        "plna task.yaml",
+        r"no such command 'plna'.*Did you mean 'plan'\?.*see brachis --help",
     ),
-    "no command": (
-        (ROOT / "examples/01_scara_line.yaml",),
-        ["a command comes before a file: brachis plan "],
+    (f"{TASK}", "a command comes before a file: brachis plan "),
+    (f"{SCARA}", "a command comes before a file: brachis inspect "),
+    ("plan task.yaml --outt", "--outt.*--out.*see brachis plan --help"),
+    ("plan", "missing argument 'TASK'"),
+    ("new scara4", r"'scara4'.*Did you mean 'scara3'\?"),
+    ("inspect gone.urdf", "gone.urdf: the file does not exist"),
+    (f"plan {SCARA}", "found a URDF; allowed: a task file.*brachis new"),
+    (f"verify {SCARA}", "found a URDF; allowed: a result.*brachis new"),
+    (f"new {TASK}", "a task file; allowed: a URDF"),
+    (f"verify {TASK}", "found a task file.*brachis plan "),
+    (
+        f"inspect {SCARA} --set robot.limits.torque=8",
+        (
+            r"--set: this option cannot be used with a URDF.*found \['robot.limits.torque=8'\]; allowed: this "
+            r"option with a task file"
+        ),
     ),
-    "a URDF alone": ((SCARA,), ["a command comes before a file: brachis inspect "]),
-    "an option's typo": (
-        ("plan", "task.yaml", "--outt"),
-        ["--outt", "--out", "see brachis plan --help"],
-    ),
-    "no argument": (("plan",), ["missing argument 'TASK'"]),
-    "a robot's typo": (("new", "scara4"), ["'scara4'", "Did you mean 'scara3'?"]),
-    "no robot": (("inspect", "gone.urdf"), ["gone.urdf: the file does not exist"]),
-    "a URDF for a task": (
-        ("plan", SCARA),
-        ["found a URDF; allowed: a task file", f"brachis new {SCARA}"],
-    ),
-    "a URDF for a result": (
-        ("verify", SCARA),
-        ["found a URDF; allowed: a result", f"brachis new {SCARA}"],
-    ),
-    "a task for a URDF": (
-        ("new", ROOT / "examples/01_scara_line.yaml"),
-        ["a task file; allowed: a URDF"],
-    ),
-    "a task for a result": (
-        ("verify", ROOT / "examples/01_scara_line.yaml"),
-        ["found a task file", "brachis plan "],
-    ),
-    "a key of a task for a URDF": (
-        ("inspect", SCARA, "--set", "robot.limits.torque=8"),
-        [
-            "--set: this option cannot be used with a URDF",
-            "found ['robot.limits.torque=8']; allowed: this option with a task file",
-        ],
-    ),
-    "no assignment": (
-        ("plan", ROOT / "examples/01_scara_line.yaml", "--set", "spline"),
-        ["key=value", "'spline'"],
-    ),
-}
+    (f"plan {TASK} --set spline", "key=value.*'spline'"),
+]
 
 
-@pytest.mark.parametrize("case", WRONG)
-@pytest.mark.parametrize("more", [(), ("--json",)])
-def test_wrong_command_lines(case, more, run, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("command", "message"), WRONG)
+@pytest.mark.parametrize("option", ["", " --json"])
+def test_a_wrong_command_line_is_one_error(
+    command, message, option, run, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    words, expected = WRONG[case]
-    outcome = run(*words, *more)
+    outcome = run(command + option)
     assert outcome.code == 2
     assert outcome.err.startswith("brachis: ")
     assert outcome.err.count("\n") == 1
-    assert all(part in outcome.err for part in expected)
-    if more:
+    assert re.search(message, outcome.err), outcome.err
+    if option:
         assert f"brachis: {json.loads(outcome.out)['error']}\n" == outcome.err
     assert not list(tmp_path.iterdir())
 
@@ -171,50 +152,37 @@ def test_results_are_told_from_tasks(run, tmp_path):
         (b'{\n  "t_end": 1.0\n}', "the figures of a plan"),
     ):
         (tmp_path / "file").write_bytes(content)
-        outcome = run("plan", tmp_path / "file")
+        outcome = run(f"plan {tmp_path / 'file'}")
         assert outcome.code == 2
         assert expected in outcome.err
 
 
-SMALL = (
-    "--set",
-    "spline.intervals=6",
-    "--set",
-    "search={effort: single, least_motion: false}",
-)
+SMALL = "--set spline.intervals=6 --set 'search={effort: single, least_motion: false}'"
 
 
 def test_set_changes_the_task(run, task, write, tmp_path):
     path = write(task)
     outcome = run(
-        "plan",
-        path,
-        *SMALL,
-        "--set",
-        "path.0.line.length=0.3",
-        "--set",
-        "robot.limits.torque=8",
+        f"plan {path} {SMALL} --set path.0.line.length=0.3 --set robot.limits.torque=8 "
         "--json",
     )
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)
     assert 1.0 < data["t_end"] < 2.4
-    shown = json.loads(
-        run("inspect", path, "--set", "robot.limits.torque=8", "--json").out
-    )
+    shown = json.loads(run(f"inspect {path} --set robot.limits.torque=8 --json").out)
     assert [joint["torque"] for joint in shown["joints"]] == ["8 Nm"] * 3
-    assert "torque" in run("bottleneck", path, *SMALL).out
-    outcome = run("bottleneck", tmp_path / "result.npz", "--set", "spline.intervals=6")
+    assert "torque" in run(f"bottleneck {path} {SMALL}").out
+    outcome = run(f"bottleneck {tmp_path / 'result.npz'} --set spline.intervals=6")
     assert outcome.code == 2
     assert "--set: this option cannot be used with a saved motion" in outcome.err
 
 
 def test_how_much_is_said(run, task, write):
     path = write(task)
-    assert run("plan", path, *SMALL, "--quiet") == run("-q", "plan", path, *SMALL)
-    quiet = run("plan", path, *SMALL, "--set", "robot.limits.velocity=1e9", "-q")
+    assert run(f"plan {path} {SMALL} --quiet") == run(f"-q plan {path} {SMALL}")
+    quiet = run(f"plan {path} {SMALL} --set robot.limits.velocity=1e9 -q")
     assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
-    verbose = run("plan", path, *SMALL, "-v")
+    verbose = run(f"plan {path} {SMALL} -v")
     assert "verification: passed" in verbose.out
     steps = verbose.err.splitlines()
     assert len(steps) > 3
@@ -222,11 +190,11 @@ def test_how_much_is_said(run, task, write):
     assert len(slow) == 1
     steps.remove(slow[0])
     assert all(" s: " in line and line.startswith("brachis: ") for line in steps)
-    assert run("plan", path, *SMALL).err == f"{slow[0]}\n", (
+    assert run(f"plan {path} {SMALL}").err == f"{slow[0]}\n", (
         "what one command is told does not hold for the next one"
     )
-    assert json.loads(run("plan", path, *SMALL, "--json", "--quiet").out)["verified"]
-    assert "gone.yaml" in run("plan", "gone.yaml", "--quiet").err
+    assert json.loads(run(f"plan {path} {SMALL} --json --quiet").out)["verified"]
+    assert "gone.yaml" in run("plan gone.yaml --quiet").err
 
 
 def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
@@ -234,33 +202,33 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
         raise ZeroDivisionError
 
     monkeypatch.setattr(planner, "plan", broken)
-    outcome = run("plan", write(task))
+    outcome = run(f"plan {write(task)}")
     assert outcome.code == 1
     assert "Traceback" not in outcome.err
     assert "internal error: ZeroDivisionError" in outcome.err
     assert "bug in brachis; run again with --verbose" in outcome.err
-    assert "Traceback" in run("plan", write(task), "--verbose").err
+    assert "Traceback" in run(f"plan {write(task)} --verbose").err
 
 
 def test_new_and_robots(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    listed = json.loads(run("robots", "--json").out)["robots"]
+    listed = json.loads(run("robots --json").out)["robots"]
     assert {
         "name": "gantry2",
         "what": "two linear axes",
         "joints": ["x_axis", "y_axis"],
     }.items() <= listed[1].items()
-    data = json.loads(run("new", listed[1]["urdf"], "--json").out)
+    data = json.loads(run(f"new {listed[1]['urdf']} --json").out)
     assert data["verified"]
     assert data["file"] == "task.yaml"
     before = (tmp_path / "task.yaml").read_text()
-    outcome = run("new", "scara3")
+    outcome = run("new scara3")
     assert outcome.code == 2
     assert "task.yaml: the file exists" in outcome.err
     assert (tmp_path / "task.yaml").read_text() == before
-    assert run("plan", "task.yaml", *SMALL).code == 0
+    assert run(f"plan task.yaml {SMALL}").code == 0
 
 
 def test_new_tells_how_long_the_motion_lasts(run, tmp_path):
-    outcome = run("new", "gantry2", "--out", tmp_path / "task.yaml")
+    outcome = run(f"new gantry2 --out {tmp_path / 'task.yaml'}")
     assert re.search(r"verified: the motion lasts \d+\.\d{4} s", outcome.out)

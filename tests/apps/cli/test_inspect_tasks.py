@@ -61,8 +61,8 @@ def test_every_convention_says_the_same_place(run, tmp_path, options, frame):
 )
 def test_the_place_is_told_while_the_end_is_wrong(run, tmp_path, end):
     file = written(tmp_path, end=end)
-    assert run("inspect", file).code == 2
-    outcome = run("inspect", file, "--posture", "home")
+    assert run(f"inspect {file}").code == 2
+    outcome = run(f"inspect {file} --posture home")
     assert outcome.code == 0
     second, third = outcome.out.splitlines()[1:3]
     assert (second, third[:12]) == ("the tool in the world:", "  position: ")
@@ -79,7 +79,7 @@ def test_wrong_names_of_postures_and_frames(run, tmp_path):
         outcome = run("inspect", file, *options)
         assert outcome.code == 2
         assert said in outcome.err
-    outcome = run("inspect", "iiwa14", "--posture", "0 0 0 0 0 0 0", "--frame", "a")
+    outcome = run("inspect iiwa14 --posture '0 0 0 0 0 0 0' --frame a")
     assert "--frame: this option cannot be used with a URDF" in outcome.err
 
 
@@ -89,11 +89,11 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
     """The start posture cannot keep clear of them, and the entries are enough to plan."""
     file = written(tmp_path, scene=[FLOOR])
     assert run("inspect", written(tmp_path, scene=[FLOOR]), "--json").code == 0
-    outcome = run("inspect", file)
+    outcome = run(f"inspect {file}")
     text = outcome.out.replace("\n", " ")
     assert "add [link_1 0, floor] to collisions.disable" in text
     assert "the task cannot be planned: postures.home" in text
-    pairs = json.loads(run("inspect", file, "--json").out)["collisions"]["never_free"]
+    pairs = json.loads(run(f"inspect {file} --json").out)["collisions"]["never_free"]
     free = run("inspect", file, "--set", f"collisions.disable={json.dumps(pairs)}")
     assert free.code == 0
     assert "never free" not in free.out
@@ -103,17 +103,17 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
 
 
 def test_it_fits_a_screen_and_has_the_reasons_where_asked(run):
-    short = run("inspect", "tx90l_rail").out
+    short = run("inspect tx90l_rail").out
     assert len(short.splitlines()) < 40
     assert "do not meet in a point" not in short
     for joint in ("rail", *(f"joint_{number}" for number in range(1, 7))):
         rows = [row for row in short.splitlines()[1:] if joint in row]
         assert len(rows) == 2, "one in the table of joints, one in that of choices"
-    long = run("--verbose", "inspect", "tx90l_rail").out
+    long = run("--verbose inspect tx90l_rail").out
     assert "not joint_4: " in long
     assert "do not meet in a point" in long
     assert "branches with rail" in long
-    many = run("inspect", "gen3_rails").out
+    many = run("inspect gen3_rails").out
     assert len(many.splitlines()) < 50
     assert "and 72 more" in many
 
@@ -126,6 +126,6 @@ def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path):
         <geom size="0.1" pos="0 0 1"/></body></worldbody></mujoco>"""
     )
     for _ in range(2):
-        outcome = run("inspect", file)
+        outcome = run(f"inspect {file}")
         assert outcome.code == 0
         assert outcome.err.count("left out: collision shapes (1)") == 1

@@ -42,7 +42,7 @@ def files(request, tmp_path_factory):
 
 
 def test_plan(run, files, tmp_path):
-    outcome = run("plan", files / "task.yaml", "--out", tmp_path)
+    outcome = run(f"plan {files / 'task.yaml'} --out {tmp_path}")
     assert outcome.code == 0, outcome.err
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"result.npz", "result.json", "overview.png", "candidates.png"}
@@ -51,7 +51,7 @@ def test_plan(run, files, tmp_path):
 @pytest.mark.parametrize("kind", sorted({*PLOTS} - {"fit"}))
 def test_plot(kind, run, files, tmp_path):
     outcome = run(
-        "plot", files / "result.npz", "--kind", kind, "--out", tmp_path / "figure.svg"
+        f"plot {files / 'result.npz'} --kind {kind} --out {tmp_path / 'figure.svg'}"
     )
     assert outcome.code == 0, outcome.err
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()
@@ -67,14 +67,14 @@ def test_export_verify_inspect(run, files, tmp_path):
         assert outcome.code == 0, outcome.err
     with table.open() as stream:
         assert {len(row) for row in csv.reader(stream)} == {5}
-    outcome = run("verify", files / "result.npz", "--json")
+    outcome = run(f"verify {files / 'result.npz'} --json")
     assert outcome.code == 0, outcome.err
     assert json.loads(outcome.out)["passed"] is True
-    outcome = run("inspect", files / "robot.urdf", "--posture", "0.2", "--json")
+    outcome = run(f"inspect {files / 'robot.urdf'} --posture 0.2 --json")
     assert outcome.code == 0, outcome.err
     (choice,) = json.loads(outcome.out)["decompositions"]
     assert choice["solver"] != "-"
-    outcome = run("verify", tmp_path)
+    outcome = run(f"verify {tmp_path}")
     assert outcome.code == 2
     message = "this folder contains no motion; allowed: result.npz or unverified.npz"
     assert message in outcome.err
@@ -82,7 +82,7 @@ def test_export_verify_inspect(run, files, tmp_path):
 
 @pytest.mark.parametrize("name", ["task.yaml", "result.npz"])
 def test_bottleneck(name, run, files, tmp_path):
-    outcome = run("bottleneck", files / name, "--check", "--out", tmp_path, "--json")
+    outcome = run(f"bottleneck {files / name} --check --out {tmp_path} --json")
     assert outcome.code == 0, outcome.err
     found = json.loads(outcome.out)["bottleneck"]["sensitivities"]
     assert found["reliable"] is True

@@ -20,7 +20,7 @@ def stopping():
 def test_a_plan_prints_its_phases_and_has_them_in_its_json(
     run, write, stopping, tmp_path
 ):
-    outcome = run("plan", write(stopping), "--out", tmp_path / "out", "--no-figures")
+    outcome = run(f"plan {write(stopping)} --out {tmp_path / 'out'} --no-figures")
     assert outcome.code == 0
     table = outcome.out.split("phases")[1]
     (row,) = [line for line in table.splitlines() if " dwell " in line]
@@ -36,10 +36,10 @@ def test_a_plan_prints_its_phases_and_has_them_in_its_json(
 
 
 def test_one_phase_is_not_listed(run, write):
-    assert "phases" not in run("plan", write(quick_task())).out
+    assert "phases" not in run(f"plan {write(quick_task())}").out
 
 
 def test_the_bottleneck_report_has_the_phases(run, write, stopping):
-    outcome = run("bottleneck", write(stopping))
+    outcome = run(f"bottleneck {write(stopping)}")
     assert outcome.code == 0
     assert "phase 2 dwell, s = 0.5" in outcome.out

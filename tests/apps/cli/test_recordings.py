@@ -42,31 +42,27 @@ def recorded(tmp_path_factory):
 def test_import(run, recorded, tmp_path):
     file, cell, trajectory = recorded
     out = tmp_path / "today.npz"
-    outcome = run(
-        "import", file, "--robot", cell, "--angle", "deg", "--out", out, "--degrees"
-    )
+    outcome = run(f"import {file} --robot {cell} --angle deg --out {out} --degrees")
     assert outcome.code == 0, outcome.err
     assert " deg/s " in outcome.out
     assert f"end time t_E: {trajectory.t_end:.4f} s" in outcome.out
     assert "verification: passed" in outcome.out
     assert "unknown: the motion between the rows" in outcome.out
-    assert run("verify", out).code == 0
-    outcome = run("bottleneck", out)
+    assert run(f"verify {out}").code == 0
+    outcome = run(f"bottleneck {out}")
     assert outcome.code == 0, outcome.err
     assert (
         "what limits cost is unknown: the motion was not planned, or that is not stored with it"
         in outcome.out
     )
-    assert run("export", out, "--out", tmp_path / "again.json").code == 0
-    assert (
-        run("import", file, "--robot", cell, "--angle", "deg", "--out", cell).code == 2
-    )
+    assert run(f"export {out} --out {tmp_path / 'again.json'}").code == 0
+    assert run(f"import {file} --robot {cell} --angle deg --out {cell}").code == 2
 
 
 def test_compare(run, recorded, tmp_path):
     file, cell, trajectory = recorded
     out = tmp_path / "out"
-    outcome = run("compare", file, "--robot", cell, "--angle", "deg", "--out", out)
+    outcome = run(f"compare {file} --robot {cell} --angle deg --out {out}")
     assert outcome.code == 0, outcome.err
     data = json.loads((out / "comparison.json").read_text())
     assert data["t_end_today"] == pytest.approx(trajectory.t_end)
@@ -78,7 +74,7 @@ def test_compare(run, recorded, tmp_path):
         "comparison.json",
         "comparison.png",
     }
-    assert run("verify", out / "result.npz").code == 0
+    assert run(f"verify {out / 'result.npz'}").code == 0
 
 
 @pytest.mark.parametrize(

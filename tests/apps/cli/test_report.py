@@ -30,13 +30,13 @@ def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(run, tmp_pat
     page.write_text(
         "<!doctype html>\n<!-- brachis report -->\nan older one", encoding="utf-8"
     )
-    outcome = run("report", result, "--title", "the first line")
+    outcome = run(f"report {result} --title 'the first line'")
     assert outcome.code == 0, outcome.err
     assert str(page) in outcome.out
     assert "MB" in outcome.out
     assert "the first line" in page.read_text(encoding="utf-8")
     page.write_text("<!doctype html><p>somebody else's", encoding="utf-8")
-    refused = run("report", result)
+    refused = run(f"report {result}")
     assert refused.code == 2
     assert "of another kind than the new one" in refused.err
     assert page.read_text(encoding="utf-8") == "<!doctype html><p>somebody else's"
@@ -54,7 +54,7 @@ def test_a_robot_without_a_name_leaves_the_title_to_the_file(
 ):
     result = saved(tmp_path)
     monkeypatch.setattr(Robot, "name", "")
-    assert run("report", result).code == 0
+    assert run(f"report {result}").code == 0
     assert "<title>motion.npz: verified</title>" in (
         tmp_path / "motion.html"
     ).read_text(encoding="utf-8")

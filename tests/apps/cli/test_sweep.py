@@ -52,7 +52,7 @@ def sweep_file(tmp_path, write, task, monkeypatch):
 
 def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = run("sweep", sweep_file, "--verbose")
+    done = run(f"sweep {sweep_file} --verbose")
     assert done.code == 0
     lines = done.out.splitlines()
     cells = [
@@ -80,7 +80,7 @@ def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
 
 
 def test_a_sweep_as_json(run, sweep_file, tmp_path):
-    outcome = run("sweep", sweep_file, "--out", tmp_path / "out", "--json")
+    outcome = run(f"sweep {sweep_file} --out {tmp_path / 'out'} --json")
     data = json.loads(outcome.out)
     assert (data["plans"], data["verified"], data["failed"]) == (4, 3, 1)
     assert data["best"] == {"plan": 0, "path.0.line.length": 1.0, "t_end_s": 0.5}
@@ -92,7 +92,7 @@ def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
     content = yaml.safe_load(sweep_file.read_text())
     content["grid"]["path.0.line.length"] = [4.0, 5.0]
     sweep_file.write_text(yaml.safe_dump(content))
-    done = run("sweep", sweep_file, "--out", tmp_path / "out")
+    done = run(f"sweep {sweep_file} --out {tmp_path / 'out'}")
     assert done.code == 1
     assert "2 failed with PathError" in done.out
     assert not (tmp_path / "out/sweep.png").exists()
@@ -100,13 +100,13 @@ def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
 
 def test_parts_are_planned_by_themselves_and_merged(run, sweep_file, tmp_path):
     out = tmp_path / "out"
-    first = run("sweep", sweep_file, "--part", "1/2", "--out", out)
+    first = run(f"sweep {sweep_file} --part 1/2 --out {out}")
     assert first.code == 0
     assert "│ plans       │ 2 " in first.out
-    missing = run("sweep", sweep_file, "--merge", "--out", out)
+    missing = run(f"sweep {sweep_file} --merge --out {out}")
     assert missing.code == 2
     assert "found no result of 2 plans: 1, 3" in missing.err
-    assert run("sweep", sweep_file, "--part", "2/2", "--out", out).code == 0
+    assert run(f"sweep {sweep_file} --part 2/2 --out {out}").code == 0
     assert not (out / "sweep.png").exists()
-    assert run("sweep", sweep_file, "--merge", "--out", out).code == 0
+    assert run(f"sweep {sweep_file} --merge --out {out}").code == 0
     assert (out / "sweep.png").exists()

@@ -2,9 +2,11 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from brachis.errors import PlanningError
 
@@ -16,70 +18,41 @@ def set_key(task, dotted, value):
     task[last] = value
 
 
-WRONG_TASKS = {
-    "a wrong type": ("spline.degree", "three", ["spline.degree", "three"]),
-    "an unknown redundant joint": ("redundant_joints", ["j9"], ["'j9'", "j1, j2, j3"]),
-    "too many redundant joints": (
-        "redundant_joints",
-        ["j1", "j2"],
-        ["found 2", "allowed: 1", "3 joints less 2 rows"],
+WRONG_TASKS = [
+    ("spline.degree: three", "spline.degree.*three"),
+    ("redundant_joints: [j9]", "'j9'.*j1, j2, j3"),
+    ("redundant_joints: [j1, j2]", "found 2.*allowed: 1.*3 joints less 2 rows"),
+    ("redundant_joints: []", "found 0.*allowed: 1"),
+    (
+        "path: [{line: {length: 5.0, angle_deg: 0}}]",
+        "out of reach from s = 0.2.* m of 5 m.*Shorten or move the path",
     ),
-    "too few redundant joints": ("redundant_joints", [], ["found 0", "allowed: 1"]),
-    "a path out of reach": (
-        "path",
-        [{"line": {"length": 5.0, "angle_deg": 0}}],
-        ["out of reach from s = 0.2", " m of 5 m", "Shorten or move the path"],
+    ("robot.limits.position: {j2: [-1.0, 1.0]}", "'j2'.*-2.0944 rad.*-1 rad to 1 rad"),
+    ("end: {joints: [0.0, 0.0, 0.0]}", "end.joints.*off the path.*m off in"),
+    ("branch: elbow_up", "'elbow_up'.*elbow_positive, elbow_negative"),
+    ("branch: elbow_positive", "another branch.*elbow_negative"),
+    ("solver.name: slsqp", "'slsqp'.*uno.*ipopt.*uno_interior"),
+    (
+        "robot.urdf: scara4",
+        r"robot.urdf: the file does not exist.*iiwa14.*Did you mean 'scara3'\?",
     ),
-    "a start out of its range": (
-        "robot.limits.position",
-        {"j2": [-1.0, 1.0]},
-        ["'j2'", "-2.0944 rad", "-1 rad to 1 rad"],
-    ),
-    "an end off the path": (
-        "end",
-        {"joints": [0.0, 0.0, 0.0]},
-        ["end.joints", "off the path", "m off in"],
-    ),
-    "an unknown branch": (
-        "branch",
-        "elbow_up",
-        ["'elbow_up'", "elbow_positive, elbow_negative"],
-    ),
-    "another branch": (
-        "branch",
-        "elbow_positive",
-        ["another branch", "elbow_negative"],
-    ),
-    "an unknown solver": (
-        "solver.name",
-        "slsqp",
-        ["'slsqp'", "uno", "ipopt", "uno_interior"],
-    ),
-    "a robot that is not included": (
-        "robot.urdf",
-        "scara4",
-        ["robot.urdf: the file does not exist", "iiwa14", "Did you mean 'scara3'?"],
-    ),
-    "a singular start": (
-        "start.joints",
-        [0.3, 0.0, 0.0],
-        ["start.joints", "branches of the closed form meet"],
-    ),
-}
+    ("start.joints: [0.3, 0.0, 0.0]", "start.joints.*branches of the closed form meet"),
+]
 
 
-@pytest.mark.parametrize("case", WRONG_TASKS)
-def test_wrong_task(case, run, task, write, tmp_path):
-    key, value, expected = WRONG_TASKS[case]
-    set_key(task, key, value)
+@pytest.mark.parametrize(("change", "message"), WRONG_TASKS)
+def test_a_wrong_task_is_an_error_and_nothing_is_written(
+    change, message, run, task, write, tmp_path
+):
+    for key, value in yaml.safe_load(change).items():
+        set_key(task, key, value)
     out = tmp_path / "out"
     path = write(task)
-    outcome = run("plan", path, "--out", out)
+    outcome = run(f"plan {path} --out {out}")
     assert outcome.code == 2, outcome.err
     assert outcome.out == ""
     assert outcome.err.startswith(f"brachis: {path}: ")
-    for part in expected:
-        assert part in outcome.err
+    assert re.search(message, outcome.err), outcome.err
     assert "Traceback" not in outcome.err
     assert not out.exists() or not list(out.iterdir())
 
@@ -88,19 +61,19 @@ def test_the_task_file_is_not_blamed_for_other_inputs(run, task, write, tmp_path
     path = write(task)
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot name='x'><link")
-    outcome = run("plan", path, "--urdf", broken)
+    outcome = run(f"plan {path} --urdf {broken}")
     assert outcome.code == 2
     assert outcome.err.startswith(f"brachis: {broken}: ")
-    outcome = run("inspect", path, "--task-space", "foo")
+    outcome = run(f"inspect {path} --task-space foo")
     assert outcome.code == 2
     assert outcome.err.startswith("brachis: task_space: ")
     for command in ("plan", "bottleneck"):
-        outcome = run(command, path, "--set", "redundant_joints=[j9]", "--strict")
+        outcome = run(f"{command} {path} --set 'redundant_joints=[j9]' --strict")
         assert outcome.code == 2
         where = f"{path} with redundant_joints, strict set: redundant_joints: "
         assert outcome.err.startswith(f"brachis: {where}")
     task["robot"]["urdf"] = str(broken)
-    outcome = run("inspect", write(task))
+    outcome = run(f"inspect {write(task)}")
     assert outcome.code == 2
     assert outcome.err.startswith(f"brachis: {broken}: ")
 
@@ -111,7 +84,7 @@ def test_torque_cannot_hold_the_arm_further_along(run, task, write):
     task["robot"]["limits"]["torque"] = [120, 60, 20]
     task["start"] = {"joints": [-math.pi / 2 - 0.2, 0.2, 0.2]}
     task["path"] = [{"line": {"to": [2.4, -1.0]}}]
-    outcome = run("plan", write(task))
+    outcome = run(f"plan {write(task)}")
     assert outcome.code == 2, outcome.err
     assert "cannot hold the arm against gravity from s = " in outcome.err
 
@@ -129,7 +102,7 @@ def test_no_closed_form(run, task, write, tmp_path):
     )
     task["robot"]["urdf"] = str(urdf)
     task["start"] = {"joints": [0.1, 0.4, 0.3]}
-    outcome = run("plan", write(task))
+    outcome = run(f"plan {write(task)}")
     assert outcome.code == 2
     assert "no closed form for redundant joints [j3]" in outcome.err
     assert (
@@ -144,7 +117,7 @@ def test_no_closed_form(run, task, write, tmp_path):
 @pytest.mark.parametrize("name", ["file", "motion.npz"])
 def test_a_file_cannot_be_the_output_folder(name, run, task, write, tmp_path):
     (tmp_path / "file").write_text("mine")
-    outcome = run("plan", write(task), "--out", tmp_path / name)
+    outcome = run(f"plan {write(task)} --out {tmp_path / name}")
     assert outcome.code == 2
     assert "a folder, and this is the name of a file" in outcome.err
     if name == "motion.npz":
@@ -167,50 +140,52 @@ def test_json_has_the_error_and_its_exit_code(run, task, write, tmp_path, monkey
         raise PlanningError("no motion")
 
     monkeypatch.setattr("brachis.planner.plan", fail)
-    outcome = run("plan", write(task), "--json")
+    outcome = run(f"plan {write(task)} --json")
     data = json.loads(outcome.out)
     assert (outcome.code, data["exit_code"], data["error"]) == (1, 1, "no motion")
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "message"),
     [
         (
-            ("plan", "scara3"),
+            "plan scara3",
             (
-                "scara3: this is the name of a robot, not of a task file; allowed: a task file. "
-                "brachis new scara3 writes a first task for it"
+                "scara3: this is the name of a robot, not of a task file; allowed: a task file. brachis new scara3 "
+                "writes a first task for it"
             ),
         ),
-        (("plan", "scara4"), "there is no robot named 'scara4'"),
+        ("plan scara4", "there is no robot named 'scara4'"),
         (
-            ("plan", "sweep.yaml"),
+            "plan sweep.yaml",
             "found a sweep file; allowed: a task file. brachis sweep sweep.yaml plans it",
         ),
         (
-            ("plan", "README.md"),
+            "plan README.md",
             "README.md: the file is not a task; found README.md: line 1, column 1: not valid YAML",
         ),
         (
-            ("inspect", "p.csv"),
-            "p.csv: the file is not a URDF; found 't,j1\\n0,1\\n' at its beginning",
+            "inspect p.csv",
+            r"p.csv: the file is not a URDF; found 't,j1\n0,1\n' at its beginning",
         ),
-        (("sweep", "task.yaml"), "found a task file; allowed: a sweep file"),
+        ("sweep task.yaml", "found a task file; allowed: a sweep file"),
         (
-            ("import", "task.yaml", "--robot", "scara3", "--out", "x.npz"),
+            "import task.yaml --robot scara3 --out x.npz",
             "found a task file; allowed: a CSV file",
         ),
     ],
 )
-def test_other_things_than_are_asked_for(run, tmp_path, monkeypatch, command, told):
+def test_the_error_says_what_was_found_and_what_is_expected(
+    run, tmp_path, monkeypatch, command, message
+):
     (tmp_path / "task.yaml").write_text("brachis: 1\n")
     (tmp_path / "sweep.yaml").write_text("sweep: 1\ntask: task.yaml\n")
     (tmp_path / "README.md").write_text("`a` page")
     (tmp_path / "p.csv").write_text("t,j1\n0,1\n")
     monkeypatch.chdir(tmp_path)
-    outcome = run(*command)
+    outcome = run(command)
     assert outcome.code == 2
-    assert told in outcome.err
+    assert message in outcome.err
 
 
 @pytest.mark.skipif(
@@ -231,6 +206,6 @@ def test_files_of_the_kernel_are_no_results(name, command, run, tmp_path):
 def test_a_text_that_shows_a_task_is_no_task_file(run, tmp_path):
     text = tmp_path / "notes.md"
     text.write_text("# A task\n\n```yaml\nbrachis: 1\n```\n")
-    outcome = run("verify", text)
+    outcome = run(f"verify {text}")
     assert outcome.code == 2
     assert "not a brachis result" in outcome.err

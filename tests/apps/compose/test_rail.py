@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from lxml import etree
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis import Robot
@@ -51,7 +52,7 @@ def check_kinematics(path, axis, xyz, rpy):
     for q in np.random.default_rng(0).uniform(-2.0, 2.0, (5, 4)):
         mounted = pin.SE3(rotation(rpy), np.array(xyz) + q[0] * direction)
         expected = mounted * arm.tool_placement(q[1:])
-        np.testing.assert_allclose(
+        assert_allclose(
             composed.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
         )
 
@@ -72,7 +73,7 @@ def test_limits_are_those_given(arm):
         ("torque", 1500.0),
     ):
         expected = [figure, *getattr(lonely.limits, name)]
-        np.testing.assert_array_equal(getattr(composed.limits, name), expected)
+        assert_array_equal(getattr(composed.limits, name), expected)
 
 
 def test_everything_moves_with_the_rail(arm):
@@ -114,18 +115,18 @@ def test_carriage_is_a_solid_box_below_the_arm(arm):
     placed = pin.SE3(rotation((pi, 0.0, 0.0)), np.array([1.0, 0.0, 0.5])).act(base)
     box = model.inertias[1] - placed
     assert box.mass == pytest.approx(80.0)
-    np.testing.assert_allclose(box.lever, [1.0, 0.0, 0.55], atol=1e-12)
+    assert_allclose(box.lever, [1.0, 0.0, 0.55], atol=1e-12)
     expected = (
         np.diag([0.2**2 + 0.1**2, 0.6**2 + 0.1**2, 0.6**2 + 0.2**2]) * 80.0 / 12.0
     )
-    np.testing.assert_allclose(box.inertia, expected, atol=1e-10)
+    assert_allclose(box.inertia, expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("length", [5.0, 5e-200, 5e200])
 def test_axis_may_have_any_length(arm, length):
     text = on_rail(arm, Rail(**RAIL, axis=(0.0, 0.6 * length, -0.8 * length)))
     axis = etree.fromstring(text.encode()).find("joint[@name='rail']/axis").get("xyz")
-    np.testing.assert_allclose(
+    assert_allclose(
         [float(word) for word in axis.split()], [0.0, 0.6, -0.8], rtol=1e-15
     )
 

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 import yourdfpy
 from lxml import etree
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis import Robot
 from brachis.apps.compose import Rail, on_rail
@@ -83,10 +84,10 @@ def test_tx90l_figures(tx90l):
         [400, 390, 420, 540, 475, 760],
     ]
     lower, upper, speed = (np.radians(row) for row in degrees)
-    np.testing.assert_array_equal(tx90l.limits.position_lower, [-2.0, *lower])
-    np.testing.assert_array_equal(tx90l.limits.position_upper, [2.0, *upper])
-    np.testing.assert_array_equal(tx90l.limits.velocity, [2.0, *speed])
-    np.testing.assert_array_equal(
+    assert_array_equal(tx90l.limits.position_lower, [-2.0, *lower])
+    assert_array_equal(tx90l.limits.position_upper, [2.0, *upper])
+    assert_array_equal(tx90l.limits.velocity, [2.0, *speed])
+    assert_array_equal(
         tx90l.limits.torque, [1500.0, 318.0, 130.0, 65.0, 34.0, 29.0, 11.0]
     )
 
@@ -108,8 +109,8 @@ def test_tx90l_forward_kinematics_are_those_of_an_ortho_parallel_wrist_arm(tx90l
         forearm = turn("z", q1) * turn("y", q2 + q3)
         hand = (forearm * turn("z", q4) * turn("y", q5) * turn("z", q6)).rotation
         placement = tx90l.tool_placement(q)
-        np.testing.assert_allclose(placement.rotation, hand, atol=1e-14)
-        np.testing.assert_allclose(
+        assert_allclose(placement.rotation, hand, atol=1e-14)
+        assert_allclose(
             placement.translation,
             wrist + [0.0, rail, 0.0] + c4 * hand[:, 2],
             atol=1e-14,
@@ -135,18 +136,14 @@ def test_iiwa14_is_the_published_arm():
     robot = Robot.from_urdf(ROBOTS / "iiwa14/robot.urdf")
     assert robot.joint_names == tuple(f"joint_{i}" for i in range(1, 8))
     assert (robot.base_frame, robot.tool_frame) == ("link_0", "tool")
-    np.testing.assert_array_equal(
+    assert_array_equal(
         robot.limits.position_upper, np.radians([170, 120, 170, 120, 170, 120, 175])
     )
-    np.testing.assert_array_equal(
-        robot.limits.position_lower, -robot.limits.position_upper
-    )
-    np.testing.assert_array_equal(
+    assert_array_equal(robot.limits.position_lower, -robot.limits.position_upper)
+    assert_array_equal(
         robot.limits.velocity, np.radians([85, 85, 100, 75, 130, 135, 135])
     )
-    np.testing.assert_array_equal(
-        robot.limits.torque, [320, 320, 176, 176, 110, 40, 40]
-    )
+    assert_array_equal(robot.limits.torque, [320, 320, 176, 176, 110, 40, 40])
     assert np.all(np.abs(gravity_torque(robot, anywhere(robot))) < robot.limits.torque)
     # Denavit-Hartenberg: turns about z and x by turns, d_bs, d_se, d_ew, d_wf along z.
     lengths, twists = (
@@ -159,7 +156,7 @@ def test_iiwa14_is_the_published_arm():
             expected = (
                 expected * turn("z", angle) * shift(0.0, 0.0, d) * turn("x", alpha)
             )
-        np.testing.assert_allclose(
+        assert_allclose(
             robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
         )
 
@@ -171,7 +168,7 @@ def test_ur10_rail_is_the_published_arm():
     assert sum(inertia.mass for inertia in robot.model.inertias) == pytest.approx(
         60.0 + 32.7
     )
-    np.testing.assert_array_equal(
+    assert_array_equal(
         robot.limits.torque, [2000.0, 330.0, 330.0, 150.0, 54.0, 54.0, 54.0]
     )
     # Denavit-Hartenberg as the maker publishes it; its base frame is turned by 180 degrees about z.
@@ -188,7 +185,7 @@ def test_ur10_rail_is_the_published_arm():
         for angle, (d, a, alpha) in zip(q[1:], rows, strict=True):
             expected = expected * turn("z", angle) * shift(a, 0.0, d) * turn("x", alpha)
         # The source writes right angles with twelve digits.
-        np.testing.assert_allclose(
+        assert_allclose(
             robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-10
         )
 

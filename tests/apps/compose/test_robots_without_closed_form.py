@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis import Robot
 from brachis.robot import dynamics
@@ -69,10 +70,10 @@ def test_mujoco_agrees_with_torques_and_tool(name):
             np.abs(data.qfrc_inverse[order] - torque) < 1e-6 * robot.limits.torque
         )
         placement = robot.tool_placement(q)
-        np.testing.assert_allclose(
+        assert_allclose(
             data.body(robot.tool_frame).xpos, placement.translation, atol=1e-9
         )
-        np.testing.assert_allclose(
+        assert_allclose(
             data.body(robot.tool_frame).xmat.reshape(3, 3),
             placement.rotation,
             atol=1e-9,
@@ -81,12 +82,10 @@ def test_mujoco_agrees_with_torques_and_tool(name):
 
 def test_gen3_limits_and_masses(gen3):
     ranges = np.radians([math.inf, 128.9, math.inf, 147.8, math.inf, 120.3, math.inf])
-    np.testing.assert_array_equal(gen3.limits.position_upper, ranges)
-    np.testing.assert_array_equal(gen3.limits.position_lower, -ranges)
-    np.testing.assert_allclose(
-        gen3.limits.velocity, [1.3963] * 4 + [1.2218] * 3, atol=1e-4
-    )
-    np.testing.assert_array_equal(gen3.limits.torque, [39] * 4 + [9] * 3)
+    assert_array_equal(gen3.limits.position_upper, ranges)
+    assert_array_equal(gen3.limits.position_lower, -ranges)
+    assert_allclose(gen3.limits.velocity, [1.3963] * 4 + [1.2218] * 3, atol=1e-4)
+    assert_array_equal(gen3.limits.torque, [39] * 4 + [9] * 3)
     assert sum(body.mass for body in gen3.model.inertias) == pytest.approx(
         8.2, abs=0.02
     )
@@ -108,7 +107,7 @@ def test_gen3_is_the_published_chain(gen3):
                 * turn
                 * pin.SE3(pin.exp3(np.array([twist, 0.0, 0.0])), np.zeros(3))
             )
-        np.testing.assert_allclose(
+        assert_allclose(
             gen3.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-12
         )
 
@@ -122,18 +121,16 @@ def test_gen3_rails_carry_the_same_arm_upside_down(gen3):
             * hanging
             * gen3.tool_placement(q[2:])
         )
-        np.testing.assert_allclose(
+        assert_allclose(
             robot.tool_placement(q).homogeneous, moved.homogeneous, atol=1e-12
         )
     for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_array_equal(
-            getattr(robot.limits, name)[2:], getattr(gen3.limits, name)
-        )
+        assert_array_equal(getattr(robot.limits, name)[2:], getattr(gen3.limits, name))
 
 
 def test_arm8_stands_upright_at_zero_and_no_neighbouring_axes_meet():
     robot = load("arm8")
-    np.testing.assert_allclose(
+    assert_allclose(
         robot.tool_placement(np.zeros(8)).translation, [0.04, 0.0, 1.4], atol=1e-12
     )
     placements = robot.model.jointPlacements[2:]

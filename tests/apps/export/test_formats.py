@@ -11,15 +11,16 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_typestore
 
+import brachis
 from brachis import export
 from brachis.apps.export.animation import frames
 from brachis.errors import BrachisWarning, InputError, UnknownNameError
-from brachis.robot import Robot
-from brachis.trajectory import Trajectory
+from support.motions import motion_between
 
 DT = 0.02
 NAMES = ("j1", "j2", "j3")
@@ -48,7 +49,7 @@ def equals_the_motion(trajectory, t, q, qdot, qddot):
         (qdot, motion.qdot),
         (qddot, motion.qddot),
     ):
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+        assert_allclose(found, expected, rtol=0.0, atol=1e-9)
     assert len(t) > 100
 
 
@@ -148,27 +149,9 @@ def test_ros2_yaml(line_trajectory, written):
 
 @pytest.fixture(scope="module")
 def ur10(line_trajectory):
-    """A motion of an arm of six joints on a rail, at rest in between."""
-    from pathlib import Path
-
-    robot = Robot.from_urdf(Path(__file__).parents[3] / "robots/ur10_rail/robot.urdf")
-    times, q = np.array([0.0, 1.0]), np.array([np.zeros(7), np.linspace(0.6, 0.7, 7)])
-    rest = np.zeros((2, 7))
-    parts = {
-        name: getattr(line_trajectory, name)
-        for name in ("task", "knots", "degree", "control_points")
-    }
-    parts |= {
-        "urdf": robot.urdf,
-        "robot": robot,
-        "redundant_joints": (),
-        "branch": "",
-        "times": times,
-        "q": q,
-    }
-    parts["phase_ends"] = times[-1:]
-    none = {"chart_rows": np.empty((0, 0, 0)), "chart_knots": np.empty(0)}
-    return Trajectory(**parts, **none, qdot=rest, qddot=rest, qddot_before=rest)
+    """A motion of an arm of six joints on a rail."""
+    q = np.array([np.zeros(7), np.linspace(0.6, 0.7, 7)])
+    return motion_between(line_trajectory, brachis.robots.ur10_rail, q, branch="")
 
 
 def test_urscript(ur10, tmp_path):
@@ -185,12 +168,10 @@ def test_urscript(ur10, tmp_path):
         float(found)
         for found in re.findall(r"servoj\(\[.*?\], 0, 0, ([0-9.e-]+),", text)
     ]
-    assert times == [0.008] * 125
-    np.testing.assert_allclose(
-        postures, ur10.position(np.cumsum(times))[:, 1:], atol=1e-9
-    )
+    assert times[:-1] == [0.008] * 137
+    assert_allclose(postures, ur10.position(np.cumsum(times))[:, 1:], atol=1e-9)
     (start,) = re.findall(r"start = (\[.*\])", text)
-    np.testing.assert_array_equal(json.loads(start), ur10.q[0, 1:])
+    assert_array_equal(json.loads(start), ur10.q[0, 1:])
     assert [line.split()[0] for line in text.splitlines()].count(
         "end"
     ) == 3  # of def, while and if

@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -46,22 +44,15 @@ def chain():
 @pytest.fixture(scope="session")
 def spatial_trajectory(line_trajectory):
     """Seven joints, one of them prismatic, from one posture to another within one polynomial piece."""
-    robot = build_robot(SPATIAL_JOINTS)
     q = np.array(
         [[0.0, 0.3, 0.4, 0.8, 0.2, 0.9, 0.0], [0.9, -0.6, 0.6, 0.5, 0.2, 0.9, 1.0]]
     )
-    return dataclasses.replace(
+    return motions.motion_between(
         line_trajectory,
-        task=line_trajectory.task.model_copy(update={"task_space": ("x", "y", "z")}),
-        robot=robot,
-        urdf=robot.urdf,
+        build_robot(SPATIAL_JOINTS),
+        q,
+        task_space=("x", "y", "z"),
         redundant_joints=("rail",),
-        times=np.array([0.0, 1.1]),
-        phase_ends=np.array([1.1]),
-        q=q,
-        qdot=np.zeros_like(q),
-        qddot=np.zeros_like(q),
-        qddot_before=np.zeros_like(q),
     )
 
 

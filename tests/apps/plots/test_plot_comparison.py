@@ -113,13 +113,6 @@ def test_value_labels_are_legible(step):
     assert written == len(paper_rows(step))
 
 
-def test_many_angles_go_to_more_panels_in_order():
-    figure = plot_comparison(paper_rows(10), unit="°")
-    assert len(figure.axes) > 1
-    labels = [tick.get_text() for ax in figure.axes for tick in ax.get_xticklabels()]
-    assert labels == [f"{a}°" for a in range(0, 360, 10)]
-
-
 @pytest.mark.parametrize(
     ("rows", "message", "where"),
     [

@@ -67,13 +67,6 @@ def test_what_the_task_allows_the_tool_is_drawn_where_it_comes_near(line_traject
     )
 
 
-def test_panels_share_the_time_axis(line_trajectory):
-    panels = plot_motion(line_trajectory).axes
-    panels[0].set_xlim(0.1, 0.2)
-    assert {ax.get_xlim() for ax in panels} == {(0.1, 0.2)}
-    assert [ax.get_xlabel() for ax in panels] == ["", "", "", "$t$ (s)"]
-
-
 def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajectory):
     labels = [ax.get_ylabel() for ax in plot_motion(line_trajectory).axes]
     assert labels == ["$q$ (rad)", r"$\dot{q}$ (rad/s)", "$s$", "tool speed (m/s)"]
@@ -101,15 +94,6 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
         == labelled(ax)[line_trajectory.joint_names[fastest]].get_color()
     )
     assert ax.get_ylim()[0] < limit.get_ydata()[0] < ax.get_ylim()[1]
-
-
-def test_far_and_infinite_limits_do_not_squeeze_the_data(line_trajectory, with_limits):
-    free = plot_motion(line_trajectory).axes[1]
-    assert levels(free) == []
-    far = plot_motion(
-        with_limits(line_trajectory, velocity=np.array([50.0, INF, 60.0]))
-    ).axes[1]
-    assert far.get_ylim() == free.get_ylim()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.apps.recording import read_recording
 from brachis.apps.recording.recording import check_units
@@ -42,8 +43,8 @@ def test_names_and_units(header, units, factors, table, write):
     found = read_recording(
         write(header, factors[0] * (t + 3.0), factors[1] * q), ROBOT, units
     )
-    np.testing.assert_allclose(found.t, t, atol=1e-12)
-    np.testing.assert_allclose(found.q, q, atol=1e-14)
+    assert_allclose(found.t, t, atol=1e-12)
+    assert_allclose(found.q, q, atol=1e-14)
     assert found.qdot is None
 
 
@@ -52,8 +53,8 @@ def test_columns_in_any_order_and_others_beside_them(table, write):
     columns = (q[:, 2], qdot[:, [1, 0, 2]], t, q[:, :2], q[:, 0])
     path = write("j3,qd_j2,j1_vel [rad/s],dq_j3,t,j1,j2,j1_effort", *columns)
     found = read_recording(path, ROBOT, {})
-    np.testing.assert_array_equal(found.q, q)
-    np.testing.assert_array_equal(found.qdot, qdot)
+    assert_array_equal(found.q, q)
+    assert_array_equal(found.qdot, qdot)
     assert "left out the columns j1_effort" in found.notes
 
 
@@ -65,7 +66,7 @@ def test_semicolons_and_decimal_commas(table, tmp_path):
     ]
     path = tmp_path / "today.csv"
     path.write_text("\n".join(["t;j1;j2;j3", *rows]))
-    np.testing.assert_allclose(read_recording(path, ROBOT, {}).q, q, atol=1e-12)
+    assert_allclose(read_recording(path, ROBOT, {}).q, q, atol=1e-12)
 
 
 def test_prismatic_joints_have_lengths(write):
@@ -75,7 +76,7 @@ def test_prismatic_joints_have_lengths(write):
     )
     names = robot.joint_names
     path = write(f"t,{names[0]} [mm],{names[1]}", t, 100.0 * t, 0.2 * t)
-    np.testing.assert_allclose(
+    assert_allclose(
         read_recording(path, robot, {}).q, np.outer(t, [0.1, 0.2]), atol=1e-15
     )
     with pytest.raises(
@@ -169,7 +170,7 @@ def test_accelerations_with_their_unit(unit, table, write):
         q,
         np.rad2deg(qdot),
     )
-    np.testing.assert_allclose(read_recording(path, ROBOT, {}).qddot, qdot, rtol=1e-12)
+    assert_allclose(read_recording(path, ROBOT, {}).qddot, qdot, rtol=1e-12)
 
 
 def test_names_of_joints_may_have_spaces(table, write):
@@ -177,4 +178,4 @@ def test_names_of_joints_may_have_spaces(table, write):
     text = ROBOT.urdf.replace('"j2"', '"joint 2"')
     robot = Robot.from_urdf("arm", urdf_text=text, tool_frame=ROBOT.tool_frame)
     found = read_recording(write("t,j1,joint 2_pos,j3", t, q), robot, {})
-    np.testing.assert_array_equal(found.q, q)
+    assert_array_equal(found.q, q)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.apps.report import make_report, tables
@@ -102,7 +103,7 @@ def test_curves_are_the_motion(rail, rail_page):
         t = np.clip(floats(trace["x"]).astype(float), 0.0, rail.t_end)
         expected = functions[kind](t)[:, trajectory.joint_names.index(name)]
         off = 2e-4 * max(1.0, np.abs(expected).max())
-        np.testing.assert_allclose(floats(trace["y"]), expected, atol=off)
+        assert_allclose(floats(trace["y"]), expected, atol=off)
         seen.add((kind, name))
     kinds = {"position", "velocity", "acceleration", "torque"}
     assert {kind for kind, name in seen if name == "joint_1"} == kinds
@@ -126,7 +127,7 @@ def test_the_timeline_shows_what_the_saturations_say(planar, planar_page):
     peaks = {str(entry.label): entry.peak for entry in entries if entry.peak > 0.5}
     assert heat["y"] == [*peaks][::-1]
     colours = floats(heat["z"]).max(axis=1)
-    np.testing.assert_allclose(colours, [*peaks.values()][::-1], atol=0.01)
+    assert_allclose(colours, [*peaks.values()][::-1], atol=0.01)
 
 
 def test_the_animation_is_the_motion(rail, rail_page):
@@ -135,8 +136,8 @@ def test_the_animation_is_the_motion(rail, rail_page):
     assert t[0] == 0.0
     assert t[-1] == pytest.approx(rail.t_end)
     samples = rail.trajectory.at(np.clip(t.astype(float), 0.0, rail.t_end))
-    np.testing.assert_allclose(bones[:, -1], samples.tool_position, atol=1e-4)
-    np.testing.assert_allclose(floats(scene["speed"]), samples.tool_speed, atol=1e-2)
+    assert_allclose(bones[:, -1], samples.tool_position, atol=1e-4)
+    assert_allclose(floats(scene["speed"]), samples.tool_speed, atol=1e-2)
     assert scene["plane"] is None
     assert [joint["name"] for joint in scene["joints"] if joint["prismatic"]] == [
         "rail"
@@ -181,8 +182,8 @@ def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limit
     assert [row[0] for row in rows] == list(rail.trajectory.joint_names)
     assert [row[0] for row in rows if row[1]] == ["rail"]
     starts, ends = ([float(row[i]) for row in rows] for i in (2, 4))
-    np.testing.assert_allclose(starts, rail.trajectory.position(0.0), atol=5e-5)
-    np.testing.assert_allclose(ends, rail.trajectory.position(rail.t_end), atol=5e-5)
+    assert_allclose(starts, rail.trajectory.position(0.0), atol=5e-5)
+    assert_allclose(ends, rail.trajectory.position(rail.t_end), atol=5e-5)
     assert re.search(r"100\.0 % of\s+1500 N", page)
 
 

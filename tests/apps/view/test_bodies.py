@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from brachis.apps.view.bodies import bodies_of, placements
 from brachis.robot import Robot
-from support.shown import PANDA, ROBOTS
+from support.shown import ROBOTS
 
 
 def placed(bodies, found):
@@ -26,12 +27,10 @@ def test_placements_are_those_of_the_model(motion_of):
     t = np.linspace(0.2, 0.9, 5)
     found = placements(robot, motion.position(t))
     tool, rotations = robot.tool_placements(motion.position(t))
-    np.testing.assert_allclose(found[0][:, -1], tool, atol=1e-12)
+    assert_allclose(found[0][:, -1], tool, atol=1e-12)
     w, x, y, z = found[1][0, -1]
-    np.testing.assert_allclose(
-        1.0 - 2.0 * (y * y + z * z), rotations[0, 0, 0], atol=1e-12
-    )
-    np.testing.assert_allclose(2.0 * (x * y + w * z), rotations[0, 1, 0], atol=1e-12)
+    assert_allclose(1.0 - 2.0 * (y * y + z * z), rotations[0, 0, 0], atol=1e-12)
+    assert_allclose(2.0 * (x * y + w * z), rotations[0, 1, 0], atol=1e-12)
 
 
 def test_a_rail_is_part_of_what_stands_still_and_the_arm_is_not(motion_of):
@@ -53,7 +52,7 @@ def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(
     found = placements(bare_robot, motion.q[:1])
     vertices = placed(bodies.skeleton, found)
     assert np.linalg.norm(vertices[2] - found[0][0, -1], axis=1).min() < 0.05
-    np.testing.assert_allclose(
+    assert_allclose(
         [vertices[0][:, 1].min(), vertices[0][:, 1].max()], [-1.0, 2.0], atol=0.02
     )  # the rail
     assert np.linalg.norm(vertices[1] - found[0][0, 2], axis=1).min() < 0.05
@@ -69,17 +68,3 @@ def test_the_box_holds_every_robot(urdf, motion_of):
     )
     assert (vertices >= bodies.box[0] - 1e-9).all()
     assert (vertices <= bodies.box[1] + 1e-9).all()
-
-
-@pytest.mark.skipif(PANDA is None, reason="example-robot-data is not installed")
-def test_meshes_that_are_missing_leave_the_skeleton(motion_of):
-    robot = Robot.from_urdf(
-        "/nowhere/panda.urdf",
-        urdf_text=PANDA.read_text().replace("package://", "package://no"),
-        tool_frame="panda_hand_tcp",
-    )
-    bodies = bodies_of(motion_of(robot))
-    assert not bodies.shows_links
-    (reason,) = bodies.unread
-    assert "missing mesh files" in reason
-    assert set(bodies.skeleton) == set(range(8))

@@ -2,6 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.apps.view.panel import shown_panels
 from brachis.robot import Robot
@@ -38,17 +39,15 @@ def test_unequal_limits_count_in_their_own_direction(bare_robot, motion_of):
         velocity_upper=np.array([1.0, 2.0]),
     )
     speed = curves_of(motion)["velocity / limit"]
-    np.testing.assert_allclose(
-        speed.values * [1.0, 2.0], motion.velocity(speed.t), atol=1e-12
-    )
+    assert_allclose(speed.values * [1.0, 2.0], motion.velocity(speed.t), atol=1e-12)
 
 
 def test_positions_count_from_the_middle_of_their_range(bare_robot, motion_of):
     position = curves_of(motion_of(bare_robot, begin=0.5, end=2.0))[
         "position in its range"
     ]
-    np.testing.assert_allclose(position.values[0], [0.0, 0.25], atol=1e-12)
-    np.testing.assert_allclose(position.values[-1], [1.0, 1.0], atol=1e-12)
+    assert_allclose(position.values[0], [0.0, 0.25], atol=1e-12)
+    assert_allclose(position.values[-1], [1.0, 1.0], atol=1e-12)
 
 
 def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of):
@@ -66,7 +65,7 @@ def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of)
     force, torque = found["force (N, no limit)"], found["torque (Nm, no limit)"]
     assert [curve.name for curve in force.curves] == ["rail"]
     assert [(curve.name, curve.style) for curve in torque.curves] == [("turn", 1)]
-    np.testing.assert_allclose(force.values[:, 0], motion.torque(force.t)[:, 0])
+    assert_allclose(force.values[:, 0], motion.torque(force.t)[:, 0])
     low, high = torque.view()
     assert low < torque.values.min() <= torque.values.max() < high
 
@@ -89,7 +88,7 @@ def test_the_tools_speed_is_in_metres_per_second_beside_what_the_task_allows(
 ):
     motion = line_result.trajectory
     free = curves_of(motion)["tool speed (m/s)"]
-    np.testing.assert_allclose(free.values[:, 0], motion.at(free.t).tool_speed)
+    assert_allclose(free.values[:, 0], motion.at(free.t).tool_speed)
     assert levels(free) == []
     task = motion.task.model_copy(
         update={"tool_limits": ToolLimits(speed=1.1 * free.values.max())}
@@ -112,5 +111,5 @@ def test_angles_without_limits_may_be_in_degrees(bare_robot, motion_of):
         found["velocity (deg/s, no limit)"],
         found["velocity (m/s, no limit)"],
     )
-    np.testing.assert_allclose(turning.values[:, 0], np.rad2deg(samples.qdot[:, 1]))
-    np.testing.assert_allclose(sliding.values[:, 0], samples.qdot[:, 0])
+    assert_allclose(turning.values[:, 0], np.rad2deg(samples.qdot[:, 1]))
+    assert_allclose(sliding.values[:, 0], samples.qdot[:, 0])

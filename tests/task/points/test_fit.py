@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import TaskError
@@ -37,9 +38,7 @@ def test_all_points_are_within_the_tolerance(count, scatter, allowed):
     assert distances.max() <= allowed * MM
     assert report.position_error <= allowed * MM
     assert report.position_error >= distances.max() - 1e-7
-    np.testing.assert_allclose(
-        drawn[[0, -1]], position[[0, -1]], rtol=1e-15, atol=1e-15
-    )
+    assert_allclose(drawn[[0, -1]], position[[0, -1]], rtol=1e-15, atol=1e-15)
     assert curve.spline.k == 5
     assert np.diff(np.unique(curve.spline.t)).min() > 0.0
     assert report.intervals == len(np.unique(curve.spline.t)) - 1
@@ -98,7 +97,7 @@ def test_corners_are_found_where_they_are(count, scatter, allowed):
     position, places = bent(count, scatter * MM)
     curves, report = fit_curves(points(position), tolerance(allowed * MM))
     assert len(curves) == 3
-    np.testing.assert_allclose(
+    assert_allclose(
         np.rad2deg([corner.angle for corner in report.corners]), [90.0, 40.0], atol=7.0
     )
     for corner, place, curve, following in zip(
@@ -106,7 +105,7 @@ def test_corners_are_found_where_they_are(count, scatter, allowed):
     ):
         end = curve.spline(curve.spline.t[-1])
         assert np.linalg.norm(end - place) < max(4.0 * scatter, 1e-6) * MM
-        np.testing.assert_allclose(end, following.spline(0.0), rtol=1e-14)
+        assert_allclose(end, following.spline(0.0), rtol=1e-14)
         assert corner.blend == curve.blend
         assert np.linalg.norm(position[corner.row] - place) < 1.5e-3
     assert curves[-1].blend is None
@@ -223,5 +222,5 @@ def test_few_points_that_nearly_repeat_count_once(tolerance_mm):
     four = np.insert(three, 2, three[1] + [0.0, 1e-9], axis=0)
     (one,), _ = fit_curves(points(three), tolerance(tolerance_mm * MM))
     (other,), report = fit_curves(points(four), tolerance(tolerance_mm * MM))
-    np.testing.assert_allclose(other.spline.c, one.spline.c, atol=1e-12)
+    assert_allclose(other.spline.c, one.spline.c, atol=1e-12)
     assert "left out 1 row" in report.told[0]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.errors import TaskError
 from brachis.task.point_data import FitTolerance
@@ -30,33 +31,31 @@ M30
 def test_lines_and_arcs():
     points, told = points_of(PROGRAM)
     assert told == ("G-code", "skipped G54, M30")
-    np.testing.assert_allclose(points.position[0], [0.1, 0.0, 0.05])
+    assert_allclose(points.position[0], [0.1, 0.0, 0.05])
     for line, end in (
         (5, [0.1, 0.0, 0.01]),
         (6, [0.2, 0.0, 0.01]),
         (7, [0.25, 0.05, 0.01]),
         (8, [0.3, 0.1, 0.01]),
     ):
-        np.testing.assert_allclose(
-            points.position[points.rows == line][-1], end, atol=1e-12
-        )
+        assert_allclose(points.position[points.rows == line][-1], end, atol=1e-12)
     for line, centre in ((7, [0.2, 0.05]), (8, [0.3, 0.05])):
         on_arc = points.position[points.rows == line]
-        np.testing.assert_allclose(
+        assert_allclose(
             np.linalg.norm(on_arc[:, :2] - centre, axis=1), 0.05, atol=1e-12
         )
         chord = np.linalg.norm(np.diff(on_arc, axis=0), axis=1).max()
         assert chord**2 / (8.0 * 0.05) < 1.1e-6
     assert np.isnan(points.speed[0])
-    np.testing.assert_allclose(np.unique(points.speed[1:]), [0.01, 0.02])
+    assert_allclose(np.unique(points.speed[1:]), [0.01, 0.02])
 
 
 def test_units_planes_and_increments():
     points, _ = points_of("G20 G0 X1 Y0 Z0\nG91 G18\nG1 X1 F60\nG2 X0 Z2 K1\n")
-    np.testing.assert_allclose(points.position[-1], [0.0508, 0.0, 0.0508], atol=1e-12)
-    np.testing.assert_allclose(points.speed[-1], 0.0254)
+    assert_allclose(points.position[-1], [0.0508, 0.0, 0.0508], atol=1e-12)
+    assert_allclose(points.speed[-1], 0.0254)
     half = points.position[points.rows == 4]
-    np.testing.assert_allclose(
+    assert_allclose(
         np.hypot(half[:, 0] - 0.0508, half[:, 2] - 0.0254), 0.0254, atol=1e-12
     )
 
@@ -70,7 +69,7 @@ def test_whole_circles_and_long_arcs(motion, side):
     short, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X10 Y0 R10 F100\n")
     long, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X10 Y0 R-10 F100\n")
     heights = [np.abs(points.position[:, 1]).max() for points in (short, long)]
-    np.testing.assert_allclose(
+    assert_allclose(
         heights, [0.01 - np.sqrt(75.0) / 1e3, 0.01 + np.sqrt(75.0) / 1e3], rtol=1e-3
     )
     assert side * short.position[len(short) // 2, 1] > 0.0
@@ -157,12 +156,12 @@ def test_positions_alone_are_given():
 
 def test_nothing_after_the_end_is_a_move():
     points, _ = points_of("G0 X1 Y1 Z1\nG1 X10 F600\nM30\nG1 X900 Y900\n")
-    np.testing.assert_allclose(points.position[-1], [0.01, 0.001, 0.001])
+    assert_allclose(points.position[-1], [0.01, 0.001, 0.001])
 
 
 def test_a_plane_needs_no_third_axis():
     points, _ = points_of("G0 X0 Y0\nG1 X10 F600\nG1 Y10\n", ("x", "y"))
-    np.testing.assert_allclose(points.position[-1], [0.01, 0.01])
+    assert_allclose(points.position[-1], [0.01, 0.01])
 
 
 @pytest.mark.parametrize("end", ["X1550 Y50", "X1650 Y50"])
@@ -201,19 +200,17 @@ def test_centres_may_be_absolute():
     )
     one, *others = (points_of(f"G0 X20 Y0 Z0\n{arc} F60\n")[0] for arc in arcs)
     for other in others:
-        np.testing.assert_allclose(other.position, one.position, atol=1e-15)
+        assert_allclose(other.position, one.position, atol=1e-15)
 
 
 def test_a_place_that_is_set_is_where_the_path_begins():
     points, _ = points_of("G92 X5 Y0 Z1\nG91\nG1 X2 F60\n")
-    np.testing.assert_allclose(
-        points.position[[0, -1]], [[5e-3, 0, 1e-3], [7e-3, 0, 1e-3]]
-    )
+    assert_allclose(points.position[[0, -1]], [[5e-3, 0, 1e-3], [7e-3, 0, 1e-3]])
 
 
 def test_what_leaves_the_path_of_the_tip_as_it_is_is_skipped():
     points, told = points_of(
         "O1000\nT1 M6\nG64 P0.01\nG43 H1 G0 X0 Y0 Z5 S1000 M3\nG1 X10 F60 E1\n"
     )
-    np.testing.assert_allclose(points.position[-1], [0.01, 0.0, 0.005])
+    assert_allclose(points.position[-1], [0.01, 0.0, 0.005])
     assert "skipped E, G43, G64, H, M3, M6, O, P, S, T" in told

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import TaskError
 from brachis.task.point_data import FileUnits, PointFile
@@ -37,7 +38,7 @@ def read(text, rows="pose", units=None, orientation=None):
 )
 def test_forms_are_found_out(text, told):
     points, found = read(text)
-    np.testing.assert_array_equal(points.position, [[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    assert_array_equal(points.position, [[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]])
     assert found == told
 
 
@@ -46,9 +47,7 @@ def test_forms_are_found_out(text, told):
 )
 def test_units_in_the_header(header):
     points, told = read(f"{header}\n1,2,3\n4,5,6\n")
-    np.testing.assert_allclose(
-        points.position, np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]) / 1e3
-    )
+    assert_allclose(points.position, np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]) / 1e3)
     assert told == ("length in mm, as the header says",)
 
 
@@ -59,11 +58,11 @@ def test_units_of_the_task():
         units=FileUnits(length="mm", angle="deg", speed="mm/min"),
         orientation="rotation_vector",
     )
-    np.testing.assert_allclose(points.position[1], [4e-3, 5e-3, 6e-3])
-    np.testing.assert_allclose(
+    assert_allclose(points.position[1], [4e-3, 5e-3, 6e-3])
+    assert_allclose(
         points.turning[0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], atol=1e-15
     )
-    np.testing.assert_allclose(points.speed, [0.01, 0.02])
+    assert_allclose(points.speed, [0.01, 0.02])
     assert told == ("orientations: axis times angle",)
     assert points.rows.tolist() == [2, 3]
 
@@ -72,7 +71,7 @@ def test_quaternions_get_like_signs():
     points, _ = read(
         "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,0,0,-1,0,0,0\n2,0,0,1,0,0,0\n"
     )
-    np.testing.assert_allclose(points.turning, [[1.0, 0.0, 0.0, 0.0]] * 3, atol=1e-15)
+    assert_allclose(points.turning, [[1.0, 0.0, 0.0, 0.0]] * 3, atol=1e-15)
 
 
 MISTAKES = [
