@@ -17,7 +17,7 @@ MM = 1e-3
 S = np.linspace(0.0, 1.0, 2_001)
 
 
-def test_the_path_is_within_the_tolerance_of_all_points_blends_included():
+def test_the_path_with_its_blends_is_within_the_tolerance_of_all_points():
     position, _ = bent(900, 0.01 * MM)
     segments = fit_path(position, tolerance={"position": "0.1 mm", "corner": "0.5 mm"})
     path = build_path(segments, position[0], ["x", "y", "z"])
@@ -71,7 +71,7 @@ def test_all_forms_of_poses_give_the_same_path():
     )
 
 
-def test_a_relative_curve_is_moved_and_turned():
+def test_a_relative_curve_moves_and_turns_to_the_start():
     position, turns = poses()
     segments = fit_path(
         matrices(position, turns), tolerance={"position": "0.02 mm"}, relative=True
@@ -90,7 +90,7 @@ def test_a_relative_curve_is_moved_and_turned():
     )
 
 
-def test_a_start_elsewhere_is_refused():
+def test_a_start_elsewhere_is_an_error():
     position, turns = poses()
     segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"})
     with pytest.raises(
@@ -151,7 +151,7 @@ def test_a_quaternion_of_length_zero_at_the_start_is_no_crash():
         )
 
 
-def test_a_fitted_task_survives_being_saved():
+def test_a_task_with_a_fit_comes_back():
     position, turns = poses()
     segments = fit_path(
         matrices(position, turns),

@@ -190,7 +190,7 @@ def test_a_spline_bears_short_chords(points):
     assert_allclose(curve.derivatives(curve.knots, 0)[0, 1:], points, atol=1e-10)
 
 
-def test_a_spline_whose_start_is_stated():
+def test_a_spline_may_state_its_start():
     waypoints = [[1.5, 0], [2, 1]]
     plain = curve_of({"spline": {"through": waypoints}}, [1, -1], XY)
     stated = curve_of(

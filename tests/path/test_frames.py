@@ -102,7 +102,7 @@ def test_every_kind_of_segment_and_orientation_is_in_the_frame():
 @pytest.mark.parametrize(
     "rows", [["x", "y"], ["x", "y", "yaw"], "position", ["y", "z"]]
 )
-def test_rows_are_turned_and_moved(rows):
+def test_a_frame_turns_and_moves_rows(rows):
     names = ["x", "y", "z"] if rows == "position" else rows
     place = {"y": {"xyz": [0.3, 0.4, 0.7], "rpy_deg": [30.0, 0.0, 0.0]}}.get(
         names[0], FLAT

@@ -85,6 +85,6 @@ def test_functions_are_met_within_the_tolerance():
         (lambda u: u, ((0.0, 1.0),), "m finite numbers"),
     ],
 )
-def test_what_is_refused(curve, more, words):
+def test_curves_that_are_not_smooth_are_errors(curve, more, words):
     with pytest.raises(InputError, match=words):
         bspline_segment(curve, *more)

@@ -67,7 +67,7 @@ def test_joints_may_stand_in_another_order(tmp_path):
     )
 
 
-def test_a_column_of_joints_in_degrees_is_named(tmp_path):
+def test_the_error_names_a_column_of_joints_in_degrees(tmp_path):
     (tmp_path / "path.csv").write_text("a_deg,b_deg\n0,0\n10,20\n")
     with pytest.raises(TaskError, match=r"path\.csv: line 1: .*columns a_deg, b_deg"):
         task([{"csv": {"file": str(tmp_path / "path.csv")}}])

@@ -180,7 +180,7 @@ PLANAR = planar_robot("RRR", "xz")
 SLIDE = gantry_robot([[1.0, 0.0, 0.0]])
 
 
-def test_the_whole_position_must_be_prescribed():
+def test_a_speed_needs_the_whole_position():
     """By as many rows as the tool can move in."""
     line = [{"line": {"by": [0.1, 0.0]}}]
     short = [{"line": {"by": [0.1]}}]

@@ -15,7 +15,7 @@ RIGHT = {"line": {"by": [1, 0]}}
 UP = {"line": {"by": [0, 1]}}
 
 
-def refused(segments, rows):
+def error_of(segments, rows):
     with pytest.raises(PathError) as caught:
         row_path(segments, [0.0] * len(rows), rows)
     return caught.value
@@ -173,15 +173,15 @@ SEGMENTS = [
 
 @pytest.mark.parametrize(("segment", "rows", "message"), SEGMENTS)
 def test_the_error_names_what_is_wrong_with_a_segment(segment, rows, message):
-    assert re.search(message, str(refused([yaml.safe_load(segment)], rows)))
+    assert re.search(message, str(error_of([yaml.safe_load(segment)], rows)))
 
 
 def test_the_key_counts_segments():
-    assert "path[1].line.by: " in str(refused([RIGHT, {"line": {"by": [0, 0]}}], XY))
+    assert "path[1].line.by: " in str(error_of([RIGHT, {"line": {"by": [0, 0]}}], XY))
 
 
 def test_a_corner_names_place_angle_and_key():
-    error = refused([RIGHT, UP], XY)
+    error = error_of([RIGHT, UP], XY)
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0: the path must be smooth to the third derivative; found a corner "
         "of 90 degrees; allowed: segments that continue each other. Set path[0].blend (m) to "
@@ -200,22 +200,22 @@ def test_a_corner_names_place_angle_and_key():
 )
 def test_a_way_back_is_offered_no_blend(angle, advice):
     back = {"line": {"length": 0.5, "angle_deg": angle}}
-    assert advice in str(refused([RIGHT, back], XY))
+    assert advice in str(error_of([RIGHT, back], XY))
     blended = [RIGHT | {"blend": 0.01}, back]
     if "blend" in advice:
         row_path(blended, [0.0, 0.0], XY)
     else:
-        message = str(refused(blended, XY))
+        message = str(error_of(blended, XY))
         assert "too sharp for a blend" in message
         assert "allowed: more than 0.2" in message
 
 
-def test_all_corners_are_named():
+def test_the_error_names_all_corners():
     assert "likewise path[1], path[2]" in str(
-        refused([RIGHT, UP, {"line": {"by": [0, -1]}}, RIGHT], XY)
+        error_of([RIGHT, UP, {"line": {"by": [0, -1]}}, RIGHT], XY)
     )
     assert "likewise path[1], path[3]" in str(
-        refused([RIGHT, UP, RIGHT, RIGHT, UP], XY)
+        error_of([RIGHT, UP, RIGHT, RIGHT, UP], XY)
     )
 
 
@@ -245,7 +245,7 @@ def test_all_corners_are_named():
     ],
 )
 def test_the_error_says_what_jumps_at_a_join(segments, rows, message):
-    assert message in str(refused(yaml.safe_load(segments), rows))
+    assert message in str(error_of(yaml.safe_load(segments), rows))
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_the_error_says_what_jumps_at_a_join(segments, rows, message):
         (3, [0.0, 1e-8], None),
     ],
 )
-def test_every_derivative_is_compared(order, jump, expected):
+def test_a_join_compares_every_derivative(order, jump, expected):
     before, after, far = np.zeros((3, 4, 2))
     before[1] = after[1] = far[1] = [1.0, 0.0]
     far[0] = [2.0, 1.0]
@@ -272,7 +272,7 @@ def test_every_derivative_is_compared(order, jump, expected):
 
 def test_a_blend_that_is_too_long_is_told_the_longest():
     short = {"line": {"by": [0, 0.3]}}
-    error = refused([RIGHT | {"blend": 0.2}, short], XY)
+    error = error_of([RIGHT | {"blend": 0.2}, short], XY)
     assert "path[0].blend: " in str(error)
     assert (
         "longer than half of a neighbouring segment; found 0.2 m; allowed: at most 0.15 m"
@@ -294,7 +294,7 @@ def test_a_blend_that_is_too_long_is_told_the_longest():
 def test_the_longest_blend_has_few_digits_and_fits_as_it_is_written(length, written):
     segments = [RIGHT | {"line": {"by": [50, 0]}, "blend": 20.0}]
     segments.append({"line": {"by": [0, length]}})
-    longest = str(refused(segments, XY)).split("at most ")[1]
+    longest = str(error_of(segments, XY)).split("at most ")[1]
     assert longest.startswith(written)
     segments[0]["blend"] = float(longest.split(" m")[0])
     row_path(segments, [0.0, 0.0], XY)
@@ -302,11 +302,11 @@ def test_the_longest_blend_has_few_digits_and_fits_as_it_is_written(length, writ
 
 def test_neighbouring_blends_do_not_overlap():
     segments = [RIGHT | {"blend": 0.5}, UP | {"blend": 0.51}, RIGHT]
-    assert "path[1].blend: " in str(refused(segments, XY))
+    assert "path[1].blend: " in str(error_of(segments, XY))
 
 
 def test_a_blend_beside_a_turn_on_the_spot():
     segments = [{"line": {"by": [1, 0, 0]}, "blend": 0.1}, {"line": {"by": [0, 0, 1]}}]
     assert "a blend needs motion of the position on both sides" in str(
-        refused(segments, XYW)
+        error_of(segments, XYW)
     )

@@ -41,7 +41,7 @@ def at_waypoints(path):
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6])
-def test_waypoints_are_passed(count):
+def test_a_spline_passes_its_waypoints(count):
     target = at_waypoints(through(count))
     assert_allclose(target[-count:, :3], POINTS[:count], atol=1e-12)
     expected = np.stack([one.as_matrix().ravel() for one in ATTITUDES[: count + 1]])

@@ -77,7 +77,7 @@ def arm(
     )
 
 
-def told(robot):
+def issues_of(robot):
     return [(remark.where, remark.message) for remark in of_robot(robot)]
 
 
@@ -106,12 +106,12 @@ def test_the_limits_of_real_urdfs_are_plausible(file):
 
 def test_velocities_and_ranges_in_degrees():
     robot = arm()
-    assert told(robot) == []
+    assert issues_of(robot) == []
     limits = robot.limits
     fast = replace(
         robot, limits=limits.with_magnitudes(velocity=np.array([180.0, 29.0, 1000.0]))
     )
-    assert told(fast) == [
+    assert issues_of(fast) == [
         ("robot.limits.velocity.j1", "the velocity limit looks like degrees per second")
     ]
     wide = replace(
@@ -122,7 +122,7 @@ def test_velocities_and_ranges_in_degrees():
             position_upper=np.array([180.0, 1e4, 12.0]),
         ),
     )
-    assert told(wide) == [
+    assert issues_of(wide) == [
         ("robot.limits.position.j1", "the position range looks like degrees")
     ]
 
@@ -134,12 +134,14 @@ def test_damping_that_stands_for_a_simulator():
     ]
     text = chain_urdf(joints, tool=(0.4, 0.0, 0.0))  # 60 Nm at 3 rad/s
     message = "the damping of the URDF takes more than the largest torque at the largest speed"
-    assert told(Robot.from_urdf("x", urdf_text=text)) == [
+    assert issues_of(Robot.from_urdf("x", urdf_text=text)) == [
         ("robot.friction.viscous.j2", message)
     ]
     for chosen in (None, 21.5):  # the task's own figure is meant
         assert (
-            told(Robot.from_urdf("x", urdf_text=text, friction={"viscous": chosen}))
+            issues_of(
+                Robot.from_urdf("x", urdf_text=text, friction={"viscous": chosen})
+            )
             == []
         )
 
@@ -154,7 +156,7 @@ def test_rails_in_mm():
             position_upper=np.array([2000.0, 3.0, 3.0]),
         ),
     )
-    assert told(rail) == [
+    assert issues_of(rail) == [
         ("robot.limits.velocity.j1", "the velocity limit looks like mm per second"),
         ("robot.limits.position.j1", "the position range looks like mm"),
     ]
@@ -164,13 +166,13 @@ def test_a_placeholder_that_is_scaled_stays_one():
     robot = Robot.from_urdf(
         SCARA, limits=LimitSpec(velocity=100.0, scale={"velocity": 0.7})
     )
-    assert told(robot) == []
+    assert issues_of(robot) == []
 
 
 def test_lengths_in_mm():
-    messages = {message for _, message in told(arm(length=400.0))}
+    messages = {message for _, message in issues_of(arm(length=400.0))}
     assert messages == {"the distance from the joint before looks like mm"}
-    assert [where for where, _ in told(arm(length=400.0))] == [
+    assert [where for where, _ in issues_of(arm(length=400.0))] == [
         "URDF origin of j2",
         "URDF origin of j3",
         "URDF origin of tool",
@@ -178,10 +180,10 @@ def test_lengths_in_mm():
 
 
 def test_masses_in_g_and_inertias_in_kg_mm2():
-    assert {message for _, message in told(arm(mass=2000.0, inertia=10.0))} == {
+    assert {message for _, message in issues_of(arm(mass=2000.0, inertia=10.0))} == {
         "the mass looks like g"
     }
-    assert {message for _, message in told(arm(mass=2.0, inertia=1e4))} == {
+    assert {message for _, message in issues_of(arm(mass=2.0, inertia=1e4))} == {
         "the inertia looks like kg mm^2"
     }
 
@@ -209,7 +211,7 @@ def test_a_payload_in_g_and_mm(payload, where):
     """And the links of the URDF, which are sound, are not blamed for it."""
     robot = brachis.robots.iiwa14
     assert not of_robot(robot.with_payload(14.0, com=[0.0, 0.0, 0.12]))
-    assert [key for key, _ in told(robot.with_payload(**payload))] == [where]
+    assert [key for key, _ in issues_of(robot.with_payload(**payload))] == [where]
 
 
 @pytest.mark.parametrize(
@@ -300,7 +302,7 @@ def test_a_plausible_plan_has_no_warnings():
     assert [issue.where for issue in result.warnings] == ["spline.intervals"]
 
 
-def test_strict_refuses_before_anything_is_planned(monkeypatch):
+def test_strict_refuses_before_the_plan(monkeypatch):
     monkeypatch.setattr("brachis.planner.Search", lambda *_: pytest.fail("planned"))
     with pytest.raises(PlausibilityError, match=r"scale\.velocity") as caught:
         brachis.plan(with_limits(scale={"velocity": 50}), strict=True)
@@ -367,7 +369,7 @@ def test_the_tolerance_of_a_fit_in_mm(tolerance, remark):
     assert [str(issue) for issue in issues] == ([remark] if remark else [])
 
 
-def test_only_the_start_posture_is_refused_where_nothing_is_said():
+def test_only_the_start_posture_is_an_error_by_default():
     content = task(
         task_space="joints",
         redundant_joints="auto",
@@ -545,17 +547,17 @@ def test_limits_beside_those_of_the_urdf(limits, told_of, sound):
 )
 def test_a_payload_in_g_that_an_arm_of_this_size_could_carry(name, mass):
     robot = getattr(brachis.robots, name)
-    assert told(robot.with_payload(mass)) == [
+    assert issues_of(robot.with_payload(mass)) == [
         ("robot.payload.mass", "the mass looks like g")
     ]
-    assert told(robot.with_payload(15.0)) == []
+    assert issues_of(robot.with_payload(15.0)) == []
 
 
 def test_the_tool_offset_and_the_mounting_in_mm():
     made = Robot.from_urdf(
         RAIL, tool_offset={"xyz": [0, 0, 120.0]}, mounting={"xyz": [0, 0, 3000.0]}
     )
-    assert [where for where, _ in told(made)] == [
+    assert [where for where, _ in issues_of(made)] == [
         "robot.tool_offset.xyz",
         "robot.mounting.xyz",
     ]
@@ -708,6 +710,8 @@ def test_an_angle_in_rad_of_a_start_a_frame_or_a_body():
 def test_a_joint_that_is_locked_in_degrees():
     text = SCARA.read_text()
     robot = Robot.from_urdf("x", urdf_text=text, locked_joints={"j1": 90.0})
-    assert ("robot.locked_joints.j1", "the position looks like degrees") in told(robot)
+    assert ("robot.locked_joints.j1", "the position looks like degrees") in issues_of(
+        robot
+    )
     robot = Robot.from_urdf("x", urdf_text=text, locked_joints={"j1": 1.5})
-    assert not told(robot)
+    assert not issues_of(robot)

@@ -24,7 +24,7 @@ def scara(torque=10.0, **options):
     return Robot.from_urdf(SCARA, **{"gravity": [0, 0, 0], "limits": spec, **options})
 
 
-def asked(**settings):
+def settings_of(**settings):
     return check_robot_settings(settings)
 
 
@@ -42,7 +42,7 @@ def line(**robot):
 
 
 def test_every_part_of_the_task_counts():
-    settings = asked(
+    settings = settings_of(
         gravity=[0, -9.81, 0],
         limits={
             "torque": 7,
@@ -72,7 +72,7 @@ def test_frames_and_locked_joints_of_the_task_count():
     plain = Robot.from_urdf(RAIL)
     made = robot_for(
         plain,
-        asked(
+        settings_of(
             base_frame="base_link",
             locked_joints={"joint_6": 0.3},
             limits={"torque": {"joint_1": 5}},
@@ -82,7 +82,7 @@ def test_frames_and_locked_joints_of_the_task_count():
     assert made.limits.torque[0] == 5.0
     also = robot_for(
         Robot.from_urdf(RAIL, locked_joints={"joint_6": 0.3}),
-        asked(locked_joints={"joint_5": 0.2}),
+        settings_of(locked_joints={"joint_5": 0.2}),
     )
     assert also.joint_names == plain.joint_names[:-2]
 
@@ -90,15 +90,17 @@ def test_frames_and_locked_joints_of_the_task_count():
 def test_a_robot_stays_as_it_is_where_the_task_adds_nothing():
     robot = scara()
     assert robot_for(robot, RobotSettings()) is robot
-    assert robot_for(robot, asked(urdf="another.urdf")) is robot
+    assert robot_for(robot, settings_of(urdf="another.urdf")) is robot
     assert robot_for(robot, robot.settings) is robot
-    same = asked(gravity=[0, 0, 0], limits={"torque": [10, 10, 10], "velocity": None})
+    same = settings_of(
+        gravity=[0, 0, 0], limits={"torque": [10, 10, 10], "velocity": None}
+    )
     assert robot_for(robot, same) is robot
 
 
 def test_limits_are_combined_joint_by_joint():
     robot = scara({"j1": 5.0})
-    made = robot_for(robot, asked(limits={"torque": {"j2": 6}}))
+    made = robot_for(robot, settings_of(limits={"torque": {"j2": 6}}))
     assert_array_equal(made.limits.torque, [5.0, 6.0, robot.limits.torque[2]])
     assert made.settings.limits.torque == {"j1": 5.0, "j2": 6.0}
     assert np.isinf(made.limits.velocity).all()
@@ -127,7 +129,9 @@ def test_a_contradiction_is_refused_with_its_key(settings, key):
         "robot.locked_joints.j3": {"locked_joints": {"j3": 0.4}},
     }
     with pytest.raises(TaskError, match="contradict") as caught:
-        robot_for(scara(**options.get(key, {})), asked(**yaml.safe_load(settings)))
+        robot_for(
+            scara(**options.get(key, {})), settings_of(**yaml.safe_load(settings))
+        )
     assert caught.value.where == key
 
 
@@ -152,10 +156,10 @@ def test_what_a_task_writes_counts_even_where_it_is_the_default(settings, key):
     if (
         key == "robot.limits.velocity"
     ):  # joint by joint, "as in the URDF" is what is not said
-        assert robot_for(robot, asked(**settings)) is robot
+        assert robot_for(robot, settings_of(**settings)) is robot
         return
     with pytest.raises(TaskError, match="contradict") as caught:
-        robot_for(robot, asked(**settings))
+        robot_for(robot, settings_of(**settings))
     assert caught.value.where == key
 
 
@@ -171,20 +175,20 @@ def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():
     assert brachis.plan(weak, result.task).t_end == pytest.approx(
         result.t_end, rel=1e-6
     )
-    made = robot_for(weak, asked(limits={"acceleration": 50}))
+    made = robot_for(weak, settings_of(limits={"acceleration": 50}))
     assert_array_equal(made.limits.torque, [4.0, 5.0, 90.0])
     assert_array_equal(made.limits.acceleration, 50.0)
     with pytest.raises(TaskError, match="contradict") as caught:
-        robot_for(weak, asked(limits={"torque": 10}))
+        robot_for(weak, settings_of(limits={"torque": 10}))
     assert caught.value.where == "robot.limits.torque.j1"
 
 
-def test_replaced_friction_is_kept():
+def test_a_task_keeps_the_friction_of_the_robot():
     robot = scara()
     stiff = replace(
         robot, friction=replace(robot.friction, viscous=np.array([1.0, 0.0, 2.0]))
     )
-    made = robot_for(stiff, asked(limits={"acceleration": 50}))
+    made = robot_for(stiff, settings_of(limits={"acceleration": 50}))
     assert_array_equal(made.friction.viscous, [1.0, 0.0, 2.0])
     assert_array_equal(made.friction.v_eps, 0.01)
 
@@ -196,13 +200,13 @@ def test_a_changed_model_is_not_lost():
     loaded = replace(robot, model=model)
     assert robot_for(loaded, RobotSettings()) is loaded
     with pytest.raises(InputError, match="model"):
-        robot_for(loaded, asked(limits={"acceleration": 50}))
+        robot_for(loaded, settings_of(limits={"acceleration": 50}))
 
 
 def test_a_robot_whose_tool_rolls_freely_is_made_anew_without_the_virtual_joint():
     rolling, _ = bind(Robot.from_urdf(RAIL), "pose_free_roll")
     assert robot_for(rolling, RobotSettings()) is rolling
-    made = robot_for(rolling, asked(limits={"torque": {"joint_1": 5}}))
+    made = robot_for(rolling, settings_of(limits={"torque": {"joint_1": 5}}))
     assert made.joint_names == rolling.joint_names[:-1]
     assert made.limits.torque[1] == 5.0
 

@@ -122,7 +122,7 @@ def test_what_a_program_says_of_limits_is_what_a_task_keeps():
     [{"torque": True}, {"acceleration": np.inf}, {"scale": {"torque": True}}],
     ids=str,
 )
-def test_what_a_task_could_not_keep_is_refused(wrong):
+def test_what_a_task_could_not_keep_is_an_error(wrong):
     with pytest.raises(TaskError, match=f"limits.{next(iter(wrong))}"):
         limits_of(**wrong)
 
@@ -132,7 +132,7 @@ def test_infinite_figures_in_lists_leave_limits_open():
     assert_array_equal(free.velocity, [1.0, np.inf, np.inf])
 
 
-def test_a_limit_that_scaling_would_mend_is_refused():
+def test_a_limit_that_scaling_would_mend_is_an_error():
     with pytest.raises(LimitError, match="torque limit is too small or too large"):
         limits_of(torque={"j3": 1e13}, scale={"torque": 1e-3})
 
@@ -184,7 +184,7 @@ def test_empty_range():
         with_limit(lower=1.0, upper=0.5)
 
 
-def test_coulomb_friction_that_no_torque_overcomes_is_refused():
+def test_coulomb_friction_that_no_torque_overcomes_is_an_error():
     friction = {"coulomb": {"j2": 90.0}}
     with pytest.raises(InputError, match="Coulomb friction of joint 'j2' is not below"):
         planar_robot("RR", friction=friction)
@@ -196,7 +196,7 @@ def test_coulomb_friction_that_no_torque_overcomes_is_refused():
 
 @pytest.mark.parametrize("value", [1e-308, 1e-7, 1e13, 1e300])
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
-def test_limits_that_no_drive_has_are_refused(kind, value):
+def test_limits_that_no_drive_has_are_errors(kind, value):
     with pytest.raises(
         LimitError, match=f"{kind} limit is too small or too large; found"
     ) as caught:
@@ -207,7 +207,7 @@ def test_limits_that_no_drive_has_are_refused(kind, value):
 
 @pytest.mark.parametrize("factor", [1e-308, 1e-9, 1e12, 1e308])
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
-def test_scaled_limits_that_no_drive_has_are_refused(kind, factor):
+def test_scaled_limits_that_no_drive_has_are_errors(kind, factor):
     with pytest.raises(
         LimitError, match=f"scaled {kind} limit is too small or too large"
     ) as caught:
@@ -225,7 +225,7 @@ def test_limits_at_the_bounds_are_taken():
 
 
 @pytest.mark.parametrize("pair", [[-1e7, 1.0], [None, 1e10]])
-def test_ranges_that_end_too_far_away_are_refused(pair):
+def test_ranges_that_end_too_far_away_are_errors(pair):
     with pytest.raises(
         LimitError, match="position range is too far from zero"
     ) as caught:
@@ -235,7 +235,7 @@ def test_ranges_that_end_too_far_away_are_refused(pair):
 
 
 @pytest.mark.parametrize("pair", [[0.2, 1e300], [None, 1e16]])
-def test_ranges_that_a_task_cannot_state_are_refused(pair):
+def test_ranges_that_a_task_cannot_state_are_errors(pair):
     with pytest.raises(TaskError, match=r"limits\.position\.j1\[1\]: out of range"):
         limits_of(position={"j1": pair})
 
@@ -253,13 +253,13 @@ def test_a_range_of_no_width_is_empty():
         ({"viscous": float("inf")}, "robot: friction.viscous"),
     ],
 )
-def test_friction_that_no_drive_has_is_refused(friction, where):
+def test_friction_that_no_drive_has_is_an_error(friction, where):
     with pytest.raises(InputError) as caught:
         planar_robot("RR", friction=friction)
     assert caught.value.where == where
 
 
-def test_positions_and_gravity_that_no_robot_has_are_refused():
+def test_positions_and_gravity_that_no_robot_has_are_errors():
     with pytest.raises(InputError, match="a joint position is out of range"):
         planar_robot("CC").posture([1e300, 0.0], "start.joints")
     with pytest.raises(InputError, match=r"robot: gravity\[2\]: out of range"):

@@ -56,7 +56,7 @@ def states(n, count=20):
     )
 
 
-def edited(*parts, text=IIWA, tool=TOOL, root="base"):
+def with_links(*parts, text=IIWA, tool=TOOL, root="base"):
     more = "".join(part.format(tool=tool, root=root) for part in parts)
     return text.replace("</robot>", more + "</robot>")
 
@@ -84,7 +84,7 @@ def test_a_urdf_edited_by_hand_moves_alike(parts, options, tool):
     plain, mine, other = (
         of(IIWA),
         of(IIWA, **options),
-        of(edited(*parts, root=root), tool_frame=tool),
+        of(with_links(*parts, root=root), tool_frame=tool),
     )
     q, qdot, qddot = states(7)
     expected = dynamics.torque(other, q, qdot, qddot)
@@ -287,12 +287,12 @@ def test_contradictions_are_refused_with_their_key(given, asked, key):
         ("tool_offset: {xyz: [0, 0]}", r"tool_offset\.xyz"),
     ],
 )
-def test_what_cannot_be_is_refused(options, words):
+def test_what_cannot_be_is_an_error(options, words):
     with pytest.raises((InputError, LimitError), match=words):
         of(IIWA, **yaml.safe_load(options))
 
 
-def test_joints_without_a_limit_on_their_acceleration_are_named():
+def test_the_summary_names_joints_without_a_limit_on_their_acceleration():
     free = of(DAMPED, tool_frame="tool")
     key = "acceleration limits"
     assert in_use(free)[key] == "none (robot.limits.acceleration)"

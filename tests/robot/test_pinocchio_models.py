@@ -107,7 +107,7 @@ def test_a_rotor_replaces_the_armature_of_the_model():
 
 
 @pytest.mark.parametrize("unstated", [np.inf, np.finfo(float).max])
-def test_limits_that_are_not_stated(unstated):
+def test_limits_without_a_figure(unstated):
     model = model_of("tx90l_rail")
     model.velocityLimit[1] = unstated
     model.effortLimit[2] = unstated

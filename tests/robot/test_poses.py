@@ -97,7 +97,7 @@ def test_a_posture_may_leave_the_virtual_joint_out():
         robot.posture(list(START[:-1]), "start")
 
 
-def test_a_joint_of_the_virtual_ones_name_is_refused():
+def test_a_joint_of_the_virtual_ones_name_is_an_error():
     text = chain_urdf(rail_arm_joints()).replace("'j7'", "'tool_roll'")
     robot = Robot.from_urdf("named", urdf_text=text)
     with pytest.raises(InputError, match="name of a virtual joint"):

@@ -52,13 +52,13 @@ def test_the_tool_of_a_posture(posture):
     ],
     ids=str,
 )
-def test_what_is_no_posture_is_refused(posture, said):
+def test_what_is_no_posture_is_an_error(posture, said):
     with pytest.raises(InputError, match=said) as caught:
         SCARA.tool_placement(posture)
     assert caught.value.where == "tool_placement"
 
 
-def test_an_unknown_joint_is_named():
+def test_the_error_names_an_unknown_joint():
     with pytest.raises(UnknownNameError, match="elbow"):
         SCARA.tool_placement({"j1": 0.0, "j2": 0.0, "j3": 0.0, "elbow": 0.0})
 

@@ -23,7 +23,7 @@ def scara(scara_urdf):
     [["x"], ["z", "x"], ["x", "y", "z"], ["y", "z"]],
     ids=str,
 )
-def test_position_rows_are_world_coordinates_in_the_order_asked(rows):
+def test_position_rows_are_world_coordinates_in_the_order_of_the_task(rows):
     robot = planar_robot("RRR", "tilted")
     space = task_map_of(robot, rows)
     assert space.rows == tuple(rows)

@@ -18,7 +18,7 @@ def robot(**limits):
     return planar_robot("RRP", limits=LimitSpec(**limits))
 
 
-def test_its_torque_at_rest_is_a_plain_limit_and_all_are_scaled():
+def test_the_torque_at_rest_is_a_plain_limit_and_scales_apply_to_all():
     scale = LimitScale(torque=0.5, power=0.1, rms_torque=0.2)
     limits = robot(
         torque_speed={"j2": CURVE},

@@ -21,7 +21,7 @@ TEXT = chain_urdf(
 )
 
 
-def refused(text):
+def message_of(text):
     with pytest.raises(UrdfError) as caught:
         Robot.from_urdf(
             "file.urdf", urdf_text=text, tool_frame="tool", limits=LimitSpec(torque=1.0)
@@ -29,7 +29,7 @@ def refused(text):
     return str(caught.value)
 
 
-def changed(old, new, text=TEXT):
+def replace_once(old, new, text=TEXT):
     assert old in text
     return text.replace(old, new, 1)
 
@@ -56,7 +56,7 @@ def changed(old, new, text=TEXT):
     ],
 )
 def test_what_is_no_finite_number_is_refused_with_its_place(old, new, words, bad):
-    message = refused(changed(old, new.format(bad)))
+    message = message_of(replace_once(old, new.format(bad)))
     assert f"{words} is wrong" in message
     assert "file.urdf, line " in message
 
@@ -78,7 +78,7 @@ def test_what_is_no_finite_number_is_refused_with_its_place(old, new, words, bad
     ],
 )
 def test_the_message_says_what_to_write_instead(old, new, unit):
-    message = refused(changed(old, new))
+    message = message_of(replace_once(old, new))
     assert unit in message
     assert message.endswith(
         "Write numbers with decimal points, spaces between them, and no units"
@@ -86,25 +86,27 @@ def test_the_message_says_what_to_write_instead(old, new, unit):
 
 
 def test_missing_and_repeated_figures():
-    assert "link 'link1': <mass value> is missing" in refused(
-        changed('<mass value="2.0"/>', "<mass/>")
+    assert "link 'link1': <mass value> is missing" in message_of(
+        replace_once('<mass value="2.0"/>', "<mass/>")
     )
-    assert "link 'link1': <inertia izz> is missing" in refused(
-        changed('izz="0.055"', "")
+    assert "link 'link1': <inertia izz> is missing" in message_of(
+        replace_once('izz="0.055"', "")
     )
-    assert "link 'link1': <mass> occurs twice" in refused(
-        changed("<mass", '<mass value="1"/><mass')
+    assert "link 'link1': <mass> occurs twice" in message_of(
+        replace_once("<mass", '<mass value="1"/><mass')
     )
-    assert "3 finite numbers" in refused(changed("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'"))
-    assert "at most 1e+12" in refused(
-        changed('<mass value="2.0"/>', '<mass value="1e13"/>')
+    assert "3 finite numbers" in message_of(
+        replace_once("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'")
+    )
+    assert "at most 1e+12" in message_of(
+        replace_once('<mass value="2.0"/>', '<mass value="1e13"/>')
     )
 
 
 def test_numbers_that_do_not_count_are_not_read():
     plugin = "<gazebo reference='base'><kp>a lot</kp></gazebo><transmission name='t'><joint name='j1'/></transmission>"
     shape = "<link name='base'><visual><origin xyz='1,5'/><geometry><box size='big'/></geometry></visual>"
-    text = changed("<link name='base'/>", f"{plugin}{shape}</link>")
+    text = replace_once("<link name='base'/>", f"{plugin}{shape}</link>")
     assert Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool").n == 2
 
 
@@ -144,40 +146,44 @@ def test_long_chains_are_summed_up_without_recursion():
     assert read_dynamics(tree, (), {}, tree.root).bodies == ()
 
 
-def test_ghost_links_are_named():
-    message = refused(changed("<parent link='link1'/>", "<parent link='ghost'/>"))
+def test_the_error_names_ghost_links():
+    message = message_of(
+        replace_once("<parent link='link1'/>", "<parent link='ghost'/>")
+    )
     assert (
         "the parent of joint 'j2' is not a link of the robot; found ghost; allowed: world, base, "
         in message
     )
     assert message.endswith("Add <link name='ghost'/>")
-    assert "Did you mean 'link1'?" in refused(
-        changed("<parent link='link1'/>", "<parent link='lnik1'/>")
+    assert "Did you mean 'link1'?" in message_of(
+        replace_once("<parent link='link1'/>", "<parent link='lnik1'/>")
     )
-    assert "the child of joint 'j2' is not a link of the robot" in refused(
-        changed("<child link='link2'/>", "<child link='ghost'/>")
+    assert "the child of joint 'j2' is not a link of the robot" in message_of(
+        replace_once("<child link='link2'/>", "<child link='ghost'/>")
     )
     assert (
         "the parent of joint 'j2' is not a link of the robot; found no name"
-        in refused(changed("<parent link='link1'/>", ""))
+        in message_of(replace_once("<parent link='link1'/>", ""))
     )
 
 
-def test_xacro_that_is_left_is_named():
+def test_the_error_names_xacro():
     include = '<xacro:include filename="$(find arm)/arm.xacro"/>'
-    declared = changed("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    declared = replace_once(
+        "<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" '
+    )
     assert Robot.from_urdf("file.urdf", urdf_text=declared, tool_frame="tool").n == 2
     for text in (
-        changed("</robot>", include + "</robot>", declared),
-        changed("</robot>", include + "</robot>"),
+        replace_once("</robot>", include + "</robot>", declared),
+        replace_once("</robot>", include + "</robot>"),
     ):
-        message = refused(text)
+        message = message_of(text)
         assert "xacro" in message
         assert "include" in message
         assert message.endswith(
             "Expand the file with xacro first: xacro robot.xacro > robot.urdf"
         )
-    message = refused(changed('<mass value="2.0"/>', '<mass value="${mass}"/>'))
+    message = message_of(replace_once('<mass value="2.0"/>', '<mass value="${mass}"/>'))
     assert "link 'link1': the URDF has xacro macros; found ${mass}" in message
 
 
@@ -205,13 +211,13 @@ def test_xacro_that_is_left_is_named():
     ],
 )
 def test_names_and_types(old, new, words):
-    assert words in refused(changed(old, new))
+    assert words in message_of(replace_once(old, new))
 
 
 def test_joints_may_have_the_names_of_links():
     plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
     for name in ("tool_mount", "mount", "flap", "j2"):
-        text = changed(f"name='{name}'", "name='aside'")
+        text = replace_once(f"name='{name}'", "name='aside'")
         robot = Robot.from_urdf(
             "file.urdf", urdf_text=text, tool_frame="tool", locked_joints={}
         )
@@ -220,8 +226,8 @@ def test_joints_may_have_the_names_of_links():
         ]
 
 
-def test_a_joint_with_the_name_of_the_world_is_refused():
-    text = changed("name='j1'", "name='universe'")
+def test_a_joint_with_the_name_of_the_world_is_an_error():
+    text = replace_once("name='j1'", "name='universe'")
     with pytest.raises(UrdfError, match=r"'universe'.*Rename the joint"):
         Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool")
 

@@ -68,7 +68,7 @@ def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
     assert_array_equal(robot.limits.velocity, [3.0, 3.1])
 
 
-def test_gripper_off_the_chain_is_locked_and_its_mass_is_carried():
+def test_the_chain_carries_the_mass_of_a_gripper_beside_it():
     bare, loaded = (
         load([TURN, TURN]),
         load([TURN, TURN], tool_frame="palm", more=GRIPPER),
@@ -96,7 +96,7 @@ def test_branching_urdf_needs_a_tool_frame():
     assert "robot.tool_frame" in str(caught.value)
 
 
-def test_a_loop_of_links_beside_the_tree_is_refused():
+def test_a_loop_of_links_beside_the_tree_is_an_error():
     loop = "<link name='a'/><link name='b'/>" + "".join(
         f"<joint name='{parent}{child}' type='fixed'><parent link='{parent}'/><child link='{child}'/></joint>"
         for parent, child in ("ab", "ba")
@@ -105,7 +105,7 @@ def test_a_loop_of_links_beside_the_tree_is_refused():
         load([TURN], more=loop)
 
 
-def test_a_joint_without_an_axis_is_refused():
+def test_a_joint_without_an_axis_is_an_error():
     with pytest.raises(
         UrdfError, match=r"the axis of joint 'j1' has zero length.*xyz='0 0 0'"
     ):
@@ -159,20 +159,20 @@ def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
         assert_allclose(own.lever, other.lever, atol=1e-14)
 
 
-def test_a_joint_that_mimics_itself_is_refused():
+def test_a_joint_that_mimics_itself_is_an_error():
     more = GRIPPER.replace("mimic joint='finger'", "mimic joint='follower'")
     with pytest.raises(UrdfError, match="mimic each other in a loop; found follower"):
         load([TURN], more=more, tool_frame="tool")
 
 
-def test_a_mimic_that_is_locked_elsewhere_is_refused():
+def test_a_mimic_locked_elsewhere_is_an_error():
     message = r"'follower' mimics 'finger', which is locked at 0\.03 m; found 0\.01 m; allowed: 0\.03 m"
     locked = {"finger": 0.03, "follower": 0.01}
     with pytest.raises(UrdfError, match=message):
         load([TURN], more=GRIPPER, tool_frame="tool", locked_joints=locked)
 
 
-def test_a_joint_beside_the_chain_that_follows_it_is_held():
+def test_a_joint_beside_the_chain_that_follows_it_stands_still():
     more = GRIPPER.replace("joint='finger'", "joint='j1'")
     robot = load([TURN, TURN], tool_frame="palm", more=more)
     assert robot.joint_names == ("j1", "j2")
@@ -180,7 +180,7 @@ def test_a_joint_beside_the_chain_that_follows_it_is_held():
     assert of_robot(robot) == ()
 
 
-def test_a_follower_on_the_way_to_the_tool_is_refused_even_if_it_is_locked():
+def test_a_follower_on_the_chain_is_an_error_with_a_lock_too():
     mimic = Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<mimic joint='j1'/>")
     with pytest.raises(UrdfError, match="joint 'j2' mimics 'j1'"):
         load([TURN, mimic, TURN], locked_joints={"j2": 0.0})
@@ -220,7 +220,7 @@ def test_joints_of_more_coordinates_are_refused_on_the_chain_alone(kind):
     assert robot.joint_names == ("j2",)
 
 
-def test_missing_range_comes_from_the_task_or_is_refused():
+def test_a_missing_range_comes_from_the_task_or_is_an_error():
     for joint in (
         Joint("revolute", limit={"effort": 1.0, "velocity": 1.0}),
         Joint("prismatic", limit=None),
@@ -240,7 +240,7 @@ def test_missing_range_comes_from_the_task_or_is_refused():
     assert load([Joint("continuous", limit={"effort": 1.0, "velocity": 1.0})]).n == 1
 
 
-def test_mass_without_inertia_is_refused():
+def test_mass_without_inertia_is_an_error():
     text = chain_urdf([Joint("revolute")])
     without = re.sub(r"<inertia [^>]*/>", "", text)
     assert without != text
@@ -288,7 +288,7 @@ def test_bodies_that_cannot_be(text, words):
 @pytest.mark.parametrize(
     "text", [inertial(-1.0, (0.1, 0.1, 0.1)), inertial(1.0, (0.1, 0.1, 0.3))]
 )
-def test_bodies_that_cannot_be_stay_with_the_base_if_their_joint_is_locked(text):
+def test_a_lock_leaves_bodies_that_cannot_be_with_the_base(text):
     joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text), TURN]
     with pytest.raises(UrdfError, match=r"lock .*j1 with robot\.locked_joints"):
         load(joints)

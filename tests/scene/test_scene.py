@@ -247,7 +247,7 @@ def test_padded_balls_are_found_from_as_far_away_as_they_are_large(tmp_path):
     assert np.all(bounds <= near.distance + 1e-6)
 
 
-def test_the_closest_pair_of_each_posture_is_found():
+def test_every_posture_has_its_closest_pair():
     robot, found = scene()
     placed = Chain.of(robot.model).place(postures(robot))
     every = everything(found, placed)
@@ -258,7 +258,7 @@ def test_the_closest_pair_of_each_posture_is_found():
         assert closest.distance[k] == pytest.approx(least, abs=1e-12)
 
 
-def test_only_pairs_that_come_close_are_kept():
+def test_the_limit_has_only_pairs_that_come_close():
     given = task()
     robot = robot_for(None, given.robot)
     limit = build_clearance(robot, given)
@@ -306,7 +306,7 @@ def test_the_error_says_what_is_wrong_with_a_body(body, message):
         scene(bodies=[yaml.safe_load(body)])
 
 
-def test_names_are_unique_and_known():
+def test_names_of_bodies_are_unique_and_links_exist():
     twice = [{"name": "a", "sphere": 0.1}, {"name": "a", "sphere": 0.2}]
     with pytest.raises(InputError, match="two bodies have this name"):
         scene(bodies=twice)
@@ -342,7 +342,7 @@ def test_a_body_that_is_always_hit_stays():
         '<sphere radius="-1"/>',
     ],
 )
-def test_wrong_collision_geometry_is_refused(shape, tmp_path):
+def test_wrong_collision_geometry_is_an_error(shape, tmp_path):
     text = (ROBOTS / "iiwa14/robot.urdf").read_text()
     first = '<cylinder radius="0.1" length="0.1575"/>'
     begin = text.index("<collision>")

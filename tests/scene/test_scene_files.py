@@ -67,7 +67,7 @@ CELL = """<robot name="cell">
 """
 
 
-def found(task):
+def scene_of_task(task):
     return scene_of(robot_for(None, task.robot), task)
 
 
@@ -121,7 +121,7 @@ def test_a_mesh_is_its_hull_and_its_file_is_beside_the_scene(tmp_path):
     file = write(tmp_path, "task.yaml", {**TASK, "scene": {"file": "cell/cell.yaml"}})
     task = brachis.load_task(file)
     assert Path(task.scene[0].mesh) == tmp_path / "cell/body.stl"
-    solid = found(task).solids[-1]
+    solid = scene_of_task(task).solids[-1]
     corners = np.array(solid.geometry.points())
     assert sorted(corners.round(6).tolist()) == [
         [0.0, 0.0, 0.0],
@@ -143,7 +143,7 @@ def test_an_srdf_disables_pairs(tmp_path):
         "task.yaml",
         {**TASK, "scene": ball, "collisions": {"srdf": "arm.srdf"}},
     )
-    scene = found(brachis.load_task(file))
+    scene = scene_of_task(brachis.load_task(file))
     names = {scene.names(pair) for pair in range(len(scene.pairs))}
     assert "link_2 and link_5 0" not in names
     assert "link_2 and link_6" in names
@@ -161,7 +161,7 @@ def test_an_srdf_disables_pairs(tmp_path):
         ([{"name": "a", "sphere": "1"}], r"scene\[0\].sphere.*a number"),
     ],
 )
-def test_a_wrong_scene_is_refused(scene, says):
+def test_a_wrong_scene_is_an_error(scene, says):
     with pytest.raises(TaskError, match=says):
         brachis.load_task({**TASK, "scene": scene})
 
@@ -182,15 +182,18 @@ def test_lengths_that_look_like_mm_are_implausible(changes, where):
 
 
 def test_without_a_scene_the_mode_decides_about_self_collisions():
-    assert found(brachis.load_task(TASK)) is None
-    assert found(brachis.load_task({**TASK, "collisions": {"clearance": 0.02}})) is None
-    scene = found(brachis.load_task({**TASK, "collisions": {"mode": "avoid"}}))
+    assert scene_of_task(brachis.load_task(TASK)) is None
+    assert (
+        scene_of_task(brachis.load_task({**TASK, "collisions": {"clearance": 0.02}}))
+        is None
+    )
+    scene = scene_of_task(brachis.load_task({**TASK, "collisions": {"mode": "avoid"}}))
     assert {solid.link for solid in scene.solids} >= {"link_0", "link_7"}
     body = brachis.Sphere(0.1, position=[2, 0, 0])
     task = brachis.load_task({**TASK, "scene": body})
-    assert found(task).solids[-1].name == "sphere 0"
+    assert scene_of_task(task).solids[-1].name == "sphere 0"
     off = brachis.load_task({**TASK, "scene": body, "collisions": {"mode": "off"}})
-    assert found(off) is None
+    assert scene_of_task(off) is None
 
 
 def test_inspect_lists_pairs_and_json_has_all(tmp_path, capfd):
@@ -260,7 +263,7 @@ def test_a_cell_is_read_from_a_urdf(tmp_path):
         (None, "cell.urdf"),
     ],
 )
-def test_a_urdf_that_is_no_cell_is_refused(tmp_path, text, message):
+def test_a_urdf_that_is_no_cell_is_an_error(tmp_path, text, message):
     if text is not None:
         (tmp_path / "cell.urdf").write_text(text)
     cell = {"name": "cell", "urdf": str(tmp_path / "cell.urdf")}
@@ -289,7 +292,9 @@ def scene_with(**keys):
     ],
 )
 def test_lengths_and_masses_whose_squares_overflow_are_errors(keys):
-    with pytest.raises(TaskError, match=r"out of range; found 1e\+300; allowed: <= 1e"):
+    with pytest.raises(
+        TaskError, match=r"out of range; found 1e\+300; allowed: <= 1e"
+    ):
         brachis.load_task({**TASK, **yaml.safe_load(keys)})
 
 
@@ -304,7 +309,7 @@ def test_lengths_and_masses_whose_squares_overflow_are_errors(keys):
     ],
     ids=str,
 )
-def test_bodies_that_are_too_large_for_exact_distances_are_refused(
+def test_bodies_that_are_too_large_for_exact_distances_are_errors(
     body, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -316,7 +321,7 @@ def test_bodies_that_are_too_large_for_exact_distances_are_refused(
         scene_with(scene=[body])
 
 
-def test_padding_that_makes_a_link_too_large_is_refused():
+def test_padding_that_makes_a_link_too_large_is_an_error():
     names = brachis.robots.iiwa14.urdf_dynamics.links
     link = next(name for name in names if name.endswith("3"))
     with pytest.raises(InputError, match=f"{link}.*: the body is too large"):
@@ -334,7 +339,7 @@ def test_a_mesh_file_is_not_read_if_it_is_too_large(tmp_path):
 @pytest.mark.parametrize(
     ("count", "what"), [(1650, "pairs that keep apart"), (4001, "bodies")]
 )
-def test_more_bodies_than_a_plan_has_memory_for_are_refused(count, what):
+def test_more_bodies_than_a_plan_has_memory_for_are_errors(count, what):
     bodies = [{"sphere": 0.01, "position": [4.0, 0.0, 0.01 * i]} for i in range(count)]
     with pytest.raises(
         InputError, match=rf"too many bodies; .*at most 4000 {what}\. Leave"

@@ -135,6 +135,6 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
         ),
     ],
 )
-def test_what_is_wrong_is_named(keys, message):
+def test_the_error_names_what_is_wrong(keys, message):
     with pytest.raises(TaskError, match=message):
         task(**yaml.safe_load(keys))

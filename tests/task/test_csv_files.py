@@ -335,7 +335,7 @@ AXES = [
 
 
 @pytest.mark.parametrize(("rows", "message"), AXES)
-def test_wrong_axes_are_named(rows, message):
+def test_the_error_names_wrong_axes(rows, message):
     Path("poses.csv").write_text(f"x,y,z,i,j,k\n0,0,0,{rows}\n")
     with pytest.raises(TaskError, match=message):
         task("pose_free_roll")

@@ -18,7 +18,7 @@ TASK = {
 
 
 @pytest.mark.parametrize("key", ["path.1.line.by", "path[1].line.by"])
-def test_lists_are_indexed(key):
+def test_keys_have_indices_of_lists(key):
     changed = with_keys(TASK, {key: [2.0, 2.0]})
     assert changed["path"] == [
         {"line": {"by": [1.0, 0.0]}},
@@ -27,7 +27,7 @@ def test_lists_are_indexed(key):
     assert TASK["path"][1] == {"line": {"by": [0.0, 1.0]}}
 
 
-def test_absent_and_null_mappings_are_made():
+def test_keys_fill_absent_and_null_mappings():
     task = {"robot": {"limits": None}}
     set_key(task, "robot.limits.torque", 5)
     set_key(task, "spline.degree", 4)

@@ -24,7 +24,7 @@ FILE = {
 
 
 @pytest.fixture
-def loaded(tmp_path):
+def load_beside(tmp_path):
     """Load a task whose robot part is given, beside a limits file."""
 
     def load(robot, **changes):
@@ -49,13 +49,13 @@ def loaded(tmp_path):
     return load
 
 
-def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(loaded):
-    limits = loaded({}).robot.limits
+def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(load_beside):
+    limits = load_beside({}).robot.limits
     assert limits.torque == {"j1": 5.0, "j2": 6.0, "j3": (-7.0, 8.0)}
     assert limits.acceleration == {"j1": 20.0, "j2": 20.0, "j3": 20.0}
     assert limits.velocity == {"j2": 2.0}
     assert limits.position == "urdf"
-    own = loaded(
+    own = load_beside(
         {
             "limits": {
                 "torque": {"j2": 1},
@@ -67,11 +67,11 @@ def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(loaded)
     assert own.limits.torque == {"j1": 5.0, "j2": 1.0, "j3": (-7.0, 8.0)}
     assert own.limits.acceleration is None
     assert_array_equal(robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0])
-    assert loaded({"limits": {"torque": 3}}).robot.limits.torque == 3.0
+    assert load_beside({"limits": {"torque": 3}}).robot.limits.torque == 3.0
 
 
-def test_a_loaded_task_needs_the_file_no_more(loaded):
-    task = loaded({})
+def test_a_loaded_task_needs_the_file_no_more(load_beside):
+    task = load_beside({})
     assert task.robot.limits_file is None
     assert load_task(task.to_dict()) == task
 
@@ -109,14 +109,14 @@ def test_a_program_reads_the_file_too(tmp_path):
         ),
     ],
 )
-def test_the_error_names_the_key_of_a_wrong_file(loaded, changes, message):
+def test_the_error_names_the_key_of_a_wrong_file(load_beside, changes, message):
     with pytest.raises(InputError, match=message):
-        loaded({}, **yaml.safe_load(changes))
+        load_beside({}, **yaml.safe_load(changes))
 
 
-def test_files_that_are_none(tmp_path, loaded):
+def test_files_that_are_none(tmp_path, load_beside):
     with pytest.raises(TaskError, match=r"robot\.limits_file: the file does not exist"):
-        loaded({"limits_file": "nowhere.yaml"})
+        load_beside({"limits_file": "nowhere.yaml"})
     (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
     with pytest.raises(
         TaskError, match=r"wrong type; found \[1, 2\] .*allowed: a mapping"
@@ -127,21 +127,21 @@ def test_files_that_are_none(tmp_path, loaded):
         robot_from_settings(RobotSettings(urdf=urdf, limits_file="limits.yaml"))
 
 
-def test_joints_that_the_robot_does_not_have_are_named(loaded):
-    task = loaded({}, joints=["a1", "j2", "j3"], limits={"torque": 5})
+def test_the_error_names_joints_that_the_robot_does_not_have(load_beside):
+    task = load_beside({}, joints=["a1", "j2", "j3"], limits={"torque": 5})
     with pytest.raises(UnknownNameError, match="'a1'"):
         robot_from_settings(task.robot)
 
 
-def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):
+def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(load_beside):
     limits = {
         "torque": 30,
         "total_power": 70,
         "torque_speed": {"j2": [[0, 20], [2, 10]]},
     }
-    assert loaded({}, limits=limits).robot.limits.total_power == 70.0
+    assert load_beside({}, limits=limits).robot.limits.total_power == 70.0
     robot = robot_from_settings(
-        loaded({"limits": {"total_power": 50}}, limits=limits).robot
+        load_beside({"limits": {"total_power": 50}}, limits=limits).robot
     )
     assert robot.limits.total_power == 50.0
     assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])
@@ -197,15 +197,15 @@ SHORT = (
 )
 
 
-def test_a_file_of_moveit_is_read(loaded, tmp_path):
+def test_a_file_of_moveit_is_read(load_beside, tmp_path):
     (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
-    limits = loaded({"limits_file": "joint_limits.yaml"}).robot.limits
+    limits = load_beside({"limits_file": "joint_limits.yaml"}).robot.limits
     assert limits.position == {"j1": (np.radians(-170.0), 2.5)}
     assert limits.velocity == {"j1": 2.0, "j2": None}
     assert limits.acceleration == {"j1": 3.75, "j2": 5.0, "j3": None}
     assert (limits.jerk, limits.torque) == ({"j1": 90.0}, {"j3": 7.5})
     assert (limits.scale.velocity, limits.scale.acceleration) == (0.5, 1.0)
-    own = loaded(
+    own = load_beside(
         {
             "limits_file": "joint_limits.yaml",
             "limits": {"scale": {"velocity": 1.0}, "velocity": {"j1": 1.0}},
@@ -238,19 +238,20 @@ def test_a_file_of_moveit_is_read(loaded, tmp_path):
 @pytest.mark.parametrize(
     "names", [SHORT, tuple(name.removesuffix("_joint") + "_joint" for name in SHORT)]
 )
-def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
+def test_a_file_of_universal_robots_is_read(load_beside, tmp_path, names):
     (tmp_path / "ur.yaml").write_text(UR.format(*names), encoding="utf-8")
     ur = {"urdf": str(ROOT / "robots/ur10_rail/robot.urdf"), "limits_file": "ur.yaml"}
     robot = robot_from_settings(
-        loaded({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot
+        load_beside({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot
     )
     assert_array_equal(robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6])
     assert_array_equal(robot.limits.torque[1:], [150.0] * 5 + [28.0])
     assert_array_equal(robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0]))
     assert (
-        robot_from_settings(loaded({**ur, "locked_joints": {"rail": 0.0}}).robot).n == 6
+        robot_from_settings(load_beside({**ur, "locked_joints": {"rail": 0.0}}).robot).n
+        == 6
     )
-    robot = robot_from_settings(loaded(ur).robot)
+    robot = robot_from_settings(load_beside(ur).robot)
     assert robot.limits.velocity[0] == robot.urdf_limits[0].velocity
 
 
@@ -293,14 +294,14 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
     ids=str,
 )
 def test_a_wrong_file_of_moveit_is_refused_with_its_key(
-    loaded, tmp_path, changes, words
+    load_beside, tmp_path, changes, words
 ):
     assert changes[0] in MOVEIT
     (tmp_path / "joint_limits.yaml").write_text(
         MOVEIT.replace(*changes), encoding="utf-8"
     )
     with pytest.raises(InputError) as caught:
-        loaded({"limits_file": "joint_limits.yaml"})
+        load_beside({"limits_file": "joint_limits.yaml"})
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
@@ -337,32 +338,34 @@ def test_a_task_may_limit_joints_that_stand_still_of_a_robot_that_has_limits():
     ids=str,
 )
 def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(
-    loaded, tmp_path, wrong
+    load_beside, tmp_path, wrong
 ):
     (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
     with pytest.raises(InputError):
-        robot_from_settings(loaded({"limits_file": "joint_limits.yaml", **wrong}).robot)
+        robot_from_settings(
+            load_beside({"limits_file": "joint_limits.yaml", **wrong}).robot
+        )
 
 
-def test_a_task_is_not_a_limits_file(loaded):
+def test_a_task_is_not_a_limits_file(load_beside):
     with pytest.raises(
         TaskError,
         match=r"task.yaml: .* another kind; found a task file; allowed: a limits file",
     ):
-        loaded({"limits_file": "task.yaml"})
+        load_beside({"limits_file": "task.yaml"})
 
 
 def test_joints_that_a_file_of_moveit_leaves_out_have_the_limits_of_the_urdf(
-    loaded, tmp_path
+    load_beside, tmp_path
 ):
     text = "joint_limits:\n  j2: {max_velocity: 5}\n"
     (tmp_path / "joint_limits.yaml").write_text(text, encoding="utf-8")
-    robot = robot_from_settings(loaded({"limits_file": "joint_limits.yaml"}).robot)
+    robot = robot_from_settings(load_beside({"limits_file": "joint_limits.yaml"}).robot)
     ours, _, theirs = robot.urdf_limits
     expected = [ours.velocity, 5.0, theirs.velocity]
     assert_array_equal(robot.limits.velocity, expected)
     more = text + "".join(f"  {name}: {{max_velocity: 5}}\n" for name in ("j7", "j9"))
     (tmp_path / "joint_limits.yaml").write_text(more, encoding="utf-8")
-    task = loaded({"limits_file": "joint_limits.yaml"})
+    task = load_beside({"limits_file": "joint_limits.yaml"})
     with pytest.raises(UnknownNameError, match="no joint named 'j7' or 'j9'"):
         robot_from_settings(task.robot)

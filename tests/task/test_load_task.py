@@ -67,7 +67,7 @@ def written(folder, text):
     return file
 
 
-def test_a_robot_may_be_named(tmp_path):
+def test_a_task_may_have_the_name_of_a_robot(tmp_path):
     named = COMPLETE.replace("../robots/scara3/robot.urdf", "iiwa14")
     file = written(tmp_path, named)
     assert load_task(file).robot.urdf == str(robots.path_of("iiwa14"))
@@ -189,7 +189,7 @@ def test_a_task_is_frozen(complete):
         complete.branch = "auto"
 
 
-def refused(source):
+def error_of(source):
     with pytest.raises(TaskError) as caught:
         load_task(source)
     assert caught.value.__cause__ is None
@@ -423,7 +423,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("change", "message"), MISTAKES)
-def test_the_error_names_the_key_what_was_found_and_what_is_allowed(change, message):
+def test_the_error_names_the_key_the_value_and_the_alternatives(change, message):
     with pytest.raises(TaskError, match=message) as caught:
         load_task(minimal(**yaml.safe_load(change)))
     assert "mistakes" not in str(caught.value), "one mistake, one complaint"
@@ -439,7 +439,7 @@ def test_degree_two_is_accepted_where_only_the_velocity_vanishes():
 def test_required_keys(key):
     task = minimal()
     del task[key]
-    assert f"task: {key}: this key is required, and missing" in str(refused(task))
+    assert f"task: {key}: this key is required, and missing" in str(error_of(task))
 
 
 def test_an_array_of_mistakes_does_not_fill_the_screen():
@@ -459,7 +459,7 @@ def test_all_mistakes_are_in_one_message(tmp_path):
         .replace("uno", "3")
     )
     file = written(tmp_path, text)
-    lines = str(refused(file)).splitlines()
+    lines = str(error_of(file)).splitlines()
     assert lines[0] == f"{file}: 3 mistakes"
     keys = ["robot.limits.scale.torque", "path[0].line.to[1]", "solver.name"]
     assert [
@@ -521,7 +521,7 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
 )
 def test_broken_files(tmp_path, text, expected):
     file = written(tmp_path, text)
-    message = str(refused(file))
+    message = str(error_of(file))
     assert message.startswith(str(file))
     for part in expected:
         assert part in message
@@ -537,29 +537,29 @@ def test_merge_keys_may_be_overridden(tmp_path):
 
 def test_a_missing_file_and_a_folder(tmp_path):
     assert "nothing.yaml: the file does not exist" in str(
-        refused(tmp_path / "nothing.yaml")
+        error_of(tmp_path / "nothing.yaml")
     )
-    assert "the file cannot be read" in str(refused(str(tmp_path)))
+    assert "the file cannot be read" in str(error_of(str(tmp_path)))
 
 
 def test_a_binary_file(tmp_path):
     file = tmp_path / "task.yaml"
     file.write_bytes(b"\xff\xfe\x00")
-    assert "not a text file" in str(refused(file))
+    assert "not a text file" in str(error_of(file))
 
 
 def test_what_is_no_source():
-    assert "found int; allowed: a file name, a mapping, or a Task" in str(refused(3))
+    assert "found int; allowed: a file name, a mapping, or a Task" in str(error_of(3))
 
 
 def test_a_file_needs_a_urdf(tmp_path):
     file = written(
         tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", "")
     )
-    assert f"{file}: robot.urdf: a task file needs this key" in str(refused(file))
+    assert f"{file}: robot.urdf: a task file needs this key" in str(error_of(file))
 
 
-def test_the_given_mapping_is_not_changed():
+def test_the_loader_leaves_the_mapping_as_it_is():
     given_task = minimal(robot={"urdf": "a.urdf"})
     before = copy.deepcopy(given_task)
     load_task(given_task)
@@ -570,7 +570,7 @@ def test_the_given_mapping_is_not_changed():
     ("key", "word"),
     [("start.joints", "home"), ("search.effort", "for"), ("path_start", "home")],
 )
-def test_words_of_a_sentence_are_not_suggested(key, word):
+def test_suggestions_are_no_words_of_a_sentence(key, word):
     with pytest.raises(TaskError) as caught:
         load_task(examples.scara_line, changes={key: word})
     assert "Did you mean" not in str(caught.value)

@@ -194,7 +194,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("segment", "message"), MISTAKES)
-def test_the_error_names_the_key_what_was_found_and_what_is_allowed(segment, message):
+def test_the_error_names_the_key_the_value_and_the_alternatives(segment, message):
     with pytest.raises(TaskError, match=message) as caught:
         task(yaml.safe_load(segment))
     assert "mistakes" not in str(caught.value), "one mistake, one complaint"

@@ -104,7 +104,7 @@ def test_the_tool_stops_at_corners(tolerance, turn_back):
     )
 
 
-def test_the_first_point_after_a_corner_is_passed():
+def test_the_path_passes_the_first_point_after_a_corner():
     """However near it is: a first waypoint of a segment that nearly equals its start is taken for it."""
     write(sharp())
     _, after = task(corner="stop", tolerance=None).path
@@ -115,7 +115,7 @@ def test_the_first_point_after_a_corner_is_passed():
     assert distances.min() < 1e-12
 
 
-def test_a_corner_of_a_file_without_a_stop_is_rounded_or_refused():
+def test_a_turn_back_without_a_stop_is_an_error():
     write(sharp(turn_back=True))
     with pytest.raises(TaskError, match=r"the path turns back.*Set corner: stop"):
         task()
@@ -139,7 +139,7 @@ def test_the_end_of_a_file_may_be_a_stop():
     ]
 
 
-def test_feed_rates_are_kept():
+def test_a_curve_keeps_feed_rates():
     rows = np.column_stack([1e3 * wave(500), np.full(500, 600.0)])
     write(rows, "x_mm,y_mm,z_mm,feed_mm/min")
     (segment,) = task().path
@@ -203,7 +203,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("keys", "message"), WRONG)
-def test_mistakes_are_named(keys, message):
+def test_the_error_names_the_mistake(keys, message):
     write(1e3 * bent(900, 0.005 * MM)[0])
     with pytest.raises(TaskError, match=message):
         task(**keys)
@@ -219,7 +219,7 @@ def test_a_turn_cannot_go_on_over_corners():
         task(space="pose", beside=turn, relative=False)
 
 
-def test_a_bad_row_is_named():
+def test_the_error_names_a_bad_row():
     rows = 1e3 * wave(500)
     rows[321, 1] = np.nan
     write(rows)

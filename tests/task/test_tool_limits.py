@@ -77,7 +77,7 @@ def test_the_error_names_the_key_of_what_makes_no_limit(tool, where, said):
     assert said in str(caught.value)
 
 
-def test_a_table_may_come_as_arrays_and_is_saved():
+def test_a_table_of_arrays_comes_back():
     given = {"s": np.linspace(0.0, 1.0, 3), "speed": np.array([1.0, 0.5, 1.0])}
     loaded = brachis.load_task({**TASK, "tool_limits": {"speed": given}})
     assert loaded.tool_limits.speed.speed == (1.0, 0.5, 1.0)

@@ -62,7 +62,7 @@ def post(at, radius=0.03, **more):
     return [{"name": "post", **shape, "position": list(at), **more}]
 
 
-def test_a_motion_through_a_thin_pin_is_refused(elbow):
+def test_a_motion_through_a_thin_pin_is_an_error(elbow):
     """It is so thin that the links pass it between the instants of any grid."""
     result = planned(post(elbow, 1e-4), mode="check", clearance=0.0)
     check = check_of(result)

@@ -9,7 +9,7 @@ from brachis.verify import verify_trajectory
 from support.gantry import DEGREE, DWELL, SPEED, SPLINES, TASK, gantry_motion, quintic
 
 
-def failed(trajectory):
+def failing_checks(trajectory):
     return {
         check.name for check in verify_trajectory(trajectory).checks if not check.passed
     }
@@ -41,34 +41,36 @@ def with_acceleration(spline, at_begin):
 
 
 def test_the_motion_passes():
-    assert failed(gantry_motion()) == set()
+    assert failing_checks(gantry_motion()) == set()
 
 
 @pytest.mark.parametrize("duration", [0.9 * DWELL, DWELL + 1e-6])
 def test_a_dwell_of_another_length(duration):
     splines = (SPLINES[0], replace(SPLINES[1], t_end=duration), *SPLINES[2:])
     motion = gantry_motion(splines)
-    assert failed(motion) == {"duration of dwells"}
+    assert failing_checks(motion) == {"duration of dwells"}
     off = value_of(motion, "duration of dwells")
     assert off == pytest.approx(abs(duration - DWELL), rel=1e-6)
 
 
 def test_a_dwell_that_is_missing():
-    assert failed(gantry_motion((SPLINES[0], *SPLINES[2:]))) == {"duration of dwells"}
+    assert failing_checks(gantry_motion((SPLINES[0], *SPLINES[2:]))) == {
+        "duration of dwells"
+    }
 
 
 def test_a_dwell_that_nobody_asked_for():
     (line, *rest) = TASK["path"]
     path = [{"line": line["line"], "stop": True}, *rest]
-    assert failed(gantry_motion(path=path)) == {"duration of dwells"}
-    assert failed(gantry_motion((SPLINES[0], *SPLINES[2:]), path=path)) == set()
+    assert failing_checks(gantry_motion(path=path)) == {"duration of dwells"}
+    assert failing_checks(gantry_motion((SPLINES[0], *SPLINES[2:]), path=path)) == set()
 
 
 def test_a_stop_without_rest():
     """The tool passes the corner at a speed."""
     before = quintic(1.0, (0.0, 0.0), (0.4, 0.1))
     behind = quintic(1.0, (0.4, 0.1), (0.55, SPEED))
-    found = failed(gantry_motion((before, behind, *SPLINES[3:])))
+    found = failing_checks(gantry_motion((before, behind, *SPLINES[3:])))
     assert "velocity at stops" in found
 
 
@@ -77,7 +79,7 @@ def test_a_stop_at_another_place():
     dwell = quintic(DWELL, (0.39, 0.0), (0.39, 0.0))
     behind = quintic(1.0, (0.39, 0.0), (0.55, SPEED))
     motion = gantry_motion((before, dwell, behind, *SPLINES[3:]))
-    assert {"s at stops", "velocity at stops"} <= failed(motion)
+    assert {"s at stops", "velocity at stops"} <= failing_checks(motion)
     assert value_of(motion, "s at stops") == pytest.approx(0.01)
 
 
@@ -89,8 +91,8 @@ def test_an_acceleration_at_a_stop_is_for_rest_in_velocity_alone():
         *SPLINES[3:],
     )
     spline = {"degree": DEGREE, "rest": "velocity"}
-    assert failed(gantry_motion(splines, spline=spline)) == set()
-    found = failed(gantry_motion(splines))
+    assert failing_checks(gantry_motion(splines, spline=spline)) == set()
+    found = failing_checks(gantry_motion(splines))
     assert found == {"acceleration at stops", "acceleration jump", "torque jump"}
 
 
@@ -98,7 +100,7 @@ def test_a_jump_at_a_flying_link_is_refused_in_any_case():
     """The acceleration at a link between a free and a given speed jumps."""
     splines = (*SPLINES[:4], with_acceleration(SPLINES[4], at_begin=True))
     motion = gantry_motion(splines, spline={"degree": DEGREE, "rest": "velocity"})
-    assert failed(motion) == {"acceleration jump", "torque jump"}
+    assert failing_checks(motion) == {"acceleration jump", "torque jump"}
 
 
 def test_a_motion_in_a_dwell():
@@ -107,9 +109,9 @@ def test_a_motion_in_a_dwell():
     before[2, 0] = 0.1
     before[2, 1] = -0.1  # the tool stays
     moving = replace(motion, qddot_before=before)
-    assert "velocity in dwells" in failed(moving)
-    assert "velocity at stops" not in failed(moving)
-    assert "path error" not in failed(moving)
+    assert "velocity in dwells" in failing_checks(moving)
+    assert "velocity at stops" not in failing_checks(moving)
+    assert "path error" not in failing_checks(moving)
 
 
 @pytest.mark.parametrize(
@@ -118,28 +120,30 @@ def test_a_motion_in_a_dwell():
 def test_another_speed_than_the_given_one(factor, passes):
     limits = {"process_speed": {"speed": factor * SPEED, "s": [0.55, 0.85]}}
     motion = gantry_motion(tool_limits=limits)
-    assert failed(motion) == (set() if passes else {"process speed"})
+    assert failing_checks(motion) == (set() if passes else {"process speed"})
     assert value_of(motion, "process speed") == pytest.approx(factor - 1.0, rel=1e-3)
 
 
 def test_a_speed_that_changes_within_its_part():
     """At both ends it is as given, and so is its mean."""
     splines = with_curve(3, 2, 1e-5)
-    assert "process speed" in failed(gantry_motion(splines))
+    assert "process speed" in failing_checks(gantry_motion(splines))
 
 
 def test_a_given_speed_that_begins_elsewhere():
     limits = {"process_speed": {"speed": SPEED, "s": [0.56, 0.85]}}
-    found = failed(gantry_motion(tool_limits=limits))
+    found = failing_checks(gantry_motion(tool_limits=limits))
     assert found == {"s where process speeds begin and end"}
 
 
 def test_a_motion_that_goes_back():
-    assert "ds/dt below zero" in failed(gantry_motion(with_curve(2, 1, -1e-6)))
+    assert "ds/dt below zero" in failing_checks(gantry_motion(with_curve(2, 1, -1e-6)))
 
 
 def test_a_jump_of_s_between_phases():
-    assert "s where phases meet" in failed(gantry_motion(with_curve(2, 0, 1e-6)))
+    assert "s where phases meet" in failing_checks(
+        gantry_motion(with_curve(2, 0, 1e-6))
+    )
 
 
 def test_holding_torque_in_a_dwell_counts():
@@ -161,7 +165,7 @@ def test_a_part_with_a_given_speed_is_checked_to_its_ends():
         ends[-1] = motion.t_end
         moved = replace(motion, phase_ends=ends)
         assert value_of(moved, "process speed") == pytest.approx(1.0 / 3.0)
-        assert "velocity at stops" not in failed(moved)
+        assert "velocity at stops" not in failing_checks(moved)
 
 
 def test_a_stop_between_nodes_is_looked_at_where_it_is_said_to_be():
@@ -169,4 +173,4 @@ def test_a_stop_between_nodes_is_looked_at_where_it_is_said_to_be():
     motion = gantry_motion()
     ends = motion.phase_ends.copy()
     ends[1] += 0.1
-    assert "velocity at stops" in failed(replace(motion, phase_ends=ends))
+    assert "velocity at stops" in failing_checks(replace(motion, phase_ends=ends))

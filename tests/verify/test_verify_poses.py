@@ -39,7 +39,7 @@ def path_error(trajectory):
     return check
 
 
-def test_it_passes_as_planned(motion):
+def test_the_motion_of_the_plan_passes(motion):
     assert verify_trajectory(motion).passed
 
 

@@ -55,7 +55,7 @@ def saved(scara_urdf, tmp_path_factory):
     return brachis.Trajectory.load(path)
 
 
-def failed(trajectory, robot):
+def failing_checks(trajectory, robot):
     """Names of the checks that fail for a robot in the place of the saved one."""
     return {
         check.name
@@ -95,4 +95,4 @@ def test_every_part_counts(saved, change, fault):
     other = robot_from_settings(
         check_robot_settings({**ROBOT, **change}), urdf_text=saved.urdf
     )
-    assert fault in failed(saved, other)
+    assert fault in failing_checks(saved, other)

@@ -15,7 +15,7 @@ from support.motions import with_limits
 MIDDLE = 60
 
 
-def shifted(trajectory, name, place, by):
+def with_entry(trajectory, name, place, by):
     """The trajectory with one entry of an array moved."""
     array = np.array(getattr(trajectory, name))
     array[place] += by
@@ -65,49 +65,52 @@ def torn(trajectory, row, by):
 
 
 FAULTS = {
-    "off the path": ("path error", lambda t: shifted(t, "q", (MIDDLE, 0), 1e-8)),
+    "off the path": ("path error", lambda t: with_entry(t, "q", (MIDDLE, 0), 1e-8)),
     "too fast": ("torque ratio", lambda t: faster(t, 1.001)),
     "backwards": ("ds/dt below zero", backwards),
     "short of the path's end": (
         "s at the ends",
-        lambda t: shifted(t, "control_points", (0, -1), -1e-6),
+        lambda t: with_entry(t, "control_points", (0, -1), -1e-6),
     ),
     "not from the path's beginning": (
         "s at the ends",
-        lambda t: shifted(t, "control_points", (0, 0), 1e-6),
+        lambda t: with_entry(t, "control_points", (0, 0), 1e-6),
     ),
     "starts elsewhere": ("start posture", started_elsewhere),
     "ends elsewhere": ("end posture", ended_elsewhere),
     "moving at the start": (
         "start velocity",
-        lambda t: shifted(t, "qdot", (0, 1), 1e-7),
+        lambda t: with_entry(t, "qdot", (0, 1), 1e-7),
     ),
-    "moving at the end": ("end velocity", lambda t: shifted(t, "qdot", (-1, 1), 1e-7)),
+    "moving at the end": (
+        "end velocity",
+        lambda t: with_entry(t, "qdot", (-1, 1), 1e-7),
+    ),
     "accelerating at the start": (
         "start acceleration",
-        lambda t: shifted(t, "qddot", (0, 1), 1e-5),
+        lambda t: with_entry(t, "qddot", (0, 1), 1e-5),
     ),
     "accelerating at the end": (
         "end acceleration",
-        lambda t: shifted(t, "qddot_before", (-1, 1), 1e-5),
+        lambda t: with_entry(t, "qddot_before", (-1, 1), 1e-5),
     ),
     "another spline": (
         "redundant joints' splines",
-        lambda t: shifted(t, "control_points", 1, 0.3),
+        lambda t: with_entry(t, "control_points", 1, 0.3),
     ),
     "one control point": (
         "redundant joints' splines",
-        lambda t: shifted(t, "control_points", (1, 9), 1e-6),
+        lambda t: with_entry(t, "control_points", (1, 9), 1e-6),
     ),
     "position jumps": ("position jump", lambda t: torn(t, 5, 1e-4)),
     "velocity jumps": ("velocity jump", lambda t: torn(t, 4, 1e-6)),
     "acceleration jumps": (
         "acceleration jump",
-        lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-3),
+        lambda t: with_entry(t, "qddot_before", (MIDDLE, 0), 1e-3),
     ),
     "torque jumps": (
         "torque jump",
-        lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-6),
+        lambda t: with_entry(t, "qddot_before", (MIDDLE, 0), 1e-6),
     ),
 }
 ALONE = {
@@ -122,19 +125,19 @@ ALONE = {
 """Faults that no other check may report."""
 
 
-def failed(verification):
+def failing_checks(verification):
     return {check.name for check in verification.checks if not check.passed}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_fault_is_found(fault, planned):
+def test_the_verification_finds_each_fault(fault, planned):
     name, tamper = FAULTS[fault]
-    assert failed(verify_trajectory(planned)) == set()
+    assert failing_checks(verify_trajectory(planned)) == set()
     verification = verify_trajectory(tamper(planned))
-    assert name in failed(verification)
+    assert name in failing_checks(verification)
     assert not verification.passed
     if fault in ALONE:
-        assert failed(verification) == {name}
+        assert failing_checks(verification) == {name}
 
 
 def test_every_check_has_its_fault(planned):
@@ -200,26 +203,33 @@ def test_positions_are_told_by_their_place_in_the_range(planned):
 
 
 def test_nothing_passes_that_is_no_number(planned):
-    verification = verify_trajectory(shifted(planned, "control_points", (0, 8), np.nan))
-    assert "ds/dt below zero" in failed(verification)
-    assert "path error" in failed(verification)
-    verification = verify_trajectory(shifted(planned, "q", (MIDDLE, 0), np.nan))
-    assert {"path error", "torque ratio", "position ratio", "position jump"} <= failed(
-        verification
+    verification = verify_trajectory(
+        with_entry(planned, "control_points", (0, 8), np.nan)
     )
+    assert "ds/dt below zero" in failing_checks(verification)
+    assert "path error" in failing_checks(verification)
+    verification = verify_trajectory(with_entry(planned, "q", (MIDDLE, 0), np.nan))
+    assert {
+        "path error",
+        "torque ratio",
+        "position ratio",
+        "position jump",
+    } <= failing_checks(verification)
 
 
 def test_tolerances_are_options(planned):
     lenient = VerifyOptions(spline_tolerance=0.31)
-    assert verify_trajectory(shifted(planned, "control_points", 1, 0.3), lenient).passed
+    assert verify_trajectory(
+        with_entry(planned, "control_points", 1, 0.3), lenient
+    ).passed
     strict = VerifyOptions(ratio_tolerance=-0.5)
-    assert failed(verify_trajectory(planned, strict)) == {"torque ratio"}
+    assert failing_checks(verify_trajectory(planned, strict)) == {"torque ratio"}
 
 
 @pytest.mark.parametrize(
     ("old", "new"), [('"j2"', '"elbow"'), ('type="continuous"', 'type="fixed"')]
 )
-def test_robot_of_other_joints_is_refused(old, new, planned):
+def test_robot_of_other_joints_is_an_error(old, new, planned):
     place = planned.urdf.index(old)
     text = planned.urdf[:place] + planned.urdf[place:].replace(old, new, 1)
     robot = Robot.from_urdf("other", urdf_text=text)

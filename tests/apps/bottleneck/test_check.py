@@ -59,7 +59,7 @@ def test_range_of_a_joint(slide):
     )
 
 
-def test_a_wrong_prediction_is_found(scara):
+def test_the_check_finds_a_wrong_prediction(scara):
     refined = scara("j3").candidate.refined
     honest = scara("j3").sensitivities
     doubled = tuple(

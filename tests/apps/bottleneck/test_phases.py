@@ -74,7 +74,7 @@ def test_a_saved_motion_is_solved_again_by_phase(stopping):
     assert 0.5 * now.t_end < again.reference.t_end < now.t_end
 
 
-def test_phases_are_named_for_a_motion_that_was_not_planned():
+def test_a_motion_from_elsewhere_has_limits_by_phase():
     motion = gantry_motion()
     ratios = limit_ratios(motion)
     narrower = replace(ratios, values=ratios.values / 0.29)

@@ -45,14 +45,14 @@ def test_limits_on_jerk_are_left_out(slide):
     assert reference.t_end == pytest.approx(best, rel=2e-4)
 
 
-def test_nothing_faster_is_said(slide):
+def test_an_optimal_motion_has_no_faster_reference(slide):
     # Parabolas on a mesh with a knot in the middle are at the optimum already.
     result = slide(degree=2, intervals=4)
     reference = find_reference(result.candidate)
     assert reference is None or reference.distance < 2e-4
 
 
-def test_end_posture_is_kept(slide):
+def test_the_reference_keeps_the_end_posture(slide):
     free = slide(
         ((1.0, 0.0, 0.0),) * 2,
         ("x",),

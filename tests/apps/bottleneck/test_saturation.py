@@ -13,7 +13,7 @@ T = 2.0
 
 
 @pytest.fixture(scope="module")
-def made(slide):
+def motion_with(slide):
     """A trajectory of the two slides whose first one has a given piecewise linear acceleration in m/s^2."""
     base = slide(degree=2, intervals=4).trajectory
 
@@ -45,8 +45,8 @@ def of(found, joint, kind):
     return entry
 
 
-def test_full_force_for_a_part_of_the_time(made):
-    trajectory = made([0.0, 0.3 * T, T], [LIMIT, 0.0, 0.0], [LIMIT, LIMIT, 0.0])
+def test_full_force_for_a_part_of_the_time(motion_with):
+    trajectory = motion_with([0.0, 0.3 * T, T], [LIMIT, 0.0, 0.0], [LIMIT, LIMIT, 0.0])
     entry = of(saturations(trajectory), "j1", "force")
     assert entry.share == pytest.approx(0.3, abs=1e-12)
     (stretch,) = entry.active
@@ -58,10 +58,12 @@ def test_full_force_for_a_part_of_the_time(made):
     assert entry.peak == pytest.approx(1.0)
 
 
-def test_both_directions_count(made):
+def test_both_directions_count(motion_with):
     turn = [0.0, 0.25 * T, 0.75 * T, T]
     entry = of(
-        saturations(made(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])),
+        saturations(
+            motion_with(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])
+        ),
         "j1",
         "force",
     )
@@ -70,32 +72,32 @@ def test_both_directions_count(made):
     assert entry.active[1].begin == entry.active[0].end == pytest.approx(0.75 * T)
 
 
-def test_the_threshold_is_met_between_grid_points(made):
-    ramp = made([0.0, T], [0.0, LIMIT], [0.0, LIMIT])
+def test_the_threshold_is_met_between_grid_points(motion_with):
+    ramp = motion_with([0.0, T], [0.0, LIMIT], [0.0, LIMIT])
     assert of(saturations(ramp), "j1", "force").share == pytest.approx(1e-2, rel=1e-6)
-    steep = made([0.0, T], [0.0, 1.7 * LIMIT], [0.0, 1.7 * LIMIT])
+    steep = motion_with([0.0, T], [0.0, 1.7 * LIMIT], [0.0, 1.7 * LIMIT])
     entry = of(saturations(steep), "j1", "force")
     assert entry.share == pytest.approx(1.0 - 0.99 / 1.7, rel=1e-9)
     assert entry.active[0].begin == pytest.approx(0.99 / 1.7 * T)
 
 
-def rippling(made, lowest):
+def rippling(motion_with, lowest):
     """A force at its limit with one dip in the middle of the motion."""
     times, forces = (
         [0.0, 0.4 * T, 0.5 * T, 0.6 * T, T],
         np.array([1.0, 1.0, lowest, 1.0, 1.0]) * LIMIT,
     )
-    return of(saturations(made(times, forces, forces)), "j1", "force")
+    return of(saturations(motion_with(times, forces, forces)), "j1", "force")
 
 
-def test_ripple_interrupts_no_stretch(made):
-    entry = rippling(made, 0.955)
+def test_ripple_interrupts_no_stretch(motion_with):
+    entry = rippling(motion_with, 0.955)
     assert [(stretch.begin, stretch.end) for stretch in entry.active] == [(0.0, T)]
     assert entry.share == 1.0
 
 
-def test_a_deeper_dip_does(made):
-    entry = rippling(made, 0.9)
+def test_a_deeper_dip_does(motion_with):
+    entry = rippling(motion_with, 0.9)
     assert len(entry.active) == 2
     below = (
         2.0 * 0.1 * 0.9
@@ -103,13 +105,15 @@ def test_a_deeper_dip_does(made):
     assert entry.share == pytest.approx(1.0 - below)
 
 
-def test_a_motion_near_its_limit_that_never_reaches_it_does_not_count(made):
+def test_a_motion_near_its_limit_that_never_reaches_it_does_not_count(motion_with):
     times, forces = [0.0, 0.5 * T, T], np.array([0.96, 0.985, 0.96]) * LIMIT
-    assert of(saturations(made(times, forces, forces)), "j1", "force").active == ()
+    assert (
+        of(saturations(motion_with(times, forces, forces)), "j1", "force").active == ()
+    )
 
 
-def test_positions_are_measured_by_their_place_in_the_range(made):
-    trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])  # from 0 to 2 m
+def test_positions_are_measured_by_their_place_in_the_range(motion_with):
+    trajectory = motion_with([0.0, T], [1.0, 1.0], [1.0, 1.0])  # from 0 to 2 m
     limits = dataclasses.replace(
         trajectory.robot.limits,
         position_lower=np.array([-4.0, -np.inf]),

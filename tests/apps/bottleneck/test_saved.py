@@ -11,7 +11,7 @@ from brachis.errors import DecompositionError, InputError, PlanningError
 from brachis.limits import Label, Limit, Partials
 
 
-def loaded(result, folder):
+def save_and_load(result, folder):
     result.trajectory.save(folder / "result.npz")
     return brachis.Trajectory.load(folder / "result.npz")
 
@@ -38,7 +38,7 @@ def assert_same(saved, fresh):
 def test_the_same_report(joint, scara, tmp_path):
     result = scara(joint)
     assert_same(
-        brachis.bottleneck.report(loaded(result, tmp_path)),
+        brachis.bottleneck.report(save_and_load(result, tmp_path)),
         brachis.bottleneck.report(result),
     )
 
@@ -46,13 +46,13 @@ def test_the_same_report(joint, scara, tmp_path):
 def test_other_knots_and_boundary_conditions(slide, tmp_path):
     result = slide(intervals=12, rest="velocity", degree=2)
     assert_same(
-        brachis.bottleneck.report(loaded(result, tmp_path)),
+        brachis.bottleneck.report(save_and_load(result, tmp_path)),
         brachis.bottleneck.report(result),
     )
 
 
-def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
-    trajectory = loaded(slide(intervals=10, rest="full"), tmp_path)
+def test_a_motion_that_is_no_optimum_is_an_error(slide, tmp_path):
+    trajectory = save_and_load(slide(intervals=10, rest="full"), tmp_path)
     slow = dataclasses.replace(
         trajectory,
         times=2.0 * trajectory.times,
@@ -65,7 +65,7 @@ def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
 
 
 def test_a_time_limit_that_is_too_short_is_no_other_optimum(slide, tmp_path):
-    trajectory = loaded(slide(intervals=10, rest="full"), tmp_path)
+    trajectory = save_and_load(slide(intervals=10, rest="full"), tmp_path)
     search = trajectory.task.search.model_copy(update={"time_limit": 1e-4})
     task = trajectory.task.model_copy(update={"search": search})
     with pytest.raises(PlanningError, match="within the time limit") as caught:
@@ -73,8 +73,8 @@ def test_a_time_limit_that_is_too_short_is_no_other_optimum(slide, tmp_path):
     assert "Raise search.time_limit" in caught.value.hint
 
 
-def test_a_motion_of_another_branch_is_refused(scara, tmp_path):
-    trajectory = loaded(scara("j3"), tmp_path)
+def test_a_motion_of_another_branch_is_an_error(scara, tmp_path):
+    trajectory = save_and_load(scara("j3"), tmp_path)
     with pytest.raises(InputError, match="branch"):
         brachis.bottleneck.report(dataclasses.replace(trajectory, branch="sideways"))
 
@@ -107,7 +107,7 @@ def test_own_limits_are_passed_again(tmp_path):
         start={"joints": [0.5236, -1.9, 1.9]},
         **own,
     )
-    motion = loaded(result, tmp_path)
+    motion = save_and_load(result, tmp_path)
     assert_same(
         brachis.bottleneck.report(motion, **own), brachis.bottleneck.report(result)
     )
@@ -128,7 +128,7 @@ def test_a_closed_form_of_the_users_own_is_passed_again(tmp_path):
         effort="single",
         families=[family],
     )
-    motion = loaded(result, tmp_path)
+    motion = save_and_load(result, tmp_path)
     assert motion.branch in {"left", "right"}
     with pytest.raises(DecompositionError, match=r"report\(motion, families=\[...\]\)"):
         brachis.bottleneck.report(motion)

@@ -116,7 +116,7 @@ def test_limits_along_a_given_joint_path_cost_what_planning_again_saves():
     rng = np.random.default_rng(1)
     points = np.cumsum(rng.normal(0.0, 0.4, (6, 3)), axis=0)
 
-    def timed(j1):
+    def plan_with(j1):
         return brachis.plan(
             brachis.examples.scara_line,
             start=points[0].tolist(),
@@ -128,9 +128,9 @@ def test_limits_along_a_given_joint_path_cost_what_planning_again_saves():
             **QUICK,
         )
 
-    result = timed(10.0)
+    result = plan_with(10.0)
     # Least times go with a power of the torque.
-    power = np.log(timed(11.0).t_end / result.t_end) / np.log(1.1)
+    power = np.log(plan_with(11.0).t_end / result.t_end) / np.log(1.1)
     for motion in (result, result.trajectory):
         found = brachis.bottleneck.report(motion).sensitivities
         change = found.of("j1", "torque").change(1.0)
@@ -173,7 +173,7 @@ def test_least_squares_agree_with_the_solver(scara, joint):
         assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
 
 
-def test_an_answer_that_is_no_optimum_is_told(scara):
+def test_an_answer_that_is_no_optimum_is_not_reliable(scara):
     refined = scara("j3").candidate.refined
     report = refined.reports[-1]
     x = report.x.copy()
@@ -183,7 +183,7 @@ def test_an_answer_that_is_no_optimum_is_told(scara):
         assert sensitivities_at(refined.program, multipliers).reliable is reliable
 
 
-def test_multipliers_of_wrong_sign_are_not_believed(scara):
+def test_least_squares_replace_multipliers_of_wrong_sign(scara):
     refined = scara("j3").candidate.refined
     report = refined.reports[-1]
     wrong = multipliers_of(refined.program, report.x, -report.multipliers)

@@ -93,7 +93,7 @@ def test_unverified_motion(run, task, write, tmp_path, request):
     ]
 
 
-def test_a_search_ended_early_is_told(run, task, write, monkeypatch):
+def test_the_command_says_that_the_search_ended_early(run, task, write, monkeypatch):
     honest = planner.plan
     monkeypatch.setattr(
         planner,

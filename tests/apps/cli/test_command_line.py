@@ -177,7 +177,7 @@ def test_set_changes_the_task(run, task, write, tmp_path):
     assert "--set: this option cannot be used with a saved motion" in outcome.err
 
 
-def test_how_much_is_said(run, task, write):
+def test_quiet_and_verbose_set_how_much_a_command_says(run, task, write):
     path = write(task)
     assert run(f"plan {path} {SMALL} --quiet") == run(f"-q plan {path} {SMALL}")
     quiet = run(f"plan {path} {SMALL} --set robot.limits.velocity=1e9 -q")

@@ -228,7 +228,7 @@ CHOICES = {
 
 
 @pytest.mark.parametrize("case", CHOICES)
-def test_candidates_are_listed(run, task, write, case):
+def test_a_plan_lists_its_candidates(run, task, write, case):
     more, choices, name = CHOICES[case]
     outcome = run("plan", write({**task, "redundant_joints": "auto", **more}))
     data = json.loads(
@@ -270,7 +270,9 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     assert not list((tmp_path / "out").iterdir())
 
 
-def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
+def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
+    run, task, write, tmp_path, monkeypatch
+):
     honest, now = pipeline.rank_candidate, [0.0]
 
     def slow(*arguments):

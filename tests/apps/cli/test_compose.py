@@ -106,7 +106,7 @@ def test_json(run, tmp_path):
 @pytest.mark.parametrize(
     "missing", ["--range", "--velocity", "--force", "--mass", "--out"]
 )
-def test_no_figure_is_guessed(run, tmp_path, missing):
+def test_every_figure_of_a_rail_is_required_by_the_command(run, tmp_path, missing):
     words = [*FIGURES, "--out", str(tmp_path / "on_rail.urdf")]
     place = words.index(missing)
     del words[place : place + (3 if missing == "--range" else 2)]

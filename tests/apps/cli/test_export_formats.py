@@ -20,7 +20,7 @@ def saved(tmp_path_factory):
     return path
 
 
-def test_the_suffix_says_the_format_unless_it_is_named(run, saved, tmp_path):
+def test_the_suffix_says_the_format_unless_an_option_does(run, saved, tmp_path):
     for name, *options in (
         ("motion.parquet",),
         ("motion.yaml",),
@@ -52,7 +52,7 @@ def test_some_joints(run, saved, tmp_path):
     assert "servoj takes the angles of six joints" in outcome.err
 
 
-def test_json_fulfils_the_schema_that_is_printed(run, saved, tmp_path):
+def test_json_fulfils_the_schema_of_the_command(run, saved, tmp_path):
     assert run(f"export {saved} --out {tmp_path / 'motion.json'} --dt 0.1").code == 0
     schema = json.loads(run("schema --of trajectory").out)
     content = json.loads((tmp_path / "motion.json").read_text())

@@ -22,7 +22,7 @@ PUBLISHED = {
 }
 
 
-def published(name):
+def find_published(name):
     for folder in map(Path, sys.path):
         path = folder / "cmeel.prefix/share/example-robot-data/robots" / PUBLISHED[name]
         if path.is_file():
@@ -91,7 +91,7 @@ def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
 def test_redundant_joints_with_a_closed_form(run, robot, joints):
     pytest.importorskip("eaik.pybindings.EAIK")  # which comes along where it has wheels
     known = ROOT / "robots" / robot / "robot.urdf"
-    solvers = decompositions(run, known if known.exists() else published(robot))
+    solvers = decompositions(run, known if known.exists() else find_published(robot))
     closed = [joint for joint, solver in solvers.items() if solver != "-"]
     assert closed == (closed if joints is None else joints)
 
@@ -108,12 +108,14 @@ def test_iiwa_has_none_for_its_elbow(run):
 def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
     monkeypatch.setattr(registry, "_KNOWN", {})
-    panda = decompositions(run, published("Panda"))
+    panda = decompositions(run, find_published("Panda"))
     assert [joint for joint, solver in panda.items() if solver != "-"] == [
         "panda_joint4",
         "panda_joint7",
     ]
-    remarks = json.loads(run("inspect", published("Panda"), "--json").out)["remarks"]
+    remarks = json.loads(run("inspect", find_published("Panda"), "--json").out)[
+        "remarks"
+    ]
     assert remarks[-1].startswith(
         "EAIK is not installed (pip install EAIK); it might add the redundant joints ["
     )
@@ -121,18 +123,18 @@ def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
         "[panda_joint5], [panda_joint6]; installing it needs a C++ compiler, except on"
         in remarks[-1]
     )
-    assert remarks[-1] in run("inspect", published("Panda")).out.replace("\n", " ")
+    assert remarks[-1] in run("inspect", find_published("Panda")).out.replace("\n", " ")
 
 
-def test_the_chosen_tool_frame_is_named(run):
-    out = run("inspect", published("Panda"), "--json").out
+def test_inspect_names_its_choice_of_a_tool_frame(run):
+    out = run("inspect", find_published("Panda"), "--json").out
     (tool, space) = json.loads(out)["remarks"]
     assert tool.startswith(
         "tool frame: panda_hand, the last link before the chains to panda_leftfinger"
     )
     assert space.startswith("task space: pose")
     named = run(
-        "inspect", published("Panda"), "--tool-frame", "panda_link8", "--json"
+        "inspect", find_published("Panda"), "--tool-frame", "panda_link8", "--json"
     ).out
     assert json.loads(named)["remarks"] == [space]
 
@@ -140,8 +142,8 @@ def test_the_chosen_tool_frame_is_named(run):
 LIMB = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 
 
-def test_of_several_arms_the_first_one_is_shown(run):
-    data = json.loads(run("inspect", published("Baxter"), "--json").out)
+def test_inspect_shows_the_first_of_several_arms(run):
+    data = json.loads(run("inspect", find_published("Baxter"), "--json").out)
     assert [joint["joint"] for joint in data["joints"]] == [
         f"left_{part}" for part in LIMB
     ]
@@ -149,7 +151,9 @@ def test_of_several_arms_the_first_one_is_shown(run):
         "from which several limbs part; --base-frame names another one"
     )
     assert "--tool-frame names another one" in data["remarks"][1]
-    solvers = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
+    solvers = decompositions(
+        run, find_published("Baxter"), "--tool-frame", "left_gripper"
+    )
     assert set(solvers.values()) == {"-"}  # offsets at the shoulder and the wrist
 
 
@@ -193,5 +197,5 @@ def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
         "--mass",
         "60",
     )
-    assert run("compose", published("UR5"), *options, "--out", out).code == 0
+    assert run("compose", find_published("UR5"), *options, "--out", out).code == 0
     assert decompositions(run, out)["rail"] == "parallel_axes"

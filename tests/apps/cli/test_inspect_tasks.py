@@ -102,7 +102,7 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
     assert "never free" not in run("inspect", written(tmp_path, scene=[low])).out
 
 
-def test_it_fits_a_screen_and_has_the_reasons_where_asked(run):
+def test_it_fits_a_screen_and_has_the_reasons_with_verbose(run):
     short = run("inspect tx90l_rail").out
     assert len(short.splitlines()) < 40
     assert "do not meet in a point" not in short

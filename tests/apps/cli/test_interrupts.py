@@ -52,7 +52,7 @@ def brachis(where, how, *arguments):
         ("unopy", "swallowed"),
     ],
 )
-def test_a_press_before_anything_is_planned(where, how, write, task, tmp_path):
+def test_a_press_before_the_plan(where, how, write, task, tmp_path):
     done = brachis(where, how, "plan", write(task), "--out", tmp_path / "out")
     assert (done.returncode, done.stdout) == (130, ""), done.stderr
     assert done.stderr == "brachis: interrupted\n"

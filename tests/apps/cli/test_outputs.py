@@ -306,7 +306,7 @@ def test_progress_takes_names_with_brackets(monkeypatch, capfd):
     assert "[/red]:x:" in capfd.readouterr().err
 
 
-def test_endless_inputs_are_refused(endless, run, saved, tmp_path):
+def test_endless_inputs_are_errors(endless, run, saved, tmp_path):
     task = yaml.safe_load((saved / "task.yaml").read_text())
     task["robot"]["urdf"] = str(saved / "robot.urdf")
     by_csv = {**task, "path": [{"csv": {"file": str(endless), "relative": True}}]}

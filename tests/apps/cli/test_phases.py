@@ -35,7 +35,7 @@ def test_a_plan_prints_its_phases_and_has_them_in_its_json(
     assert phases[-1]["end"] == data["t_end"]
 
 
-def test_one_phase_is_not_listed(run, write):
+def test_a_plan_lists_no_single_phase(run, write):
     assert "phases" not in run(f"plan {write(quick_task())}").out
 
 

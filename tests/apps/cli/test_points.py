@@ -27,7 +27,7 @@ def seam(task, write, tmp_path):
     return write({**task, "start": "free", "redundant_joints": ["j1"], "search": QUICK})
 
 
-def test_inspect_says_what_was_found(seam):
+def test_inspect_reports_the_fit_of_points(seam):
     done = RUNNER.invoke(app, ["inspect", str(seam)])
     assert done.exit_code == 0
     for text in (

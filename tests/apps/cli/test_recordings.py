@@ -15,7 +15,7 @@ TASK = ROOT / "examples/01_scara_line.yaml"
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def recording(tmp_path_factory):
     """A slow motion as a file in degrees, and a task file with the robot and its settings."""
     folder, task = tmp_path_factory.mktemp("recorded"), yaml.safe_load(TASK.read_text())
     task["robot"]["urdf"] = str(SCARA)
@@ -39,8 +39,8 @@ def recorded(tmp_path_factory):
     return folder / "today.csv", folder / "cell.yaml", trajectory
 
 
-def test_import(run, recorded, tmp_path):
-    file, cell, trajectory = recorded
+def test_import(run, recording, tmp_path):
+    file, cell, trajectory = recording
     out = tmp_path / "today.npz"
     outcome = run(f"import {file} --robot {cell} --angle deg --out {out} --degrees")
     assert outcome.code == 0, outcome.err
@@ -59,8 +59,8 @@ def test_import(run, recorded, tmp_path):
     assert run(f"import {file} --robot {cell} --angle deg --out {cell}").code == 2
 
 
-def test_compare(run, recorded, tmp_path):
-    file, cell, trajectory = recorded
+def test_compare(run, recording, tmp_path):
+    file, cell, trajectory = recording
     out = tmp_path / "out"
     outcome = run(f"compare {file} --robot {cell} --angle deg --out {out}")
     assert outcome.code == 0, outcome.err
@@ -88,9 +88,9 @@ def test_compare(run, recorded, tmp_path):
     ],
 )
 def test_a_wrong_option_is_an_error_and_nothing_is_written(
-    run, recorded, tmp_path, options, message
+    run, recording, tmp_path, options, message
 ):
-    file, cell, _ = recorded
+    file, cell, _ = recording
     out = tmp_path / "today.npz"
     outcome = run("import", file, "--robot", cell, *options, "--out", out)
     assert outcome.code == 2, outcome.err

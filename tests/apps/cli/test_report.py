@@ -9,7 +9,7 @@ from support.effort import QUICK
 from .conftest import ROOT
 
 
-def saved(folder, torque=None):
+def save_motion(folder, torque=None):
     """Save a motion of the example, on drives with other limits than it was planned for."""
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
     quick = {**task, "spline": {**task["spline"], "intervals": 6}, "search": QUICK}
@@ -26,7 +26,7 @@ def saved(folder, torque=None):
 
 
 def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(run, tmp_path):
-    result, page = saved(tmp_path), tmp_path / "motion.html"
+    result, page = save_motion(tmp_path), tmp_path / "motion.html"
     page.write_text(
         "<!doctype html>\n<!-- brachis report -->\nan older one", encoding="utf-8"
     )
@@ -43,7 +43,9 @@ def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(run, tmp_pat
 
 
 def test_an_unverified_motion_is_reported_with_its_exit_code(run, tmp_path):
-    outcome = run("report", saved(tmp_path, torque=9.0), "--out", tmp_path / "bad.html")
+    outcome = run(
+        "report", save_motion(tmp_path, torque=9.0), "--out", tmp_path / "bad.html"
+    )
     assert outcome.code == 1
     assert "did not pass" in outcome.err
     assert "NOT VERIFIED" in (tmp_path / "bad.html").read_text(encoding="utf-8")
@@ -52,7 +54,7 @@ def test_an_unverified_motion_is_reported_with_its_exit_code(run, tmp_path):
 def test_a_robot_without_a_name_leaves_the_title_to_the_file(
     run, tmp_path, monkeypatch
 ):
-    result = saved(tmp_path)
+    result = save_motion(tmp_path)
     monkeypatch.setattr(Robot, "name", "")
     assert run(f"report {result}").code == 0
     assert "<title>motion.npz: verified</title>" in (

@@ -50,7 +50,7 @@ def sweep_file(tmp_path, write, task, monkeypatch):
     return path
 
 
-def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
+def test_a_sweep_shows_its_results(run, sweep_file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = run(f"sweep {sweep_file} --verbose")
     assert done.code == 0
@@ -98,7 +98,7 @@ def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
     assert not (tmp_path / "out/sweep.png").exists()
 
 
-def test_parts_are_planned_by_themselves_and_merged(run, sweep_file, tmp_path):
+def test_parts_of_a_sweep_give_one_table_by_merge(run, sweep_file, tmp_path):
     out = tmp_path / "out"
     first = run(f"sweep {sweep_file} --part 1/2 --out {out}")
     assert first.code == 0

@@ -15,7 +15,7 @@ WIDTHS = (60, 80, 120)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
-def printed(width, columns, rows, **options):
+def print_to_text(width, columns, rows, **options):
     console = Console(width=width, highlight=False, markup=False)
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -40,7 +40,7 @@ ROWS = [
 
 @pytest.mark.parametrize("width", [30, *WIDTHS, 200])
 def test_numbers_stay_whole_at_every_width(width):
-    text = printed(width, COLUMNS, ROWS, numbers=NUMBERS)
+    text = print_to_text(width, COLUMNS, ROWS, numbers=NUMBERS)
     assert max(map(len, text.splitlines())) <= width
     words = text.replace("│", " ").split()
     for row in ROWS:
@@ -48,14 +48,14 @@ def test_numbers_stay_whole_at_every_width(width):
 
 
 def test_a_table_has_lines_where_they_fit_and_parts_where_nothing_else_does():
-    assert "━" in printed(200, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "━" not in printed(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "title (2 of " in printed(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert printed(60, COLUMNS, ROWS, numbers=NUMBERS).count("first") >= 2
+    assert "━" in print_to_text(200, COLUMNS, ROWS, numbers=NUMBERS)
+    assert "━" not in print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
+    assert "title (2 of " in print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
+    assert print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS).count("first") >= 2
 
 
 def test_long_words_of_text_are_broken_not_lost():
-    text = printed(
+    text = print_to_text(
         30,
         ("", ""),
         [("branch", "shoulder_front_elbow_up_wrist_flipped")],

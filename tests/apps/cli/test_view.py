@@ -43,7 +43,7 @@ def looked_at(monkeypatch):
     return seen
 
 
-def test_a_plan_is_shown(run, write, task, looked_at):
+def test_a_plan_opens_the_viewer(run, write, task, looked_at):
     task["search"] = {"effort": "single"}
     planned = run(f"plan {write(task)} --view")
     assert planned.code == 0, planned.err

@@ -175,7 +175,7 @@ def test_json_has_the_error_and_its_exit_code(run, task, write, tmp_path, monkey
         ),
     ],
 )
-def test_the_error_says_what_was_found_and_what_is_expected(
+def test_the_error_says_what_the_command_takes(
     run, tmp_path, monkeypatch, command, message
 ):
     (tmp_path / "task.yaml").write_text("brachis: 1\n")

@@ -61,20 +61,23 @@ def task(today):
 
 
 @pytest.fixture(scope="module")
-def found(file, task):
+def both_motions(file, task):
     return compare(file, task=task)
 
 
-def test_the_path_is_recovered_and_the_plan_is_faster(found, today):
-    assert today.miss(found.recorded, DT) < 1e-6
-    assert found.result.verified
-    assert 0.05 < found.saved < 0.5
-    assert found.saved == 1.0 - found.result.t_end / found.recorded.t_end
-    assert found.verdict.startswith(f"{100 * found.saved:.1f} % faster: ")
+def test_the_path_is_recovered_and_the_plan_is_faster(both_motions, today):
+    assert today.miss(both_motions.recorded, DT) < 1e-6
+    assert both_motions.result.verified
+    assert 0.05 < both_motions.saved < 0.5
+    assert (
+        both_motions.saved
+        == 1.0 - both_motions.result.t_end / both_motions.recorded.t_end
+    )
+    assert both_motions.verdict.startswith(f"{100 * both_motions.saved:.1f} % faster: ")
 
 
-def test_both_begin_in_one_posture_and_end_in_one_place(found):
-    planned, given = found.result.trajectory, found.recorded
+def test_both_begin_in_one_posture_and_end_in_one_place(both_motions):
+    planned, given = both_motions.result.trajectory, both_motions.recorded
     np.testing.assert_allclose(planned.q[0], given.q[0], atol=1e-9)
     _, task_map = bind(given.robot, given.task.task_space)
     off = task_map.difference(
@@ -84,26 +87,32 @@ def test_both_begin_in_one_posture_and_end_in_one_place(found):
     assert np.abs(planned.q[-1] - given.q[-1]).max() > 0.01
 
 
-def test_the_limits_are_the_same_and_what_todays_motion_exceeds_is_said(found, today):
-    assert [use.limit for use in found.uses] == ["torque", "velocity", "acceleration"]
-    assert all(use.planned <= 1.0 + 1e-4 for use in found.uses)
-    worst = max(use.recorded for use in found.uses)
+def test_the_limits_are_the_same_and_remarks_name_what_exceeds_them(
+    both_motions, today
+):
+    assert [use.limit for use in both_motions.uses] == [
+        "torque",
+        "velocity",
+        "acceleration",
+    ]
+    assert all(use.planned <= 1.0 + 1e-4 for use in both_motions.uses)
+    worst = max(use.recorded for use in both_motions.uses)
     assert worst == pytest.approx(
         today.largest_ratio(), abs=1e-3
     )  # what the rows prove
-    assert all(use.recorded <= use.recorded_up_to for use in found.uses)
-    *exceeded, jumps = found.remarks  # as toppra's accelerations do at both ends
+    assert all(use.recorded <= use.recorded_up_to for use in both_motions.uses)
+    *exceeded, jumps = both_motions.remarks  # as toppra's accelerations do at both ends
     assert "the plan may do so as well" in jumps
-    assert bool(found.exceeded) == (worst > 1.0 + 1e-4) == bool(exceeded)
+    assert bool(both_motions.exceeded) == (worst > 1.0 + 1e-4) == bool(exceeded)
     assert all("the recorded motion exceeds the" in remark for remark in exceeded)
-    data = json.loads(json.dumps(found.to_dict()))
-    assert data["t_end_today"] == found.recorded.t_end
-    assert data["today_within_limits"] is (not found.exceeded)
-    assert found.verdict in str(found)
+    data = json.loads(json.dumps(both_motions.to_dict()))
+    assert data["t_end_today"] == both_motions.recorded.t_end
+    assert data["today_within_limits"] is (not both_motions.exceeded)
+    assert both_motions.verdict in str(both_motions)
 
 
 def test_what_may_be_between_rows_of_few_digits_is_no_fact(
-    found, today, task, tmp_path
+    both_motions, today, task, tmp_path
 ):
     t = np.append(np.arange(0.0, today.motion.duration, 0.008), today.motion.duration)
     file = tmp_path / "today.csv"
@@ -113,7 +122,7 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
     rough = brachis.import_motion(file, task=task)
     verification = brachis.verify_trajectory(rough)
     coarse = dataclasses.replace(
-        found,
+        both_motions,
         recorded=rough,
         proven=comparison.bound_ratios(rough),
         verification=verification,
@@ -135,26 +144,29 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
 
 
 @pytest.mark.parametrize(("factor", "is_doubted"), [(2.0, False), (1000.0, True)])
-def test_a_recorded_motion_far_faster_than_its_limits_allow_is_doubted(
-    found, factor, is_doubted
+def test_a_remark_doubts_a_recorded_motion_far_faster_than_its_limits_allow(
+    both_motions, factor, is_doubted
 ):
     slow = SimpleNamespace(
-        t_end=factor * found.recorded.t_end, verification=found.result.verification
+        t_end=factor * both_motions.recorded.t_end,
+        verification=both_motions.result.verification,
     )
-    remarks = dataclasses.replace(found, result=slow).remarks
+    remarks = dataclasses.replace(both_motions, result=slow).remarks
     said = f"{factor:.0f} times as fast as the plan: its times may have another unit"
     assert any(said in remark for remark in remarks) == is_doubted
 
 
-def test_the_figure_shows_both(found):
-    figure = plot_both_motions(found)
+def test_the_figure_shows_both(both_motions):
+    figure = plot_both_motions(both_motions)
     progress, speed, ratio = figure.axes
     for ax in (progress, speed, ratio):
         ends = sorted(line.get_xdata()[-1] for line in ax.lines[:2])
-        assert ends == pytest.approx([found.result.t_end, found.recorded.t_end])
-    assert progress.get_title() == found.verdict
+        assert ends == pytest.approx(
+            [both_motions.result.t_end, both_motions.recorded.t_end]
+        )
+    assert progress.get_title() == both_motions.verdict
     t, speeds = speed.lines[1].get_data()
-    trajectory = found.result.trajectory
+    trajectory = both_motions.result.trajectory
     places = trajectory.robot.tool_placements(trajectory.position(t))[0]
     assert np.trapezoid(speeds, t) == pytest.approx(
         np.linalg.norm(np.diff(places, axis=0), axis=1).sum(), rel=1e-3
@@ -162,15 +174,15 @@ def test_the_figure_shows_both(found):
     assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_end_posture_may_be_kept(found):
-    kept = compare(found.recorded, keep_end=True)
+def test_a_plan_may_keep_the_end_posture(both_motions):
+    kept = compare(both_motions.recorded, keep_end=True)
     np.testing.assert_allclose(
-        kept.result.trajectory.q[-1], found.recorded.q[-1], atol=1e-6
+        kept.result.trajectory.q[-1], both_motions.recorded.q[-1], atol=1e-6
     )
-    assert kept.saved <= found.saved + 1e-3
+    assert kept.saved <= both_motions.saved + 1e-3
 
 
-def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
+def test_other_plans_follow_a_slower_first_one(both_motions, monkeypatch):
     """The motion of a plan cannot be beaten with the same intervals: finer ones come next, then its own joint path."""
     wanted = []
 
@@ -183,15 +195,15 @@ def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
 
     monkeypatch.setattr(sys.modules["brachis.apps.comparison.comparison"], "plan", plan)
     with pytest.raises(Planned):
-        compare(found.recorded)
+        compare(both_motions.recorded)
     assert wanted == [(12, ("x", "y")), (36, ("x", "y")), (36, "joints")]
 
 
-def test_the_joint_path_of_today_is_timed(found):
-    *_, last = tasks_of(found.recorded, keep_end=False)
-    result = brachis.plan(found.recorded.robot, last)
+def test_the_joint_path_of_today_has_a_timing(both_motions):
+    *_, last = tasks_of(both_motions.recorded, keep_end=False)
+    result = brachis.plan(both_motions.recorded.robot, last)
     assert result.verified
-    assert result.t_end < 1.02 * found.recorded.t_end
+    assert result.t_end < 1.02 * both_motions.recorded.t_end
     assert brachis.compare is comparison.compare
 
 

@@ -16,7 +16,7 @@ SHARES = np.array([1.0, -0.5, 0.02])
 """Of the largest velocity, acceleration and jerk, joint by joint."""
 
 
-def imported(folder, digits, dt, kind, share):
+def import_rows(folder, digits, dt, kind, share):
     """A motion that uses this share of a limit of the first joint, at every `dt` s: full speed up, full speed down."""
     t = np.arange(0.0, 2.0 + 0.5 * dt, dt)
     if kind == "jerk":
@@ -66,7 +66,7 @@ def check(trajectory, kind):
 )
 def test_rows_of_a_motion_at_its_limit_prove_no_more(digits, dt, tmp_path):
     """The spline through rounded rows overshoots, and fails its verification; that proves nothing."""
-    trajectory = imported(tmp_path, digits, dt, "acceleration", 1.0)
+    trajectory = import_rows(tmp_path, digits, dt, "acceleration", 1.0)
     ratio, subject, _ = worst(trajectory, "acceleration")
     assert 0.8 < ratio <= 1.0 + 1e-9
     assert subject == "j1"
@@ -76,13 +76,13 @@ def test_rows_of_a_motion_at_its_limit_prove_no_more(digits, dt, tmp_path):
 
 @pytest.mark.parametrize(("digits", "dt"), [(4, 0.02), (6, 0.008), (12, 0.004)])
 def test_rows_of_a_motion_beyond_its_limit_prove_it(digits, dt, tmp_path):
-    trajectory = imported(tmp_path, digits, dt, "acceleration", 1.4)
+    trajectory = import_rows(tmp_path, digits, dt, "acceleration", 1.4)
     assert 1.2 < worst(trajectory, "acceleration")[0] <= 1.4 + 1e-9
 
 
 @pytest.mark.parametrize("kind", ["velocity", "jerk"])
 def test_velocity_is_a_mean_over_a_period_and_jerk_one_over_three(kind, tmp_path):
-    trajectory = imported(tmp_path, 15, 1.0 / 30.0, kind, 1.0)
+    trajectory = import_rows(tmp_path, 15, 1.0 / 30.0, kind, 1.0)
     largest = {"velocity": 1.0 - 0.5 / 30.0, "jerk": 1.0}[
         kind
     ]  # the velocity has its peak at a row
@@ -90,7 +90,7 @@ def test_velocity_is_a_mean_over_a_period_and_jerk_one_over_three(kind, tmp_path
 
 
 def test_torques_are_those_of_the_mean_motion(tmp_path):
-    trajectory = imported(tmp_path, 15, 0.008, "acceleration", 1.0)
+    trajectory = import_rows(tmp_path, 15, 0.008, "acceleration", 1.0)
     t = np.linspace(0.0, 1.0, 1001)
     q, qdot, qddot = (
         np.outer(part, SHARES) for part in (0.5 * t**2, t, np.ones_like(t))

@@ -37,26 +37,26 @@ OTHER = """
 """
 
 
-def parsed(text):
+def parse(text):
     return etree.fromstring(text.encode())
 
 
 def files(text):
-    return [each.get("filename") for each in parsed(text).iter("mesh", "texture")]
+    return [each.get("filename") for each in parse(text).iter("mesh", "texture")]
 
 
 @pytest.fixture
-def meshed(arm):
+def arm_with_meshes(arm):
     arm.write_text(arm_text(more=MESHES))
     return arm
 
 
 @pytest.mark.parametrize("folder", [".", "arm", "elsewhere/deep", "link"])
-def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
+def test_relative_meshes_are_found_from_the_new_file(arm_with_meshes, tmp_path, folder):
     (tmp_path / "elsewhere/deep").mkdir(parents=True)
     (tmp_path / "link").symlink_to("elsewhere/deep")
     output = tmp_path / folder / "new.urdf"
-    text = on_rail(meshed, Rail(**RAIL), output=output)
+    text = on_rail(arm_with_meshes, Rail(**RAIL), output=output)
     assert output.read_text() == text
     a, wood, package, absolute, d = files(text)
     assert (package, absolute) == ("package://arm_description/b.dae", "/opt/c.dae")
@@ -73,42 +73,44 @@ def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
 
 @pytest.mark.parametrize("ros", [False, True])
 def test_meshes_of_a_package_are_found_from_another_folder(
-    meshed, tmp_path, monkeypatch, ros
+    arm_with_meshes, tmp_path, monkeypatch, ros
 ):
     (tmp_path / "arm_description").mkdir()
     (tmp_path / "arm_description/b.dae").touch()
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path) if ros else "")
     output = tmp_path / "elsewhere/new.urdf"
     output.parent.mkdir()
-    package = files(on_rail(meshed, Rail(**RAIL), output=output))[2]
+    package = files(on_rail(arm_with_meshes, Rail(**RAIL), output=output))[2]
     assert (package == "package://arm_description/b.dae") == ros
     found = mesh_file(package, output.parent)
     assert found is not None
     assert found.samefile(tmp_path / "arm_description/b.dae")
 
 
-def test_relative_meshes_become_absolute_without_a_file(meshed, tmp_path, monkeypatch):
+def test_relative_meshes_become_absolute_without_a_file(
+    arm_with_meshes, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    a, wood, *_, d = files(on_rail(meshed.relative_to(tmp_path), Rail(**RAIL)))
+    a, wood, *_, d = files(on_rail(arm_with_meshes.relative_to(tmp_path), Rail(**RAIL)))
     assert [a, wood, d] == [
         str(tmp_path.resolve() / name)
         for name in ("arm/meshes/a.stl", "wood.png", "arm/d.stl")
     ]
 
 
-def test_meshes_can_be_dropped(meshed):
-    text = on_rail(meshed, Rail(**RAIL), meshes=False)
+def test_a_composed_robot_may_have_no_meshes(arm_with_meshes):
+    text = on_rail(arm_with_meshes, Rail(**RAIL), meshes=False)
     assert files(text) == []
-    cover = parsed(text).find("link[@name='cover']")
+    cover = parse(text).find("link[@name='cover']")
     shapes = [each.find("geometry")[0].tag for each in cover]
     assert shapes == ["box", "sphere"]
-    assert files(on_rail(meshed, Rail(**RAIL))) != []
+    assert files(on_rail(arm_with_meshes, Rail(**RAIL))) != []
 
 
 def test_the_rest_of_the_arm_is_kept_as_written(arm):
     arm.write_text(arm_text(more=OTHER))
-    robot = parsed(on_rail(arm, Rail(**RAIL)))
-    before = parsed(arm.read_text())
+    robot = parse(on_rail(arm, Rail(**RAIL)))
+    before = parse(arm.read_text())
     assert robot.get("name") == "chain_rail"
     for place in (
         "transmission",
@@ -134,7 +136,7 @@ def test_the_rest_of_the_arm_is_kept_as_written(arm):
 
 def test_root_link_with_a_name_of_its_own_keeps_it(arm):
     arm.write_text(arm_text().replace("'world'", "'stand'"))
-    robot = parsed(on_rail(arm, Rail(**RAIL)))
+    robot = parse(on_rail(arm, Rail(**RAIL)))
     links = {each.get("name") for each in robot.findall("link")}
     assert {"world", "rail_carriage", "stand"} <= links
     assert robot.find("joint[@name='rail_mount']/child").get("link") == "stand"
@@ -142,7 +144,7 @@ def test_root_link_with_a_name_of_its_own_keeps_it(arm):
 
 def test_robot_without_a_name_gets_that_of_its_file(arm):
     arm.write_text(arm_text().replace("<robot name='chain'>", "<robot>"))
-    assert parsed(on_rail(arm, Rail(**RAIL))).get("name") == "arm_rail"
+    assert parse(on_rail(arm, Rail(**RAIL))).get("name") == "arm_rail"
 
 
 def test_text_in_other_scripts(arm):

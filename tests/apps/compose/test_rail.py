@@ -63,7 +63,7 @@ def test_tool_is_shifted_along_the_rail(arm, axis, mount):
     check_kinematics(arm, AXES[axis], *MOUNTS[mount])
 
 
-def test_limits_are_those_given(arm):
+def test_limits_are_those_of_the_rail_and_of_the_arm(arm):
     lonely, composed = robots(arm)
     assert composed.position_units == ("m", "rad", "rad", "rad")
     for name, figure in (
@@ -138,7 +138,7 @@ def test_example_of_the_docstring(monkeypatch):
     assert doctest.DocTestRunner().run(example).failed == 0
 
 
-def test_compose_is_public_and_loaded_when_used():
+def test_compose_is_public_and_imports_late():
     assert brachis.compose.on_rail is on_rail
     code = (
         "import sys, brachis; assert 'brachis.apps.compose' not in sys.modules; "

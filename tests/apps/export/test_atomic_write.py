@@ -22,7 +22,7 @@ def half_write(path, error):
         raise error
 
 
-def test_the_old_file_stays_until_the_block_has_ended(tmp_path):
+def test_the_old_file_stays_until_the_end_of_the_block(tmp_path):
     path = tmp_path / "file"
     path.write_bytes(b"old")
     with atomic_write(path) as stream:
@@ -54,7 +54,7 @@ def test_permissions_are_those_of_any_new_file(tmp_path):
     )
 
 
-def test_a_symbolic_link_is_followed(tmp_path):
+def test_a_symbolic_link_stays_a_link(tmp_path):
     (tmp_path / "target").write_bytes(b"old")
     link = tmp_path / "link"
     link.symlink_to("target")
@@ -64,7 +64,7 @@ def test_a_symbolic_link_is_followed(tmp_path):
     assert (tmp_path / "target").read_bytes() == b"new"
 
 
-def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
+def test_a_pipe_stays_a_pipe(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
@@ -78,7 +78,7 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["nowhere/file", "."])
-def test_what_cannot_be_written_is_named(tmp_path, name):
+def test_the_error_names_what_cannot_be_written_to(tmp_path, name):
     path = tmp_path / name
     with (
         pytest.raises(InputError, match="cannot be written") as caught,
@@ -90,7 +90,7 @@ def test_what_cannot_be_written_is_named(tmp_path, name):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
-def test_a_full_disk_is_named():
+def test_the_error_names_a_full_disk():
     with (
         pytest.raises(
             InputError,

@@ -292,7 +292,7 @@ def test_mp4(line_trajectory, written):
     assert stream["r_frame_rate"] == "2/1"
 
 
-def test_without_ffmpeg_a_film_is_refused(line_trajectory, tmp_path, monkeypatch):
+def test_without_ffmpeg_a_film_is_an_error(line_trajectory, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(
         InputError,
@@ -301,7 +301,7 @@ def test_without_ffmpeg_a_film_is_refused(line_trajectory, tmp_path, monkeypatch
         export.write(line_trajectory, tmp_path / "motion.mp4", dt=0.5)
 
 
-def test_what_ffmpeg_says_is_told(line_trajectory, tmp_path, monkeypatch):
+def test_the_error_says_what_ffmpeg_says(line_trajectory, tmp_path, monkeypatch):
     folder = tmp_path / "bin"
     folder.mkdir()
     program = folder / "ffmpeg"
@@ -315,7 +315,7 @@ def test_what_ffmpeg_says_is_told(line_trajectory, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [folder]
 
 
-def test_without_its_library_a_format_is_refused(
+def test_without_its_library_a_format_is_an_error(
     line_trajectory, tmp_path, monkeypatch
 ):
     for module, suffix in (("pyarrow", ".parquet"), ("mcap_ros2.writer", ".mcap")):

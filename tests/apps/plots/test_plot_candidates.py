@@ -26,7 +26,7 @@ def candidate(joint, estimate, t_end=math.inf, *, verified=False, status=RANKED)
     )
 
 
-def drawn(candidates):
+def marks_of(candidates):
     """Times by the labels of the marks."""
     (ax,) = plot_candidates(candidates).axes
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
@@ -40,7 +40,7 @@ def drawn(candidates):
 def test_no_unfinished_one_is_left_of_the_fastest_for_its_estimate(t_end):
     """Finishing the fastest made its time longer, or splines of better knots shorter: so it would with the others."""
     fastest = candidate("j1", 2.0, t_end, verified=True)
-    marks, _ = drawn([fastest, candidate("j2", 2.0005), candidate("j3", 2.5)])
+    marks, _ = marks_of([fastest, candidate("j2", 2.0005), candidate("j3", 2.5)])
     (star,) = marks["the fastest"]
     assert star == t_end
     (unfinished,) = (
@@ -52,7 +52,7 @@ def test_no_unfinished_one_is_left_of_the_fastest_for_its_estimate(t_end):
 
 def test_refined_times_are_drawn_as_they_are():
     fastest = candidate("j1", 2.0, 2.002, verified=True)
-    marks, _ = drawn(
+    marks, _ = marks_of(
         [
             fastest,
             candidate("j2", 2.3, 2.4, verified=True),
@@ -66,8 +66,8 @@ def test_refined_times_are_drawn_as_they_are():
     assert failed == [2.2]
 
 
-def test_without_a_motion_nothing_is_scaled():
-    marks, _ = drawn(
+def test_without_a_motion_times_stay_as_they_are():
+    marks, _ = marks_of(
         [candidate("j1", 2.0), candidate("j2", math.inf, status="out of reach")]
     )
     (unfinished,) = (
@@ -76,6 +76,6 @@ def test_without_a_motion_nothing_is_scaled():
     assert unfinished == [2.0]
 
 
-def test_nothing_to_draw_is_refused():
+def test_nothing_to_draw_is_an_error():
     with pytest.raises(InputError, match="the list of candidates is empty"):
         plot_candidates([])

@@ -124,7 +124,7 @@ def test_value_labels_are_legible(step):
         ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "already in another row", "rows[1]"),
     ],
 )
-def test_wrong_tables_are_refused(rows, message, where):
+def test_wrong_tables_are_errors(rows, message, where):
     with pytest.raises(InputError, match=message) as caught:
         plot_comparison(rows)
     assert caught.value.where == where

@@ -11,7 +11,7 @@ from brachis.task import fit_path
 from support.seams import bent, wave
 
 
-def test_errors_tolerances_and_corners_are_drawn(line_trajectory):
+def test_the_figure_has_errors_tolerances_and_corners(line_trajectory):
     position, _ = bent(3_000, 1e-5)
     segments = fit_path(position, tolerance={"position": "0.1 mm"})
     task = line_trajectory.task.model_copy(update={"path": segments})
@@ -42,6 +42,6 @@ def test_angles_have_an_axis_of_their_own(line_trajectory):
     assert angles.get_ydata().max() <= tolerance.get_ydata()[0] == pytest.approx(0.2)
 
 
-def test_a_path_that_was_not_fitted_is_refused(line_trajectory):
+def test_a_path_that_was_not_fitted_is_an_error(line_trajectory):
     with pytest.raises(InputError, match="the path was not fitted"):
         plot_fit(line_trajectory)

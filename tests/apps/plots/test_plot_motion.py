@@ -10,7 +10,7 @@ from brachis.task import SpeedTable, ToolLimits
 INF = float("inf")
 
 
-def labelled(ax):
+def lines_by_label(ax):
     return {
         line.get_label(): line
         for line in ax.get_lines()
@@ -29,9 +29,9 @@ def drawn_limits(ax):
 def test_panels_show_the_trajectory(line_trajectory):
     positions, velocities, progress, speed = plot_motion(line_trajectory).axes
     for joint, name in enumerate(line_trajectory.joint_names):
-        t, q = labelled(positions)[name].get_data()
+        t, q = lines_by_label(positions)[name].get_data()
         assert np.array_equal(q, line_trajectory.position(t)[:, joint])
-        t, qdot = labelled(velocities)[name].get_data()
+        t, qdot = lines_by_label(velocities)[name].get_data()
         assert np.array_equal(qdot, line_trajectory.velocity(t)[:, joint])
     t, s = progress.get_lines()[0].get_data()
     assert np.array_equal(s, line_trajectory.path_coordinate(t))
@@ -78,7 +78,7 @@ def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajecto
         r"$\dot{q}$ (m/s)",
     ]
     sliding = plot_motion(spatial_trajectory).axes[1]
-    assert list(labelled(sliding)) == ["rail"]
+    assert list(lines_by_label(sliding)) == ["rail"]
 
 
 def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limits):
@@ -91,7 +91,7 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
     assert abs(limit.get_ydata()[0]) == velocity[fastest]
     assert (
         limit.get_color()
-        == labelled(ax)[line_trajectory.joint_names[fastest]].get_color()
+        == lines_by_label(ax)[line_trajectory.joint_names[fastest]].get_color()
     )
     assert ax.get_ylim()[0] < limit.get_ydata()[0] < ax.get_ylim()[1]
 
@@ -99,7 +99,7 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
 @pytest.mark.parametrize(
     ("kind", "name", "panel"), [("position", "q", 0), ("velocity", "qdot", 1)]
 )
-def test_limits_that_differ_in_both_directions_are_both_drawn(
+def test_limits_that_differ_by_direction_have_two_lines(
     line_trajectory, with_limits, kind, name, panel
 ):
     values = getattr(line_trajectory, name)
@@ -109,7 +109,7 @@ def test_limits_that_differ_in_both_directions_are_both_drawn(
     ax = plot_motion(with_limits(line_trajectory, **limits)).axes[panel]
     assert levels(ax) == sorted([*lower, *upper])
     for joint, joint_name in enumerate(line_trajectory.joint_names):
-        colour = labelled(ax)[joint_name].get_color()
+        colour = lines_by_label(ax)[joint_name].get_color()
         drawn = [line for line in drawn_limits(ax) if line.get_color() == colour]
         ends = sorted(line.get_ydata()[0] for line in drawn)
         assert ends == [lower[joint], upper[joint]]
@@ -133,12 +133,12 @@ def test_the_overview_has_every_curve(line_trajectory):
         ("$q$ (rad)", line_trajectory.position),
         (r"$\dot{q}$ (rad/s)", line_trajectory.velocity),
     ):
-        curves = labelled(by_label[label])
+        curves = lines_by_label(by_label[label])
         assert list(curves) == names
         drawn = np.column_stack([line.get_ydata() for line in curves.values()])
         expected = function(curves["j1"].get_xdata())
         np.testing.assert_allclose(drawn, expected, atol=1e-9)
-    assert list(labelled(by_label[r"$\tau / \tau_\mathrm{max}$"])) == names
+    assert list(lines_by_label(by_label[r"$\tau / \tau_\mathrm{max}$"])) == names
     assert [text.get_text() for text in figure.legends[0].get_texts()] == names
 
 
@@ -158,7 +158,7 @@ def test_the_overview_shows_what_holds_the_motion(line_trajectory, with_limits):
     assert not [title for title in titles if "tau" in title]
     (ax,) = (ax for ax in figure.axes if ax.get_ylabel() == "acceleration / limit")
     assert max(
-        np.abs(line.get_ydata()).max() for line in labelled(ax).values()
+        np.abs(line.get_ydata()).max() for line in lines_by_label(ax).values()
     ) == pytest.approx(1.0, abs=0.02)
 
 

@@ -37,7 +37,7 @@ def test_the_tool_path_is_the_prescribed_line(line_trajectory):
     assert len(y) > 100
 
 
-def test_scales_are_equal_and_axes_labelled(line_trajectory):
+def test_scales_are_equal_and_axes_have_labels(line_trajectory):
     figure = plot_postures(line_trajectory)
     figure.draw_without_rendering()
     ax = figure.axes[0]

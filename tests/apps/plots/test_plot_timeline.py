@@ -66,7 +66,7 @@ def test_active_stretches_are_marked_where_they_are(line_trajectory):
     assert len(entry.active) < 7
 
 
-def test_limits_that_are_never_near_are_said(line_trajectory, with_limits):
+def test_the_timeline_says_that_no_limit_is_near(line_trajectory, with_limits):
     open_range = {
         "position_lower": np.full(3, -np.inf),
         "position_upper": np.full(3, np.inf),

@@ -50,7 +50,7 @@ def test_joints_without_torque_limit_are_left_out(line_trajectory, with_limits):
     assert lines(ax)["j3"].get_color() == full["j3"].get_color()
 
 
-def test_without_any_torque_limit_the_torques_themselves_are_drawn(
+def test_without_any_torque_limit_the_figure_has_the_torques_themselves(
     line_trajectory, with_limits
 ):
     ax = plot_torques(with_limits(line_trajectory, torque=np.full(3, INF))).axes[0]

@@ -45,7 +45,7 @@ def test_the_same_figure_gives_the_same_file(saved, suffix):
 
 
 @pytest.mark.parametrize("name", ["figure.jpg", "figure", "figure.csv"])
-def test_an_unknown_suffix_is_refused_with_those_allowed(tmp_path, name):
+def test_the_error_of_an_unknown_suffix_lists_the_known_ones(tmp_path, name):
     path = tmp_path / name
     with pytest.raises(InputError, match=r"allowed: \.png, \.pdf, \.svg") as caught:
         save_figure(Figure(), path)

@@ -47,7 +47,7 @@ def test_its_path_comes_back_and_it_verifies(imported, motion):
     assert np.abs(places[:, 0] - start[0]).max() < 1e-9  # a line along y
 
 
-def test_what_is_known_of_it_is_saved(imported, tmp_path):
+def test_a_saved_recording_keeps_its_notes_and_its_path(imported, tmp_path):
     assert "accelerations are the file's" in imported.recovered.told
     assert any(line.startswith("unknown: ") for line in imported.recovered.told)
     imported.save(tmp_path / "today.npz")
@@ -110,7 +110,7 @@ def test_bottlenecks_are_when_limits_are_active(imported):
         bottleneck.report(imported, check=True)
 
 
-def test_few_digits_are_smoothed(motion, table, write):
+def test_few_digits_get_a_smoothing_spline(motion, table, write):
     t, q, _ = table
     found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task)
     assert any(
@@ -201,7 +201,7 @@ def test_rates_that_contradict_the_positions_are_left_out(motion, write):
     assert_allclose(found.acceleration(samples.t), samples.qddot, atol=0.05)
 
 
-def test_measured_positions_are_smoothed(motion, write):
+def test_positions_with_noise_get_a_smoothing_spline(motion, write):
     samples, noise = motion.sample(0.002), 1e-5
     q = samples.q + noise * np.random.default_rng(0).standard_normal(samples.q.shape)
     path = write("t,j1,j2,j3", samples.t, q)
@@ -257,7 +257,7 @@ def test_ends_in_motion(motion, table, write):
     assert failed <= {"torque ratio"}
 
 
-def test_a_tool_that_stops_and_turns_off_is_refused(motion, table, write):
+def test_a_tool_that_stops_and_turns_off_is_an_error(motion, table, write):
     t, q, _ = table
     back = q + 0.5 * (q - q[0]) * [0.0, 0.0, 1.0]
     path = write(

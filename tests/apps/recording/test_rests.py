@@ -18,7 +18,7 @@ def robot(tmp_path_factory):
     return Robot.from_urdf(urdf)
 
 
-def recorded(motion, robot, folder, dt):
+def record_and_import(motion, robot, folder, dt):
     export.write(motion, folder / "recorded.csv", dt=dt)
     return brachis.import_motion(folder / "recorded.csv", robot, task_space=["x", "z"])
 
@@ -27,7 +27,7 @@ def recorded(motion, robot, folder, dt):
 def test_a_wait_at_a_corner(robot, tmp_path, dt):
     """Rows of 7 ms miss both ends of the wait."""
     motion = gantry_motion()
-    again = recorded(motion, robot, tmp_path, dt)
+    again = record_and_import(motion, robot, tmp_path, dt)
     assert [phase.kind for phase in again.phases] == ["move", "dwell", "move"]
     wait = again.phases[1]
     assert wait.s_begin == pytest.approx(0.4, abs=1e-6)
@@ -44,12 +44,12 @@ def test_a_wait_at_a_corner(robot, tmp_path, dt):
 
 
 def test_it_is_saved_with_its_phases(robot, tmp_path):
-    again = recorded(gantry_motion(), robot, tmp_path, 0.01)
+    again = record_and_import(gantry_motion(), robot, tmp_path, 0.01)
     again.save(tmp_path / "recorded.npz")
     assert brachis.Trajectory.load(tmp_path / "recorded.npz").phases == again.phases
 
 
-def test_a_corner_without_a_wait_is_refused(robot, tmp_path):
+def test_a_corner_without_a_wait_is_an_error(robot, tmp_path):
     motion = gantry_motion((SPLINES[0], *SPLINES[2:]))
     with pytest.raises(PathError, match="stops for less than five rows"):
-        recorded(motion, robot, tmp_path, 0.01)
+        record_and_import(motion, robot, tmp_path, 0.01)

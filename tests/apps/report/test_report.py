@@ -110,7 +110,7 @@ def test_curves_are_the_motion(rail, rail_page):
     assert {kind for kind, name in seen if name == "rail"} >= {"force"}
 
 
-def test_limits_of_every_joint_are_drawn(weaker_page, weaker):
+def test_the_figure_has_limits_of_every_joint(weaker_page, weaker):
     traces = data_of(weaker_page)["motion"]["data"]
     drawn = [trace for trace in traces if trace.get("meta") == "limit"]
     levels = {
@@ -149,7 +149,7 @@ def test_a_planar_motion_is_drawn_in_its_plane(planar_page):
     assert data_of(planar_page)["scene"]["plane"] == [0, 1]
 
 
-def test_an_unverified_motion_says_so_and_what_failed(weaker_page):
+def test_an_unverified_motion_says_which_check_fails(weaker_page):
     header = re.search(r"<header.*?</header>", weaker_page.html, re.DOTALL)[0]
     assert 'class="unverified"' in header
     assert "<h1>NOT VERIFIED: do not run</h1>" in header
@@ -236,7 +236,7 @@ def pairs_of(page):
     }
 
 
-def test_robot_path_and_what_it_carries_are_named(planar, planar_page):
+def test_the_summary_names_robot_path_and_payload(planar, planar_page):
     said = pairs_of(planar_page)
     assert said["robot"] == "scara3 (robot.urdf)"
     assert (
@@ -261,9 +261,7 @@ def test_robot_path_and_what_it_carries_are_named(planar, planar_page):
     assert said["mounting"] == "at [0, 0, 1] m, roll, pitch, yaw [0, 0, 30] deg"
 
 
-def test_hashes_are_those_of_the_urdf_and_of_the_task_that_is_shown(
-    planar, planar_page
-):
+def test_hashes_are_those_of_the_urdf_and_of_the_task_in_the_page(planar, planar_page):
     said = pairs_of(planar_page)
     urdf = Path(planar.task.robot.urdf).read_bytes()
     assert said["SHA-256 of the URDF"] == hashlib.sha256(urdf).hexdigest()
@@ -335,7 +333,7 @@ def test_the_task_and_the_versions_are_in_it(planar_page):
 @pytest.mark.parametrize(
     ("module", "name"), [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")]
 )
-def test_what_is_not_installed_is_said(module, name, planar, monkeypatch):
+def test_the_error_names_the_package_to_install(module, name, planar, monkeypatch):
     _plotly.cache_clear()
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(

@@ -120,7 +120,7 @@ def test_names_that_yaml_would_misread(tmp_path):
     assert list(yaml.safe_load(starter.text)["start"]["joints"]) == ["on", "2: a # b"]
 
 
-def test_limits_that_are_missing_are_marked(tmp_path):
+def test_the_task_marks_missing_limits(tmp_path):
     (tmp_path / "robot.urdf").write_text(two_joints(effort=0.0))
     starter = starter_task(tmp_path / "robot.urdf", folder=tmp_path)
     assert "PUT THE MAKER'S FIGURES HERE" in starter.text
@@ -154,7 +154,7 @@ def test_what_is_no_arm(tmp_path):
         starter_task(tmp_path / "robot.urdf")
 
 
-def test_masses_in_g_are_named_if_no_motion_is_found(tmp_path):
+def test_a_warning_names_masses_in_g_without_a_motion(tmp_path):
     text = brachis.robots.path_of("iiwa14").read_text()
     (tmp_path / "g.urdf").write_text(text.replace('mass value="', 'mass value="1000'))
     with (
@@ -167,7 +167,7 @@ def test_masses_in_g_are_named_if_no_motion_is_found(tmp_path):
 @pytest.mark.parametrize(
     ("name", "frame"), [("iiwa14", "link_1"), ("iiwa14", "link_2"), ("scara3", "link1")]
 )
-def test_a_frame_that_only_turns_on_the_spot_is_refused(name, frame):
+def test_a_frame_that_only_turns_on_the_spot_is_an_error(name, frame):
     with pytest.raises(InputError, match=r"only turns on the spot.*Name another"):
         starter_task(brachis.robots.path_of(name), tool_frame=frame)
 

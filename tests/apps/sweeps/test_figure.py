@@ -68,7 +68,7 @@ def test_nothing_to_draw(rows):
         plot_sweep(rows, ["a"])
 
 
-def test_which_keys_are_drawn(undisturbed):
+def test_a_figure_has_the_first_keys_or_those_of_the_caller(undisturbed):
     assert undisturbed.varied == (
         "path.0.line.angle_deg",
         "path.0.line.length",

@@ -93,7 +93,7 @@ def test_a_plan_that_its_workers_did_not_survive_fails_alone():
     assert found[1].facts["status"] == "verified"
 
 
-def test_an_executor_whose_workers_ended():
+def test_an_executor_without_workers_is_an_error():
     class Executor:
         def submit(self, *_):
             raise BrokenExecutor("a child process terminated abruptly")
@@ -125,7 +125,7 @@ def test_plans_that_wait_are_cancelled_with_the_sweep():
         ),
     ],
 )
-def test_wrong_pools_are_refused(jobs, executor, expected):
+def test_wrong_pools_are_errors(jobs, executor, expected):
     with pytest.raises(InputError, match=expected):
         pool_for(jobs, executor)
 
@@ -200,7 +200,7 @@ def cluster(tmp_path):
             process.wait(WAIT)
 
 
-def test_a_sweep_on_dask_survives_a_worker_that_is_killed(
+def test_a_sweep_on_dask_survives_the_end_of_a_worker(
     cluster, content, tmp_path, same_as_undisturbed
 ):
     from distributed import Client

@@ -113,7 +113,7 @@ def test_a_key_is_refused_only_where_every_plan_that_sets_it_is(tmp_path):
         load_sweep(tmp_path / "sweep.yaml")
 
 
-def test_the_wrong_key_is_named(tmp_path):
+def test_the_error_names_the_wrong_key(tmp_path):
     grid = {"spline.intervals": [6, 7], "robot.limits.scale.torqe": [1, 2]}
     content = {
         "sweep": 1,

@@ -58,9 +58,7 @@ def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
     )
 
 
-def test_workers_have_ended_when_an_outcome_cannot_be_stored(
-    content, tmp_path, monkeypatch
-):
+def test_no_worker_outlives_a_full_disk(content, tmp_path, monkeypatch):
     ended = []
 
     def pool(plans):
@@ -129,7 +127,9 @@ def test_a_finished_sweep_is_not_run_again(undisturbed, content, same_as_undistu
     assert same_as_undisturbed(brachis.sweep(content, undisturbed.folder).table)
 
 
-def test_plans_of_a_changed_sweep_are_added(undisturbed, content, here, tmp_path):
+def test_another_sweep_of_the_folder_adds_its_plans(
+    undisturbed, content, here, tmp_path
+):
     folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
     content |= {
         "grid": {"path.0.line.length": [9.0, 0.9], "path.0.line.angle_deg": [95, 90]},
@@ -146,7 +146,7 @@ def test_plans_of_a_changed_sweep_are_added(undisturbed, content, here, tmp_path
     assert result.rows()[3]["t_end_s"] == undisturbed.rows()[3]["t_end_s"]
 
 
-def test_failures_are_planned_again_where_asked(
+def test_retry_plans_failures_again(
     undisturbed, content, here, tmp_path, same_as_undisturbed
 ):
     folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
@@ -231,7 +231,7 @@ def test_a_mistake_is_an_error_before_anything_runs(content, tmp_path, change, m
 
 
 @pytest.mark.usefixtures("here")
-def test_the_time_that_is_left_is_told(undisturbed, content, tmp_path):
+def test_the_listener_hears_the_time_to_go(undisturbed, content, tmp_path):
     folder, told = shutil.copytree(undisturbed.folder, tmp_path / "out"), []
     motion = folder / undisturbed.rows()[0]["motion"]
     motion.unlink()
@@ -269,9 +269,7 @@ def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undistu
     )
 
 
-def test_parts_are_planned_by_themselves_and_merged(
-    content, tmp_path, here, undisturbed
-):
+def test_parts_of_a_sweep_give_one_table_by_merge(content, tmp_path, here, undisturbed):
     out = tmp_path / "out"
     lines = {}
     for part in ("1/4", "2/4", "3/4"):
@@ -304,7 +302,7 @@ def test_parts_are_planned_by_themselves_and_merged(
 
 @pytest.mark.usefixtures("nothing_runs")
 @pytest.mark.parametrize("part", ["0/2", "3/2", "7/7", "1", "1/", "a/b", "-1/2"])
-def test_wrong_parts_are_refused(content, tmp_path, part):
+def test_wrong_parts_are_errors(content, tmp_path, part):
     with pytest.raises(
         InputError,
         match=f"part: this is not a part of the sweep; found {part}; allowed: i/n.* n <= 6",

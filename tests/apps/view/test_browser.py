@@ -61,7 +61,7 @@ def picture(page, name, folder):
     return whole[160:, 380:-420]
 
 
-def changed(first, second):
+def count_different(first, second):
     """How many pixels are different."""
     return int((np.abs(first - second).max(axis=2) > 30).sum())
 
@@ -116,8 +116,8 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
     assert (
         len(np.unique(first.reshape(-1, 3), axis=0)) > 500
     )  # there is something to see
-    assert changed(first, again) < 50
-    assert changed(first, last) > 2000
+    assert count_different(first, again) < 50
+    assert count_different(first, last) > 2000
     for part in (
         "verified",
         "torque / limit",

@@ -54,7 +54,7 @@ def test_nothing_is_printed_on_standard_output(capfd):
     assert "viser" not in capfd.readouterr().out
 
 
-def test_a_page_cannot_have_the_scene_published(server):
+def test_a_page_cannot_publish_the_scene(server):
     assert server.request_share_url() is None
 
 
@@ -76,7 +76,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(
 
 
 @pytest.mark.parametrize("port", [-1, 65536])
-def test_what_is_no_port_is_refused(port):
+def test_what_is_no_port_is_an_error(port):
     with pytest.raises(
         InputError,
         match=rf"--port: the port is out of range; found {port}; allowed: 0 to 65535",
@@ -84,7 +84,7 @@ def test_what_is_no_port_is_refused(port):
         start_server(LOOPBACK, port)
 
 
-def test_a_host_that_is_not_here_is_refused(monkeypatch):
+def test_a_host_that_is_not_here_is_an_error(monkeypatch):
     def unknown(*_args, **_kwargs):
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 

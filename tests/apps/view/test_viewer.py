@@ -224,7 +224,7 @@ def test_tables_have_units_and_escape_names(bare_robot, motion_of):
     assert "40 more" in candidates_table([known] * 100)
 
 
-def test_the_panel_says_whether_the_motion_is_verified(line_result):
+def test_the_panel_says_the_verdict_of_the_verification(line_result):
     assert ", verified" in summary(line_result.trajectory, (), verified=True)
     assert "NOT verified" in summary(line_result.trajectory, (), verified=False)
     told = summary(line_result.trajectory, ["not shown: a: no file <x>"], verified=None)

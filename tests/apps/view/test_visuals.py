@@ -54,7 +54,7 @@ def test_shapes_stand_where_the_urdf_has_them_in_their_colour():
     "name",
     ["part.stl", "meshes/../part.stl", "package://cell/part.stl", "file://{}/part.stl"],
 )
-def test_mesh_files_are_found(name, tmp_path, monkeypatch):
+def test_mesh_files_of_every_form_of_name(name, tmp_path, monkeypatch):
     folder = tmp_path / "cell"
     (folder / "meshes").mkdir(parents=True)
     trimesh.creation.box((1.0, 2.0, 3.0)).export(folder / "part.stl")
@@ -125,7 +125,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN, ids=lambda name: name[-12:])
-def test_a_broken_mesh_is_told(name, tmp_path):
+def test_a_remark_names_a_broken_mesh(name, tmp_path):
     if name.endswith("dae"):
         pytest.importorskip("collada", reason="pycollada is not installed")
     content, reason = BROKEN[name]
@@ -159,7 +159,7 @@ def test_meshes_that_are_too_large_are_told_and_not_read(packed, tmp_path):
     ]
 
 
-def test_a_broken_shape_is_told(tmp_path):
+def test_a_remark_names_a_broken_shape(tmp_path):
     _, unread = link_shapes(LINK.format('<box size="wide"/>', ""), tmp_path)
     assert len(unread) == 1
     assert unread[0].startswith("a: ValueError")

@@ -25,7 +25,7 @@ def spikes(position):
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.02])
-def test_a_spike_is_named(scatter):
+def test_the_error_names_the_row_of_a_spike(scatter):
     position = wave(2_000, scatter * MM)
     spikes(position)
     position[1_234] += [0.0, 5.0 * MM, 0.0]
@@ -45,7 +45,7 @@ def test_corners_are_no_spikes_and_spikes_beside_them_are(count, scatter):
         spikes(position)
 
 
-def test_a_factor_of_a_thousand_is_named():
+def test_the_error_names_a_factor_of_a_thousand():
     away = np.array([0.5, 0.2, 0.1])
     position = wave(100) + away
     position[60] *= 1e3
@@ -62,7 +62,7 @@ def test_a_factor_of_a_thousand_is_named():
         spikes(position)
 
 
-def test_a_whole_file_in_other_units_is_doubted():
+def test_a_note_doubts_a_file_in_other_units():
     assert plausibility_note(points(wave(100))) is None
     assert "mm for m? Set units: {length: mm}" in str(
         plausibility_note(points(1e3 * wave(100)))
@@ -72,7 +72,7 @@ def test_a_whole_file_in_other_units_is_doubted():
     )
 
 
-def test_repeated_rows_are_left_out_and_listed():
+def test_notes_list_rows_that_repeat():
     position = np.repeat(wave(10), [1, 2, 1, 1, 1, 3, 1, 1, 1, 1], axis=0)
     kept = without_repetitions(points(position))
     np.testing.assert_array_equal(kept.position, wave(10))
@@ -82,7 +82,7 @@ def test_repeated_rows_are_left_out_and_listed():
     assert without_repetitions(points(wave(10))).notes == ()
 
 
-def test_a_turn_on_the_spot_is_refused():
+def test_a_turn_on_the_spot_is_an_error():
     position, yaw = np.repeat(wave(4)[:, :2], 2, axis=0), np.arange(8.0)[:, None] / 10.0
     with pytest.raises(
         TaskError,
@@ -95,7 +95,7 @@ def test_a_turn_on_the_spot_is_refused():
 
 @pytest.mark.parametrize("scatter", [0.001, 0.02])
 @pytest.mark.parametrize("count", [200, 5_000])
-def test_scatter_is_estimated(scatter, count):
+def test_the_estimate_of_scatter_is_close(scatter, count):
     found = scatter_of(points(wave(count, scatter * MM))).deviation
     assert 0.6 * scatter * MM < found < 1.3 * scatter * MM
 

@@ -111,7 +111,7 @@ def test_corners_are_found_where_they_are(count, scatter, allowed):
     assert curves[-1].blend is None
 
 
-def test_corners_between_bends_are_found_however_far_they_may_be_rounded():
+def test_corners_between_bends_stay_corners_with_a_wide_tolerance():
     """Lines as long as the tolerance of corners would meet beside the corner, by ten times the scatter."""
     t = np.linspace(0.0, 1.0, 8_001)
     heading = np.where(t > 0.5, 0.9, 0.0) + 0.6 * np.sin(9.0 * t)
@@ -149,7 +149,7 @@ def test_long_straight_ways_are_straight():
     assert np.abs(on_line[:, 1]).max() < 0.3 * MM
 
 
-def test_scatter_that_is_wider_than_the_tolerance_is_said():
+def test_the_error_says_that_points_scatter_more_than_the_tolerance():
     with pytest.raises(
         TaskError,
         match=r"row \d+: no smooth curve .*scatter by 0.05\d* mm .*tolerance of 0.3 mm or more",
@@ -157,7 +157,7 @@ def test_scatter_that_is_wider_than_the_tolerance_is_said():
         fit_curves(points(wave(2_000, 0.05 * MM)), tolerance(0.02 * MM))
 
 
-def test_what_there_is_too_little_room_for_is_said():
+def test_the_error_names_a_corner_without_room():
     position, _ = bent(2_000, 0.05 * MM)
     with pytest.raises(
         TaskError,

@@ -142,12 +142,12 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("text", "message"), MISTAKES)
-def test_mistakes_are_named(text, message):
+def test_the_error_names_the_mistake(text, message):
     with pytest.raises(TaskError, match=message):
         points_of(text)
 
 
-def test_positions_alone_are_given():
+def test_gcode_has_positions_alone():
     with pytest.raises(
         TaskError, match=r"G-code contains only positions; found x, y, yaw"
     ):
@@ -208,7 +208,7 @@ def test_a_place_that_is_set_is_where_the_path_begins():
     assert_allclose(points.position[[0, -1]], [[5e-3, 0, 1e-3], [7e-3, 0, 1e-3]])
 
 
-def test_what_leaves_the_path_of_the_tip_as_it_is_is_skipped():
+def test_words_that_do_not_move_the_tip_have_no_effect():
     points, told = points_of(
         "O1000\nT1 M6\nG64 P0.01\nG43 H1 G0 X0 Y0 Z5 S1000 M3\nG1 X10 F60 E1\n"
     )

@@ -114,7 +114,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("text", "units", "message"), MISTAKES)
-def test_mistakes_are_named(text, units, message):
+def test_the_error_names_the_mistake(text, units, message):
     with pytest.raises(
         TaskError, match=f"a.csv: {message}" if message.startswith("line") else message
     ):
