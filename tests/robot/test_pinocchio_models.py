@@ -162,44 +162,33 @@ def test_names_that_come_twice_and_unknown_frames():
         brachis.Robot.from_pinocchio(model, "tool", limits=limits)
 
 
-def test_solids_are_taken_over(tmp_path):
+def test_solids_of_a_geometry_model_become_those_of_the_robot(tmp_path):
     mesh = tmp_path / "a & b.stl"
     mesh.write_text("solid\nendsolid\n")
     model = model_of("scara3")
     geometry = pin.GeometryModel()
     away = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.1]))
     shapes = {
-        "box": coal.Box(0.1, 0.2, 0.3),
-        "ball": coal.Sphere(0.1),
-        "round": coal.Cylinder(0.1, 0.4),
-        "capsule": coal.Capsule(0.1, 0.4),
+        "box {'size': '0.1 0.2 0.3'}": coal.Box(0.1, 0.2, 0.3),
+        "sphere {'radius': '0.1'}": coal.Sphere(0.1),
+        "cylinder {'radius': '0.1', 'length': '0.4'}": coal.Cylinder(0.1, 0.4),
+        "capsule {'radius': '0.1', 'length': '0.4'}": coal.Capsule(0.1, 0.4),
     }
     for name, shape in shapes.items():
         geometry.addGeometryObject(pin.GeometryObject(name, 2, away, shape))
     robot = brachis.Robot.from_pinocchio(model, geometry=geometry)
     (link,) = read_tree(robot.urdf, "").robot.xpath("link[collision]")
     assert link.get("name") == "link2"
-    texts = [
-        f"{shape.tag} {dict(shape.attrib)}"
-        for shape in link.iterfind("collision/geometry/*")
-    ]
-    assert texts == [
-        "box {'size': '0.1 0.2 0.3'}",
-        "sphere {'radius': '0.1'}",
-        "cylinder {'radius': '0.1', 'length': '0.4'}",
-        "capsule {'radius': '0.1', 'length': '0.4'}",
-    ]
+    solids = link.iterfind("collision/geometry/*")
+    assert [f"{solid.tag} {dict(solid.attrib)}" for solid in solids] == [*shapes]
     assert link.find("collision/origin").get("xyz") == "0.5 0 0.1"
-    solid = pin.GeometryObject(
-        "mesh", 1, away, coal.Halfspace(), str(mesh), np.full(3, 0.001)
-    )
+    half = coal.Halfspace()
+    solid = pin.GeometryObject("mesh", 1, away, half, str(mesh), np.full(3, 0.001))
     geometry.addGeometryObject(solid)
     robot = brachis.Robot.from_pinocchio(model, geometry=geometry)
     (file,) = read_tree(robot.urdf, "").robot.iter("mesh")
     assert dict(file.attrib) == {"filename": str(mesh), "scale": "0.001 0.001 0.001"}
-    plane = pin.GeometryObject("floor", 0, away, coal.Halfspace())
-    geometry.addGeometryObject(plane)
-    with pytest.raises(
-        UrdfError, match=r"geometry: floor: .*found halfspace; allowed: a box"
-    ):
+    geometry.addGeometryObject(pin.GeometryObject("floor", 0, away, half))
+    message = r"geometry: floor: .*found halfspace; allowed: a box"
+    with pytest.raises(UrdfError, match=message):
         brachis.Robot.from_pinocchio(model, geometry=geometry)

@@ -1,6 +1,7 @@
 """Scenes from files and from Python, meshes, SRDF; what inspect and the viewer show of them."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from brachis.problem.plausibility import of_task
 from brachis.robot.from_task import robot_for
 from brachis.scene import scene_of
 from support.command_line import code_of, interrupts_kept
+from support.motions import motion_between
 
 IIWA = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
 TASK = {
@@ -208,7 +210,7 @@ def test_inspect_lists_pairs_and_json_has_all(tmp_path, capfd):
     assert data["collisions"]["solids"][-1] == "ball"
 
 
-def test_the_viewer_draws_the_bodies_where_they_are():
+def test_the_viewer_draws_the_bodies_where_they_are(line_trajectory):
     trimesh = pytest.importorskip("trimesh")
     from brachis.apps.view.bodies import scene_meshes
 
@@ -217,18 +219,19 @@ def test_the_viewer_draws_the_bodies_where_they_are():
         brachis.Capsule(0.1, 0.2, link="tool", position=[0, 0, 0.3], name="rod"),
         brachis.HalfSpace([0, 0, 1], -0.5, name="floor"),
     ]
-    result = brachis.plan(
-        {**TASK, "scene": scene}, effort="single", intervals=8, least_motion=False
-    )
-    meshes = scene_meshes(result.trajectory)
-    assert {joint: len(own) for joint, own in meshes.items()} == {0: 2, 7: 1}
+    q = np.array([TASK["start"]["joints"]] * 2)
+    motion = motion_between(line_trajectory, brachis.robots.iiwa14, q)
+    task = brachis.load_task({**TASK, "scene": scene})
+    meshes = scene_meshes(replace(motion, task=task))
+    assert {joint: len(solids) for joint, solids in meshes.items()} == {0: 2, 7: 1}
     box, floor = meshes[0]
     assert isinstance(box, trimesh.Trimesh)
     assert_allclose(box.bounds, [[0.9, -0.2, -0.3], [1.1, 0.2, 0.3]])
     assert floor.bounds[1, 2] == pytest.approx(-0.5)
     # The tool is 45 mm in front of joint 7.
-    assert_allclose(meshes[7][0].bounds.mean(axis=0), [0, 0, 0.345], atol=1e-6)
-    assert_allclose(np.ptp(meshes[7][0].bounds, axis=0), [0.2, 0.2, 0.4], atol=2e-3)
+    (rod,) = meshes[7]
+    assert_allclose(rod.bounds.mean(axis=0), [0, 0, 0.345], atol=1e-6)
+    assert_allclose(np.ptp(rod.bounds, axis=0), [0.2, 0.2, 0.4], atol=2e-3)
 
 
 def test_a_cell_is_read_from_a_urdf(tmp_path):
@@ -292,9 +295,7 @@ def scene_with(**keys):
     ],
 )
 def test_lengths_and_masses_whose_squares_overflow_are_errors(keys):
-    with pytest.raises(
-        TaskError, match=r"out of range; found 1e\+300; allowed: <= 1e"
-    ):
+    with pytest.raises(TaskError, match=r"out of range; found 1e\+300; allowed: <= 1e"):
         brachis.load_task({**TASK, **yaml.safe_load(keys)})
 
 

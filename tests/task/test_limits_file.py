@@ -198,40 +198,21 @@ SHORT = (
 
 
 def test_a_file_of_moveit_is_read(load_beside, tmp_path):
-    (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
-    limits = load_beside({"limits_file": "joint_limits.yaml"}).robot.limits
+    file = tmp_path / "joint_limits.yaml"
+    file.write_text(MOVEIT, encoding="utf-8")
+    limits = load_beside({"limits_file": file.name}).robot.limits
     assert limits.position == {"j1": (np.radians(-170.0), 2.5)}
     assert limits.velocity == {"j1": 2.0, "j2": None}
     assert limits.acceleration == {"j1": 3.75, "j2": 5.0, "j3": None}
     assert (limits.jerk, limits.torque) == ({"j1": 90.0}, {"j3": 7.5})
     assert (limits.scale.velocity, limits.scale.acceleration) == (0.5, 1.0)
-    own = load_beside(
-        {
-            "limits_file": "joint_limits.yaml",
-            "limits": {"scale": {"velocity": 1.0}, "velocity": {"j1": 1.0}},
-        }
-    )
-    assert own.robot.limits.scale.velocity == 1.0
-    assert own.robot.limits.velocity == {"j1": 1.0, "j2": None}
-    beside = brachis.LimitSpec(velocity={"j1": 1.0})
-    task = {"urdf": "unread.urdf", "limits_file": str(tmp_path / "joint_limits.yaml")}
-    given = load_task(
-        {
-            "brachis": 1,
-            "robot": {**task, "limits": beside},
-            "start": {"joints": [0.5, -2.0, 2.0]},
-            "task_space": ["x", "y"],
-            "path": [{"line": {"by": [0.1, 0.0]}}],
-        }
-    )
-    assert given.robot.limits.scale.velocity == 0.5
-    robot = Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf",
-        limits=read_limits(tmp_path / "joint_limits.yaml"),
-    )
-    assert_array_equal(
-        robot.limits.velocity, [1.0, np.inf, robot.urdf_limits[2].velocity * 0.5]
-    )
+    changes = {"scale": {"velocity": 1.0}, "velocity": {"j1": 1.0}}
+    task = load_beside({"limits_file": file.name, "limits": changes})
+    assert task.robot.limits.scale.velocity == 1.0
+    assert task.robot.limits.velocity == {"j1": 1.0, "j2": None}
+    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=read_limits(file))
+    half = 0.5 * robot.urdf_limits[2].velocity
+    assert_array_equal(robot.limits.velocity, [1.0, np.inf, half])
     assert_array_equal(robot.limits.acceleration, [3.75, 5.0, np.inf])
 
 

@@ -132,46 +132,43 @@ def test_tx90l_rail_moves_the_whole_arm_and_no_other_carriage(tx90l):
     )
 
 
+def denavit_hartenberg(start, rows, q):
+    """Placement by rows of d, a, alpha."""
+    placement = start
+    for angle, (d, a, alpha) in zip(q, rows, strict=True):
+        placement = placement * turn("z", angle) * shift(a, 0.0, d) * turn("x", alpha)
+    return placement.homogeneous
+
+
 def test_iiwa14_is_the_published_arm():
     robot = Robot.from_urdf(ROBOTS / "iiwa14/robot.urdf")
+    limits = robot.limits
     assert robot.joint_names == tuple(f"joint_{i}" for i in range(1, 8))
     assert (robot.base_frame, robot.tool_frame) == ("link_0", "tool")
-    assert_array_equal(
-        robot.limits.position_upper, np.radians([170, 120, 170, 120, 170, 120, 175])
-    )
-    assert_array_equal(robot.limits.position_lower, -robot.limits.position_upper)
-    assert_array_equal(
-        robot.limits.velocity, np.radians([85, 85, 100, 75, 130, 135, 135])
-    )
-    assert_array_equal(robot.limits.torque, [320, 320, 176, 176, 110, 40, 40])
-    assert np.all(np.abs(gravity_torque(robot, anywhere(robot))) < robot.limits.torque)
-    # Denavit-Hartenberg: turns about z and x by turns, d_bs, d_se, d_ew, d_wf along z.
-    lengths, twists = (
-        (0.36, 0.0, 0.42, 0.0, 0.40, 0.0, 0.126),
-        np.radians([-90, 90, 90, -90, -90, 90, 0]),
-    )
+    ranges = np.radians([170, 120, 170, 120, 170, 120, 175])
+    assert_array_equal(limits.position_upper, ranges)
+    assert_array_equal(limits.position_lower, -ranges)
+    speeds = np.radians([85, 85, 100, 75, 130, 135, 135])
+    assert_array_equal(limits.velocity, speeds)
+    assert_array_equal(limits.torque, [320, 320, 176, 176, 110, 40, 40])
+    assert np.all(np.abs(gravity_torque(robot, anywhere(robot))) < limits.torque)
+    lengths = (0.36, 0.0, 0.42, 0.0, 0.40, 0.0, 0.126)
+    twists = np.radians([-90, 90, 90, -90, -90, 90, 0])
+    rows = [(d, 0.0, alpha) for d, alpha in zip(lengths, twists, strict=True)]
     for q in anywhere(robot, 50):
-        expected = pin.SE3.Identity()
-        for angle, d, alpha in zip(q, lengths, twists, strict=True):
-            expected = (
-                expected * turn("z", angle) * shift(0.0, 0.0, d) * turn("x", alpha)
-            )
-        assert_allclose(
-            robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
-        )
+        expected = denavit_hartenberg(pin.SE3.Identity(), rows, q)
+        assert_allclose(robot.tool_placement(q).homogeneous, expected, atol=1e-14)
 
 
 def test_ur10_rail_is_the_published_arm():
     robot = Robot.from_urdf(ROBOTS / "ur10_rail/robot.urdf")
     assert (robot.base_frame, robot.tool_frame) == ("world", "tool0")
     assert robot.joint_names[0] == "rail"
-    assert sum(inertia.mass for inertia in robot.model.inertias) == pytest.approx(
-        60.0 + 32.7
-    )
-    assert_array_equal(
-        robot.limits.torque, [2000.0, 330.0, 330.0, 150.0, 54.0, 54.0, 54.0]
-    )
-    # Denavit-Hartenberg as the maker publishes it; its base frame is turned by 180 degrees about z.
+    masses = [inertia.mass for inertia in robot.model.inertias]
+    assert sum(masses) == pytest.approx(60.0 + 32.7)
+    torques = [2000.0, 330.0, 330.0, 150.0, 54.0, 54.0, 54.0]
+    assert_array_equal(robot.limits.torque, torques)
+    # As the maker publishes it; its base frame is turned by 180 degrees about z.
     rows = (
         (0.1273, 0.0, math.pi / 2),
         (0.0, -0.612, 0.0),
@@ -181,13 +178,10 @@ def test_ur10_rail_is_the_published_arm():
         (0.0922, 0.0, 0.0),
     )
     for q in anywhere(robot, 50):
-        expected = shift(0.0, q[0], 0.0) * turn("z", math.pi)
-        for angle, (d, a, alpha) in zip(q[1:], rows, strict=True):
-            expected = expected * turn("z", angle) * shift(a, 0.0, d) * turn("x", alpha)
+        base = shift(0.0, q[0], 0.0) * turn("z", math.pi)
+        expected = denavit_hartenberg(base, rows, q[1:])
         # The source writes right angles with twelve digits.
-        assert_allclose(
-            robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-10
-        )
+        assert_allclose(robot.tool_placement(q).homogeneous, expected, atol=1e-10)
 
 
 PUBLIC = {

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
 from brachis.apps.bottleneck import limit_ratios
 from brachis.apps.plots import plot_limits
@@ -35,22 +34,3 @@ def test_a_panel_for_every_kind_and_a_line_for_every_value(line_trajectory):
         np.testing.assert_allclose(
             drawn[label.subject, label.axis].get_ydata(), column, atol=1e-9
         )
-
-
-def test_positions_are_drawn_by_their_place_in_the_range(line_trajectory, with_limits):
-    q = line_trajectory.q
-    middle, half = q[0], 1.25 * np.abs(q - q[0]).max(axis=0)
-    ranged = with_limits(
-        line_trajectory, position_lower=middle - half, position_upper=middle + half
-    )
-    (ax,) = (
-        ax
-        for ax in plot_limits(ranged).axes
-        if ax.get_ylabel() == "position in its range"
-    )
-    for joint, line in enumerate(lines(ax).values()):
-        t, place = line.get_data()
-        np.testing.assert_allclose(
-            place, ((line_trajectory.position(t) - middle) / half)[:, joint], atol=1e-9
-        )
-        assert np.abs(place).max() == pytest.approx(0.8, abs=1e-3)

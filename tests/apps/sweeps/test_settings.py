@@ -51,20 +51,20 @@ def test_nothing_varied_is_one_plan():
 
 
 def test_draws_follow_their_distributions():
-    found = drawn(
+    draws = drawn(
         u={"uniform": [1, 3]},
         l={"log_uniform": [0.01, 100]},
         n={"normal": [5, 0.5]},
         c={"choice": ["x", [1]]},
     )
-    u, logs, n = (np.array([each[key] for each in found]) for key in ("u", "l", "n"))
+    u, logs, n = (np.array([draw[key] for draw in draws]) for key in "uln")
     assert u.min() >= 1.0
     assert u.max() <= 3.0
     assert u.mean() == pytest.approx(2.0, abs=0.1)
-    assert np.log10(logs).mean() == pytest.approx(0.0, abs=0.2)
     assert np.log10(logs).min() >= -2.0
+    assert np.log10(logs).mean() == pytest.approx(0.0, abs=0.2)
     assert (n.mean(), n.std()) == pytest.approx((5.0, 0.5), abs=0.1)
-    assert sum(each["c"] == "x" for each in found) == pytest.approx(500, abs=60)
+    assert sum(draw["c"] == "x" for draw in draws) == pytest.approx(500, abs=60)
 
 
 def test_more_draws_and_further_keys_leave_the_first_ones():

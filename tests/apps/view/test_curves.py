@@ -31,25 +31,6 @@ def test_a_planned_motion_reaches_its_torque_limits_and_keeps_them(line_result):
     assert levels(found["torque / limit"]) == [-1.0, 1.0]
 
 
-def test_unequal_limits_count_in_their_own_direction(bare_robot, motion_of):
-    motion = motion_of(bare_robot)
-    motion = with_limits(
-        motion,
-        velocity_lower=np.array([-9.0, -9.0]),
-        velocity_upper=np.array([1.0, 2.0]),
-    )
-    speed = curves_of(motion)["velocity / limit"]
-    assert_allclose(speed.values * [1.0, 2.0], motion.velocity(speed.t), atol=1e-12)
-
-
-def test_positions_count_from_the_middle_of_their_range(bare_robot, motion_of):
-    position = curves_of(motion_of(bare_robot, begin=0.5, end=2.0))[
-        "position in its range"
-    ]
-    assert_allclose(position.values[0], [0.0, 0.25], atol=1e-12)
-    assert_allclose(position.values[-1], [1.0, 1.0], atol=1e-12)
-
-
 def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of):
     motion = with_limits(
         motion_of(bare_robot),
