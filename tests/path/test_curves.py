@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import PathError
 from brachis.path import build_path
-from brachis.path.curves import septic
 from brachis.task.segments import ArcSegment
 from support.poses import row_path
 
@@ -87,15 +86,6 @@ def test_derivatives_are_the_slopes_of_those_below(name):
     assert_allclose(first, start, atol=1e-12)
     assert curve.knots[0] == 0
     assert curve.knots[-1] == pytest.approx(curve.length)
-
-
-def test_derivatives_of_a_blend():
-    start, end = np.random.default_rng(2).standard_normal((2, 4, 3))
-    curve = septic(start, end, 1.7)
-    assert_derivatives(curve)
-    assert_allclose(
-        curve.derivatives(np.array([0.0, 1.7])), np.stack([start, end], 1), atol=1e-12
-    )
 
 
 coordinates = st.lists(st.floats(-5, 5), min_size=3, max_size=3).map(np.array)

@@ -118,12 +118,3 @@ def test_smooth_continuations_need_no_blend(segments):
         ).max()
         < 1e-5
     )
-
-
-def test_one_row_and_yaw_alone():
-    path = row_path([{"line": {"by": [-2]}}], [0.5], ["z"])
-    assert_allclose(path.sample([0, 0.5, 1]).target[:, 0], [0.5, -0.5, -1.5])
-    assert path.length == pytest.approx(2)
-    turning = row_path([{"line": {"by": [0, 0, 2]}}], [0, 0, 0], ["x", "y", "yaw"])
-    assert_allclose(turning.sample([0.5]).xi, [[0, 0, 2]])
-    assert turning.length == 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import yaml
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from brachis.path import build_path
@@ -20,7 +20,6 @@ from support.poses import (
     twist_by_difference,
 )
 
-ROTATE = {"rotate": {"axis": [1, 2, -2], "angle_deg": 140}}
 SMOOTH = {
     "rotate": {
         "axis": [1, 2, -2],
@@ -30,14 +29,6 @@ SMOOTH = {
     }
 }
 ALONG = {"line": {"by": [0.6, 0, 0.3]}}
-SPLINE = {"spline": {"through": [[0.6, 0.3, 0.2], [0.9, 0.4, 0.4], [1.1, 0.8, 0.3]]}}
-CIRCLE = {"circle": {"center": [0.2, 0.1, 0.3], "normal": [0, 1, 1], "turns": -1.25}}
-VIA = {"arc": {"via": [0.7, 0.3, 0.3], "to": [0.9, 0.2, 0.5]}}
-ATTITUDES = [
-    {"rpy_deg": [20, 40, 60]},
-    {"rotation_vector": [0.2, 0.9, 1.5]},
-    {"quaternion_wxyz": [-0.5, 0.5, -0.5, -0.5]},
-]
 
 SEGMENTS = yaml.safe_load("""
 fixed:
@@ -338,29 +329,6 @@ def test_along_the_tangent_the_tool_keeps_to_the_velocity_and_has_no_roll():
 def test_a_line_along_its_tangent_does_not_turn():
     sample = pose_path([ALONG | {"orientation": "tangent"}]).sample([0.0, 0.5, 1.0])
     assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
-
-
-def test_a_turn_moves_nothing_but_the_orientation():
-    path = pose_path([{"turn": ROTATE}, {"turn": ROTATE}])
-    sample = path.sample(np.linspace(0, 1, 9))
-    assert path.length == 0.0
-    assert_array_equal(sample.target[:, :3], np.broadcast_to(START, (9, 3)))
-    assert_array_equal(sample.xi[:, :3], 0.0)
-    assert_allclose(np.linalg.norm(sample.xi[:, 3:], axis=1), np.deg2rad(280))
-
-
-def test_positions_are_those_of_the_task_space_of_positions():
-    poses = pose_path(SEGMENTS["blends"])
-    plain = [
-        {key: value for key, value in one.items() if key != "orientation"}
-        for one in SEGMENTS["blends"]
-    ]
-    alone = pose_path(plain)
-    s = np.linspace(0, 1, 50)
-    assert_allclose(
-        poses.sample(s).target[:, :3], alone.sample(s).target[:, :3], atol=1e-12
-    )
-    assert poses.length == pytest.approx(alone.length)
 
 
 def test_a_blend_of_a_turn_that_goes_on_keeps_close_to_it():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
-from brachis.task import load_task, read_assignment, with_keys
+from brachis.task import read_assignment, with_keys
 from brachis.task.load import set_key
 
 TASK = {
@@ -51,14 +51,6 @@ def test_ways_that_lead_nowhere(key, expected):
     with pytest.raises(TaskError) as caught:
         with_keys(TASK, {key: 1})
     assert all(part in str(caught.value) for part in expected)
-
-
-def test_unknown_keys_are_named_with_their_alternatives():
-    with pytest.raises(
-        TaskError,
-        match=r"spline.intervls: unknown key.*allowed: .*Did you mean 'intervals'",
-    ):
-        load_task(with_keys(TASK, {"spline.intervls": 40}))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import dataclasses
 
 import brachis
-from brachis.robot import Robot
 from support.effort import QUICK
 
 from .conftest import ROOT
@@ -49,14 +48,3 @@ def test_an_unverified_motion_is_reported_with_its_exit_code(run, tmp_path):
     assert outcome.code == 1
     assert "did not pass" in outcome.err
     assert "NOT VERIFIED" in (tmp_path / "bad.html").read_text(encoding="utf-8")
-
-
-def test_a_robot_without_a_name_leaves_the_title_to_the_file(
-    run, tmp_path, monkeypatch
-):
-    result = save_motion(tmp_path)
-    monkeypatch.setattr(Robot, "name", "")
-    assert run(f"report {result}").code == 0
-    assert "<title>motion.npz: verified</title>" in (
-        tmp_path / "motion.html"
-    ).read_text(encoding="utf-8")

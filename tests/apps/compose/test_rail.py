@@ -76,19 +76,6 @@ def test_limits_are_those_of_the_rail_and_of_the_arm(arm):
         assert_array_equal(getattr(composed.limits, name), expected)
 
 
-def test_everything_moves_with_the_rail(arm):
-    """Also the base of the arm, which no joint of its own moves."""
-    _, composed = robots(arm)
-    assert sum(inertia.mass for inertia in composed.model.inertias) == pytest.approx(
-        80.0 + ARM_MASS
-    )
-    zero = np.zeros((1, 4))
-    accelerated = dynamics.torque(
-        composed, zero, zero, np.array([[3.0, 0.0, 0.0, 0.0]])
-    )
-    assert accelerated[0, 0] == pytest.approx(3.0 * (80.0 + ARM_MASS))
-
-
 @pytest.mark.parametrize("axis", AXES)
 def test_rail_carries_its_share_of_the_weight(arm, axis):
     _, composed = robots(arm, axis=AXES[axis])

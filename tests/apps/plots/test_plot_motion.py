@@ -160,16 +160,3 @@ def test_the_overview_shows_what_holds_the_motion(line_trajectory, with_limits):
     assert max(
         np.abs(line.get_ydata()).max() for line in lines_by_label(ax).values()
     ) == pytest.approx(1.0, abs=0.02)
-
-
-@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
-def test_nothing_on_the_overview_overlaps(name, request):
-    figure = plot_overview(request.getfixturevalue(name))
-    figure.draw_without_rendering()
-    boxes = [ax.get_window_extent() for ax in figure.axes]
-    boxes += [
-        legend.get_window_extent()
-        for legend in [*figure.legends, figure.axes[0].get_legend()]
-    ]
-    for i, box in enumerate(boxes):
-        assert not [other for other in boxes[:i] if box.padded(-1.0).overlaps(other)]

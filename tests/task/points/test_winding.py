@@ -36,8 +36,3 @@ def test_a_raster_with_round_turns_takes_knots_where_it_bends(
     curves, intervals = winding_paths.fit(path)
     assert winding_paths.deviations(path, curves, sides=2_000, count=500)[0] <= 1.001
     assert intervals <= 20 * path.turns
-
-
-def test_every_kind_is_among_the_seeds(winding_paths):
-    kinds = {winding_paths.winding_path(seed, 300).kind for seed in range(12)}
-    assert kinds == set(winding_paths.KINDS)
