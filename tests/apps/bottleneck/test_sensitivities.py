@@ -191,20 +191,6 @@ def test_least_squares_replace_multipliers_of_wrong_sign(scara):
     assert wrong.residual < 1e-5
 
 
-def test_two_rows_that_hold_alike_give_way_together_only():
-    # min t over t >= b1, t >= b2 with b1 = b2: relaxation of one alone saves nothing.
-    active_set = ActiveSet(
-        np.array([[1.0], [1.0]]), np.array([0, 1]), np.array([1.0, 1.0])
-    )
-    assert active_set.dependent
-    for weights in ([1.0, 0.0], [0.3, 0.7]):
-        both = Multipliers(active_set, np.array(weights), "solver", 0.0)
-        assert both.change(np.array([1.0, 0.0])) == pytest.approx(0.0)
-        assert both.change(np.array([0.0, 1.0])) == pytest.approx(0.0)
-        assert both.change(np.array([1.0, 2.0])) == pytest.approx(-1.0)
-        assert both.change(np.array([1.0, 1.0]), side=-1.0) == 0.0
-
-
 def test_branch_boundary_is_told_apart(scara):
     refined = scara("j3").candidate.refined
     program, report = refined.program, refined.reports[-1]

@@ -5,7 +5,6 @@ import re
 import shlex
 from math import radians
 
-import numpy as np
 import pytest
 
 from brachis import Robot
@@ -23,31 +22,10 @@ READMES = [
 
 def test_writes_what_the_library_makes(run, tmp_path):
     out = tmp_path / "on_rail.urdf"
-    options = (
-        "--axis",
-        "0",
-        "0",
-        "1",
-        "--mount-xyz",
-        "0.1",
-        "-0.2",
-        "0.3",
-        "--mount-rpy-deg",
-        "180",
-        "0",
-        "-90",
-    )
     outcome = run(
-        "compose",
-        SCARA,
-        *FIGURES,
-        *options,
-        "--name",
-        "lift",
-        "--root",
-        "floor",
-        "--out",
-        out,
+        f"compose {SCARA} --range -2 2 --velocity 2 --force 1500 --mass 80 --axis 0 0 1 "
+        "--mount-xyz 0.1 -0.2 0.3 --mount-rpy-deg 180 0 -90 --name lift --root floor "
+        f"--out {out}"
     )
     assert (outcome.code, outcome.out, outcome.err) == (0, f"wrote {out}\n", "")
     rail = Rail(
@@ -62,9 +40,7 @@ def test_writes_what_the_library_makes(run, tmp_path):
         root="floor",
     )
     assert out.read_text() == on_rail(SCARA, rail)
-    robot = Robot.from_urdf(out)
-    assert robot.joint_names == ("lift", "j1", "j2", "j3")
-    np.testing.assert_array_equal(robot.limits.position_lower[0], -2.0)
+    assert Robot.from_urdf(out).joint_names == ("lift", "j1", "j2", "j3")
 
 
 @pytest.mark.parametrize(

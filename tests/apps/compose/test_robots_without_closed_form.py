@@ -1,4 +1,4 @@
-"""The robots of the repository without a closed form for poses: as their sources say, and as MuJoCo moves them."""
+"""The robots of the repository without a closed form for poses: as their sources say."""
 
 import math
 
@@ -13,17 +13,10 @@ from brachis.robot import dynamics
 from .conftest import ROOT
 
 JOINTS = {"gen3": 7, "arm8": 8, "gen3_rails": 9}
-COMPILER = (
-    '<mujoco><compiler discardvisual="true" fusestatic="false"/></mujoco></robot>'
-)
-
-
-def urdf(name):
-    return ROOT / f"robots/{name}/robot.urdf"
 
 
 def load(name):
-    return Robot.from_urdf(urdf(name))
+    return Robot.from_urdf(ROOT / f"robots/{name}/robot.urdf")
 
 
 @pytest.fixture
@@ -50,34 +43,6 @@ def test_their_drives_can_hold_them(name, joints):
     assert np.all(
         np.abs(dynamics.torque(robot, q, still, still)) < 0.7 * robot.limits.torque
     )
-
-
-@pytest.mark.parametrize("name", JOINTS)
-def test_mujoco_agrees_with_torques_and_tool(name):
-    mujoco, robot = pytest.importorskip("mujoco"), load(name)
-    model = mujoco.MjModel.from_xml_string(
-        urdf(name).read_text().replace("</robot>", COMPILER)
-    )
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    order = [model.joint(name).qposadr[0] for name in robot.joint_names]
-    data, rng = mujoco.MjData(model), np.random.default_rng(1)
-    for q in anywhere(robot, 50):
-        v, a = rng.normal(size=(2, robot.n))
-        data.qpos[order], data.qvel[order], data.qacc[order] = q, v, a
-        mujoco.mj_inverse(model, data)
-        torque = dynamics.torque(robot, q[None], v[None], a[None])[0]
-        assert np.all(
-            np.abs(data.qfrc_inverse[order] - torque) < 1e-6 * robot.limits.torque
-        )
-        placement = robot.tool_placement(q)
-        assert_allclose(
-            data.body(robot.tool_frame).xpos, placement.translation, atol=1e-9
-        )
-        assert_allclose(
-            data.body(robot.tool_frame).xmat.reshape(3, 3),
-            placement.rotation,
-            atol=1e-9,
-        )
 
 
 def test_gen3_limits_and_masses(gen3):
