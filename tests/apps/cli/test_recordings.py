@@ -39,7 +39,9 @@ def recording(tmp_path_factory):
     return folder / "today.csv", folder / "cell.yaml", trajectory
 
 
-def test_import(run, recording, tmp_path):
+def test_an_imported_recording_is_verified_and_can_be_exported(
+    run, recording, tmp_path
+):
     file, cell, trajectory = recording
     out = tmp_path / "today.npz"
     outcome = run(f"import {file} --robot {cell} --angle deg --out {out} --degrees")
@@ -56,6 +58,10 @@ def test_import(run, recording, tmp_path):
         in outcome.out
     )
     assert run(f"export {out} --out {tmp_path / 'again.json'}").code == 0
+    told = json.loads(
+        run(f"import {file} --robot {SCARA} --angle deg --out {out} --json").out
+    )
+    assert told["t_end"] == pytest.approx(trajectory.t_end)
     assert run(f"import {file} --robot {cell} --angle deg --out {cell}").code == 2
 
 
