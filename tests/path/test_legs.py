@@ -90,14 +90,14 @@ LEAD = 0.1
     ],
 )
 def test_a_part_leaves_leads_at_stops_and_ends(parts, boundary, held):
-    given = problem(STOPPING, parts, boundary)
-    speeds = [leg for leg in given.legs if leg.speed is not None]
+    bound = problem(STOPPING, parts, boundary)
+    speeds = [leg for leg in bound.legs if leg.speed is not None]
     found = [(leg.speed, 0.6 * leg.begin, 0.6 * leg.end) for leg in speeds]
     assert_allclose(found, held, atol=1e-9)
-    again = Problem.of(given.robot, load_task(given.task.to_dict()))
+    again = Problem.of(bound.robot, load_task(bound.task.to_dict()))
     assert_allclose(
         [(leg.begin, leg.end) for leg in again.legs],
-        [(leg.begin, leg.end) for leg in given.legs],
+        [(leg.begin, leg.end) for leg in bound.legs],
         atol=1e-12,
     )
 
@@ -129,9 +129,9 @@ def test_segments_have_speeds(path, expected):
 
 
 def test_speeds_of_segments_and_of_parts():
-    given = problem([RIGHT, SEAM, RIGHT], part(0.3, 0.1, 0.2))
-    assert [leg.speed for leg in given.legs] == [None, 0.3, None, 0.1, None]
-    assert [part.segment for part in given.task.tool_limits.process_speed] == [None, 1]
+    bound = problem([RIGHT, SEAM, RIGHT], part(0.3, 0.1, 0.2))
+    assert [leg.speed for leg in bound.legs] == [None, 0.3, None, 0.1, None]
+    assert [part.segment for part in bound.task.tool_limits.process_speed] == [None, 1]
     with pytest.raises(TaskError, match=r"a begin of path\[1\]\.speed above 0\.5"):
         problem([RIGHT, SEAM, RIGHT], part(0.3, 0.3, 0.5))
     with pytest.raises(
@@ -147,8 +147,8 @@ def test_a_file_has_a_speed_between_its_stops(tmp_path):
     file = tmp_path / "seam.nc"
     file.write_text("G21 G90\nG1 X400 Y0 Z500 F600\nG1 X500\nG1 Y100\n")
     segment = {"csv": {"file": str(file), "corner": "stop"}, "speed": 0.05}
-    given = problem([segment])
-    found = [(leg.begin, leg.end, leg.speed) for leg in given.legs]
+    bound = problem([segment])
+    found = [(leg.begin, leg.end, leg.speed) for leg in bound.legs]
     lead = LEAD * 0.05 / 0.2
     expected = [(lead, 0.5 - lead, 0.05), (0.5 + lead, 1.0 - lead, 0.05)]
     assert_allclose([leg for leg in found if leg[2]], expected)
@@ -162,10 +162,10 @@ def test_a_speed_replaces_the_feed_rates_of_points():
     (segment,) = fitted
     with_feed = problem([segment])
     assert with_feed.task.tool_limits.feed
-    given = problem([segment.model_copy(update={"speed": 0.05})])
-    assert not given.task.tool_limits.feed
+    bound = problem([segment.model_copy(update={"speed": 0.05})])
+    assert not bound.task.tool_limits.feed
     assert brachis.fit_path(points, speed=0.05)[0].speed == 0.05
-    assert [leg.speed for leg in given.legs] == [None, 0.05, None]
+    assert [leg.speed for leg in bound.legs] == [None, 0.05, None]
 
 
 def test_a_tool_that_turns_on_the_spot_has_no_speed():
@@ -214,9 +214,9 @@ def test_the_speed_at_the_start_of_a_path_of_joints_is_that_of_the_tool():
     assert begun.legs[0].end == pytest.approx(LEAD * 0.1 / slope, rel=1e-9)
     start_speed = 0.1 / slope * np.linalg.norm(first)
     boundary = {"start_speed": float(start_speed)}
-    given = Problem.of(robot, load_task({**task, "boundary": boundary}))
-    assert given.legs[0].speed == 0.1
-    assert given.leg_rates[0][0] == pytest.approx(0.1 / slope, rel=1e-6)
+    bound = Problem.of(robot, load_task({**task, "boundary": boundary}))
+    assert bound.legs[0].speed == 0.1
+    assert bound.leg_rates[0][0] == pytest.approx(0.1 / slope, rel=1e-6)
 
 
 CIRCLE = {"circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1]}}
@@ -227,11 +227,11 @@ def test_the_seam_of_a_periodic_motion_has_a_lead_between_two_speeds(
     last,
 ):
     parts = [part(0.1, 0.0, 0.3), part(last, 0.6, 1.0)]
-    given = problem([CIRCLE], parts, {"periodic": True})
-    speeds = [leg.speed for leg in given.legs]
+    bound = problem([CIRCLE], parts, {"periodic": True})
+    speeds = [leg.speed for leg in bound.legs]
     assert speeds == [0.1, None, 0.1] if last == 0.1 else [None, 0.1, None, last]
     if last > 0.1:
-        assert given.legs[0].end == pytest.approx(LEAD * last / given.path.length)
+        assert bound.legs[0].end == pytest.approx(LEAD * last / bound.path.length)
 
 
 def problem(path, parts=(), boundary=None, limits=None):
@@ -250,24 +250,24 @@ def problem(path, parts=(), boundary=None, limits=None):
 def test_rates_where_legs_meet():
     """On lines ds/dt is the speed over the path's length."""
     ends = {"start_speed": 0.3, "end_speed": 0.06}
-    given = problem(STOPPING, part(0.12, 0.8, 0.9), ends)
+    bound = problem(STOPPING, part(0.12, 0.8, 0.9), ends)
     expected = [0.3 / 0.6, 0.0, 0.0, 0.2, 0.2, 0.1]
-    assert [rates[0] for rates in given.leg_rates] == pytest.approx(expected[:-1])
-    assert [rates[1] for rates in given.leg_rates] == pytest.approx(expected[1:])
-    assert [law is None for law in given.time_laws] == [True, True, True, False, True]
-    assert [path.breaks[0] for path in given.leg_paths] == [
-        leg.begin for leg in given.legs
+    assert [rates[0] for rates in bound.leg_rates] == pytest.approx(expected[:-1])
+    assert [rates[1] for rates in bound.leg_rates] == pytest.approx(expected[1:])
+    assert [law is None for law in bound.time_laws] == [True, True, True, False, True]
+    assert [path.breaks[0] for path in bound.leg_paths] == [
+        leg.begin for leg in bound.legs
     ]
     assert_allclose(
-        given.leg_paths[0].sample([given.legs[0].end]).xi, [[0.6, 0.0, 0.0]], atol=1e-12
+        bound.leg_paths[0].sample([bound.legs[0].end]).xi, [[0.6, 0.0, 0.0]], atol=1e-12
     )
 
 
 def test_rates_at_the_seam_of_a_periodic_motion():
     rate = 0.1 / (0.2 * np.pi)
     for parts in (part(0.1, 0.0, 0.5), part(0.1, 0.5, 1.0)):
-        given = problem([CIRCLE], parts, {"periodic": True})
-        flat = [rate for rates in given.leg_rates for rate in rates]
+        bound = problem([CIRCLE], parts, {"periodic": True})
+        flat = [rate for rates in bound.leg_rates for rate in rates]
         assert flat == pytest.approx([rate] * 4)
     free = problem([CIRCLE], part(0.1, 0.2, 0.5), {"periodic": True})
     assert free.leg_rates[0] == pytest.approx((0.0, rate))

@@ -39,7 +39,7 @@ def recording(tmp_path_factory):
     return folder / "today.csv", folder / "cell.yaml", trajectory
 
 
-def test_an_imported_recording_is_verified_and_can_be_exported(
+def test_import_verifies_a_recording_which_every_command_takes(
     run, recording, tmp_path
 ):
     file, cell, trajectory = recording
