@@ -79,8 +79,9 @@ def test_python_snippets_run(page, clone, monkeypatch):
 @pytest.mark.parametrize("page", ["README.md", "docs/command_line.md"])
 def test_commands_run(page, clone, monkeypatch, capfd):
     """The brachis commands of the README, and the list of all commands, in order."""
-    commands = (ROOT / page).read_text().split("## A first task")[0]
-    lines = re.findall(r"^brachis \w[^#\n]*", commands, re.MULTILINE)
+    beginning = (ROOT / page).read_text().split("## A first task")[0]
+    fenced = "".join(beginning.split("```")[1::2])
+    lines = re.findall(r"^brachis \w[^#\n]*", fenced, re.MULTILINE)
     assert len(lines) >= 6
     (task,) = blocks(ROOT / "README.md", "yaml")
     (clone / "task.yaml").write_text(task)
