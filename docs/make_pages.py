@@ -7,10 +7,9 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "docs/figures/gallery.json"
@@ -235,8 +234,7 @@ def _by_range(result: dict[str, Any]) -> Table:
     return ["range", "tasks", "gain, median", "largest"], rows
 
 
-@dataclass(frozen=True)
-class Shown:
+class Shown(NamedTuple):
     """What the page shows of a result."""
 
     title: str
