@@ -115,7 +115,7 @@ Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: f
 torque rate includes the change of Coulomb friction; a larger `coulomb_velocity` makes it change slower.
 
 **What is in use** is printed by a plan, and stands in the saved motion and under `in_use` in the JSON. `brachis inspect
-task.yaml` shows it without a plan, with the path and the postures at its ends, and refuses what a plan refuses at once.
+task.yaml` shows it without a plan, and refuses what a plan refuses at once.
 
 **`brachis.plan(robot, task)`** puts a `Robot` in place of the `urdf` key and adds the task's `robot` settings. A
 setting that contradicts the robot is an error.

@@ -39,12 +39,12 @@ class FileUnits(Model):
     """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
 
     length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
-    """Unit of positions. Null: the header's unit, or m."""
+    """Of positions. Null: the header's unit, or m."""
     angle: Literal["rad", "mrad", "deg"] | None = None
-    """Unit of yaw and orientations. Null: the header's unit, or rad; required for roll, pitch, yaw and angles of KUKA,
+    """Of yaw and orientations. Null: the header's unit, or rad; required for roll, pitch, yaw and angles of KUKA,
     Staubli and Fanuc."""
     speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = None
-    """Unit of feed rates. Null: the header's unit, which is then required."""
+    """Of feed rates. Null: the header's unit, which is then required."""
 
 
 class FitTolerance(Model):
@@ -72,8 +72,7 @@ class PointFile(Model):
     file: Name
     """CSV or G-code file (.nc, .ngc, .gcode, .tap)."""
     relative: Flag = False
-    """Whether points are relative to the first one, which is then at the segment's start. Displacements are in the
-    path's frame, rotations in the tool frame."""
+    """Whether points are moved so that the first one is at the segment's start, as in a spline."""
     orientation: OrientationWord | None = Field(
         default=None,
         description="Convention of the orientation columns, if their names do not define it: "

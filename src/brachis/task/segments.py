@@ -73,7 +73,7 @@ class BSplineCurve(CheckedModel):
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = ()
     """Tables of the largest tool speed along parts of the curve: pairs [distance, m, speed, m/s], linear in between."""
     fit: FitReport | None = None
-    """The points that the curve was fitted to; written by brachis."""
+    """Origin of the points; written by brachis."""
 
     @property
     def has_orientations(self) -> bool:
@@ -236,9 +236,9 @@ class SplineThrough(CheckedModel):
     """Expected start of the segment, all task coordinates: refused if more than 1e-4 m or rad away. With relative,
     waypoints are relative to this point."""
     starts_oriented: Attitude | None = None
-    """Expected orientation of the tool at the start, with orientations."""
+    """Expected orientation at the start, with orientations."""
     fit: FitReport | None = None
-    """Origin of the waypoints; written by brachis."""
+    """Origin of the points; written by brachis."""
     joints: JointOrder = None
 
     @property
