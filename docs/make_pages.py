@@ -40,7 +40,7 @@ GALLERY_HEAD = """\
 
 # Gallery
 
-Every example of the repository, with its end times, s. Every motion is verified. To run one, use `brachis plan
+Every example of the repository, with its end times. Every motion is verified. To run one, use `brachis plan
 examples/NAME.yaml` or `python examples/NAME.py`. `python docs/make_figures.py` makes the pictures and the times.
 """
 CARD = """\
@@ -62,7 +62,7 @@ BENCHMARKS_HEAD = """\
 # Benchmarks
 
 Each table is made from a file in `benchmarks/results`, which the script named above the table writes with `--save`.
-`pip install -e ".[benchmark]"` installs what the scripts need. Times are processor times:
+`pip install -e ".[benchmark]"` installs what the scripts need. Times are processor times of
 {measured}.
 
 ## How long a plan takes
@@ -110,7 +110,7 @@ def _card(name: str, t_end: dict[str, float]) -> str:
         title=title,
         picture=picture,
         about=_about(_files(name)),
-        times=", ".join(f"{value:.3f} ({key})" for key, value in t_end.items()),
+        times=", ".join(f"{value:.3f} s ({key})" for key, value in t_end.items()),
     )
 
 

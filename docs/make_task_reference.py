@@ -96,8 +96,8 @@ start: {joints: [!degrees 30, !degrees -120, 2.0944]}   # rad without a tag
 end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
 ```
 
-**Postures by name** stand at `start`, `end` and in lines, which end at the tool's place in the posture, and for poses
-with its orientation:
+**Postures by name** can be used for `start`, `end` and lines. A line ends at the tool's place in the posture, for
+poses with its orientation:
 
 ```yml
 postures: {home: [0.5, -2.1, 2.1]}                      # rad (m)
@@ -114,8 +114,8 @@ scaling; ends of position ranges within 1e6 rad or m of zero.
 Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they hold at both ends too. The
 torque rate includes the change of Coulomb friction; a larger `coulomb_velocity` makes it change slower.
 
-**What is in use** is printed by a plan, and stands in the saved motion and under `in_use` in the JSON. `brachis inspect
-task.yaml` shows it without a plan, and refuses what a plan refuses at once.
+**What is in use** is printed by a plan; it is also in the saved motion and, under `in_use`, in the JSON. `brachis
+inspect task.yaml` shows it without a plan, and refuses what a plan refuses at once.
 
 **`brachis.plan(robot, task)`** puts a `Robot` in place of the `urdf` key and adds the task's `robot` settings. A
 setting that contradicts the robot is an error.
@@ -212,8 +212,8 @@ Rows that depend on each other, or that no joint changes, are refused.
 
 **Frames.** The path may be in one of the `frames`, such as that of a workpiece: `path: {frame: workpiece, segments:
 [...]}`, or the key `path_frame`. Segments, files of points, directions, orientations and `path_start` are then in it;
-bodies of the scene and other frames stand in it with `frame: workpiece`. If the workpiece moves, one key changes; a
-sweep over `frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be
+bodies of the scene and other frames are placed in it with `frame: workpiece`. If the workpiece moves, one key changes;
+a sweep over `frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be
 rotated only within these. Results, plots and exports are in the world frame.
 
 ```yaml
@@ -236,7 +236,7 @@ TURN = """
 ### `turn: {...}`
 
 For poses: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as below. A turn can follow another one about
-the same axis, or about any axis with `profile: smooth`, but not stand next to a segment with a moving position.
+the same axis, or about any axis with `profile: smooth`. It cannot follow or precede a segment with a moving position.
 """
 ORIENTATION = """## `orientation`
 
@@ -305,7 +305,7 @@ they have the names of the joints (rad, m), without `units` and `tolerance`. For
 A column `feed` (or `f`, `speed`, `v`) gives the largest speed on the way to each point, linear between the first and
 the last point that has one, besides `tool_limits`; it needs a `tolerance`. Columns are separated by commas,
 semicolons, tabs or spaces. Decimal commas are read unless commas separate the columns. Units are part of the column
-names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or stand in `units`. brachis reports how it understood the file.
+names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or given by `units`. brachis reports how it understood the file.
 
 The segment starts at the first point, with `start: free` and without `path_start` the path too. A start more than
 1e-4 m or rad away from it is refused, unless `relative: true` moves the points there.

@@ -123,8 +123,8 @@ class Task(CheckedModel):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
-    """Posture at the start of the path: {joints: ...}, a name out of postures, or free. free needs path_start, unless
-    the path begins with a waypoint; a path of joints that does needs no start."""
+    """Posture at the start of the path: {joints: ...}, a name out of postures, or free, which needs path_start unless
+    the path begins with a waypoint. A path of joints that begins with one needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, rad). For a pose, or with axis: {position:
     [x, y, z], rpy_deg: [...]}, or another convention; of the position the rows of the task space count. Null: the
