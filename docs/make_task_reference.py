@@ -80,6 +80,8 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "bspline": (BSplineCurve,),
     "csv": (PointFile,),
 }
+BY_BRACHIS = "written by brachis."
+"""End of the descriptions of keys that no user writes."""
 FILES: dict[str, type[BaseModel]] = {"units": FileUnits, "tolerance": FitTolerance}
 INTRODUCTION = """# Task files
 
@@ -357,6 +359,8 @@ def rows(*models: type, above: set[str] | None = None) -> Iterator[str]:
         for name, field in model.__pydantic_fields__.items():
             text = field.description or describe_fields(model)[name]
             meaning = " ".join(text.split())
+            if meaning.endswith(BY_BRACHIS):
+                meaning = f"Of saved tasks; {BY_BRACHIS}"
             if field.is_required():
                 meaning = f"required. {meaning}"
             key = f"`{name}{_default(field)}`"
