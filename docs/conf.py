@@ -40,7 +40,8 @@ numpydoc_show_class_members = False
 
 html_math_renderer = "pictures"
 html_theme = "furo"
-html_title = "brachis"
+html_title = f"brachis {version}"
+html_logo = "_static/logo.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import ast
 import json
+import re
+from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from statistics import median
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "docs/figures/gallery.json"
@@ -36,17 +40,20 @@ GALLERY_HEAD = """\
 
 # Gallery
 
-Every example of the repository. Click a picture to see the example's source. To run one, use
-`brachis plan examples/NAME.yaml` or `python examples/NAME.py`. `python docs/make_figures.py` makes the pictures and the
-end times. Every motion shown is verified.
+Every example of the repository, with its end times. Every motion is verified. To run one, use `brachis plan
+examples/NAME.yaml` or `python examples/NAME.py`. `python docs/make_figures.py` makes the pictures and the times.
 """
 CARD = """\
-:::{{grid-item-card}} {title}
+:::{{grid-item-card}} {name}: {title}
 :img-top: figures/{picture}
-:class-img-top: thumbnail
-:link: example-{name}
-:link-type: ref
-{times}
+
+{about} {times}.
+:::
+"""
+SOURCE = """\
+:::{{dropdown}} {file}
+```{{literalinclude}} ../{file}
+```
 :::
 """
 BENCHMARKS_HEAD = """\
@@ -54,37 +61,57 @@ BENCHMARKS_HEAD = """\
 
 # Benchmarks
 
-Each table is made from a file in `benchmarks/results`, which the script named above it writes with `--save`. `pip
-install -e ".[benchmark]"` installs what the scripts need. Times are processor times on the machine that the file
-names, unless a table says otherwise; they do not compare between machines.
+Each table is made from a file in `benchmarks/results`, which the script named above the table writes with `--save`.
+`pip install -e ".[benchmark]"` installs what the scripts need. Times are processor times of
+{measured}.
 
 ## How long a plan takes
 
-```{include} ../README.md
-:start-after: <!-- timings -->
-:end-before: <!-- end of timings -->
-```
+`python3 tasks.py bench`, 20 intervals, after import, in a fast hour of a virtual machine; in a slow hour everything
+takes three times as long. Plans are refined and verified unless the row says otherwise. "Goal" is what we aim at:
+
+| what | planar arm (j1, j2, j3) | goal | TX90L on its rail | goal |
+|---|---|---|---|---|
+| one plan, neither refined nor verified | 22, 23, 41 ms | 40 ms | 54 ms | |
+| one plan, `effort: single` | 108, 122, 130 ms | 80 ms | 162 ms | 150 ms |
+| one plan, `effort: fast`, four guesses | 199, 179, 354 ms | | 309 ms | |
+| `redundant_joints: auto`, `effort: fast` | 390 ms | 3 s | 420 ms | |
+| rows at 61 collocation points | 0.14 ms | | 0.21 ms | |
+| their whole Jacobian | 0.15 ms | | 0.20 ms | 2.5 ms |
+| closed form, all 8 branches, per pose of a batch of 2000 | | | 0.8 to 1.3 us | 5 us |
+| the same by EAIK | | | 17 us | 15 us |
+"""
+BENCHMARKS_REST = """\
+## All other results
+
+| file in `benchmarks/results` | what it measures | script |
+|---|---|---|
 """
 
 
 def gallery() -> str:
-    """Return the gallery: a thumbnail of every example, then title, picture, end times and source of each."""
+    """Return the gallery: a card with picture, description and end times for every example, then all sources."""
     recorded = json.loads(GALLERY.read_text())
     names = [name for name in PICTURES if name in recorded]
     cards = "\n".join(_card(name, recorded[name]) for name in names)
-    grid = f"::::{{grid}} 1 2 3 3\n:gutter: 2\n\n{cards}::::\n"
-    return "\n".join(
-        [GALLERY_HEAD, grid, *(_example(name, recorded[name]) for name in names)]
-    )
+    grid = f"::::{{grid}} 1 2 2 2\n:gutter: 2\n\n{cards}::::\n"
+    sources = [
+        SOURCE.format(file=path.relative_to(ROOT))
+        for name in names
+        for path in _files(name)
+    ]
+    return "\n".join([GALLERY_HEAD, grid, "## Sources\n", *sources])
 
 
 def _card(name: str, t_end: dict[str, float]) -> str:
-    values = [f"{value:.3f}" for value in t_end.values()]
-    times = (
-        f"{values[0]} s" if len(values) == 1 else f"{min(values)} to {max(values)} s"
-    )
     picture, title = PICTURES[name]
-    return CARD.format(title=title, picture=picture, name=name, times=times)
+    return CARD.format(
+        name=name,
+        title=title,
+        picture=picture,
+        about=_about(_files(name)),
+        times=", ".join(f"{value:.3f} s ({key})" for key, value in t_end.items()),
+    )
 
 
 def _files(name: str) -> list[Path]:
@@ -97,22 +124,6 @@ def _files(name: str) -> list[Path]:
     return sorted(
         path for pattern in patterns for path in (ROOT / "examples").glob(pattern)
     )
-
-
-def _example(name: str, t_end: dict[str, float]) -> str:
-    files = _files(name)
-    picture, title = PICTURES[name]
-    times = ", ".join(f"{value:.4f} s ({key})" for key, value in t_end.items())
-    parts = [
-        f"(example-{name})=\n## {title}\n",
-        f"{_about(files)}\n",
-        f"![{title}](figures/{picture})\n",
-        f"End time: {times}.\n",
-    ]
-    for path in files:
-        parts.append(f":::{{dropdown}} {path.relative_to(ROOT)}")
-        parts.append(f"```{{literalinclude}} ../{path.relative_to(ROOT)}\n```\n:::\n")
-    return "\n".join(parts)
 
 
 def _about(files: list[Path]) -> str:
@@ -130,31 +141,175 @@ def _about(files: list[Path]) -> str:
     return " ".join(comment[:2])
 
 
+Table = tuple[list[str], list[list[str]]]
+"""Columns and rows."""
+
+
+def _all_rows(result: dict[str, Any]) -> Table:
+    return result["columns"], result["rows"]
+
+
+def _lines_of_work(result: dict[str, Any]) -> Table:
+    """Return the lines that stand for all tasks of a kind."""
+    return result["columns"], [row for row in result["rows"] if ": " not in row[0]]
+
+
+def _number(text: str) -> float:
+    return float(text.split(maxsplit=1)[0].rstrip("%"))
+
+
+def _by_arm(result: dict[str, Any]) -> Table:
+    """Return, for each arm, how many lines there are, the worst gaps and the median time."""
+    arms = defaultdict(list)
+    for task, _, _, *gaps, _, time in result["rows"]:
+        arm = task.split(": ")[1].split(",")[0]
+        arms[arm].append([*map(_number, gaps), _number(time)])
+    columns = ["arm", "lines", *result["columns"][3:6], "processor time, median"]
+    rows = []
+    for arm, values in arms.items():
+        *gaps, times = zip(*values, strict=True)
+        worst = [f"{max(gap):+.4f} %" for gap in gaps]
+        rows.append([arm, str(len(values)), *worst, f"{median(times):.2f} s"])
+    return columns, rows
+
+
+def _worst_slides(result: dict[str, Any]) -> Table:
+    """Return, for each velocity limit, the row with the largest excess over the least time."""
+    worst: dict[str, list[str]] = {}
+    for row in result["rows"]:
+        limit, excess = row[0], _number(row[4])
+        if limit not in worst or excess > _number(worst[limit][4]):
+            worst[limit] = row
+    return result["columns"][:5], [row[:5] for row in worst.values()]
+
+
+def _by_robot(result: dict[str, Any]) -> Table:
+    """Return, for each robot at given speeds, the largest deviations and the longest time; squares as they are."""
+    groups: dict[str, list[list[str]]] = defaultdict(list)
+    for row in result["rows"]:
+        name = row[0] if "square" in row[0] else re.split("[,:] ", row[0])[0]
+        groups[NAMES_OF_GROUPS.get(name, name)].append(row)
+    rows = []
+    for name, cases in groups.items():
+        _, _, beside, off, times, verified = zip(*cases, strict=True)
+        texts = [re.split(" above|, ", text)[0] for text in beside if "%" in text]
+        offs = [float(text) for text in off if text]
+        rows.append(
+            [
+                name,
+                f"{verified.count('yes')} of {len(cases)}",
+                max(texts, key=_number, default=""),
+                f"{max(offs):.0e}" if offs else "",
+                max((text.split(", ")[-1] for text in times), key=_number),
+            ]
+        )
+    columns = [
+        "robot or path",
+        "verified",
+        "end time beside the least, by hand",
+        "most off the speed",
+        "longest processor time",
+    ]
+    return columns, rows
+
+
+NAMES_OF_GROUPS = {
+    "TX90L": "TX90L, rail locked",
+    "refused": "speed refused, planned at the speed that the error names",
+}
+
+
+def _by_range(result: dict[str, Any]) -> Table:
+    """Return, for each kind of range, what it gains."""
+    kinds = defaultdict(list)
+    for row in result["rows"]:
+        ((rows_of, ranges),) = ast.literal_eval(row[1]).items()
+        ((kind, value),) = ranges.items()
+        unit = "m" if rows_of == "position" else "deg"
+        kinds[f"`{kind}: {value}` {unit}"].append(_number(row[4]))
+    rows = [
+        [kind, str(len(gains)), f"{median(gains):.1f} %", f"{max(gains):.1f} %"]
+        for kind, gains in kinds.items()
+    ]
+    return ["range", "tasks", "gain, median", "largest"], rows
+
+
+class Shown(NamedTuple):
+    """What the page shows of a result."""
+
+    title: str
+    table: Callable[[dict[str, Any]], Table] = _all_rows
+    about: str | None = None
+    """In place of the result's own words."""
+
+
+SHOWN = {
+    "work": Shown("Kinds of tasks", _lines_of_work),
+    "growth_plans": Shown(
+        "More intervals",
+        about="The TX90L on its rail, `effort: single`, refined and verified, with N intervals.",
+    ),
+    "peers": Shown("Other solvers"),
+    "joint_paths": Shown("Joint paths: toppra"),
+    "jerk_paths": Shown(
+        "Joint paths with limited jerk: copp-py",
+        about="Random paths of the KUKA iiwa 14, also with limits on velocity, acceleration and torque.",
+    ),
+    "slides": Shown("Slides whose least time is known", _worst_slides),
+    "strong_drives": Shown("Strong drives and slow joints", _by_arm),
+    "laws": Shown(
+        "An easier task is not slower",
+        lambda result: (result["columns"][:3], [row[:3] for row in result["rows"]]),
+    ),
+    "phases": Shown(
+        "Stops and process speeds",
+        _by_robot,
+        "0.02 to 1 m/s on a part of the path; stops at the corners of a square. The speed is checked by central "
+        "differences of the tool's positions along the saved motion.",
+    ),
+    "tolerances": Shown(
+        "What tolerances gain",
+        _by_range,
+        "The same random tasks planned without and with a range for the tool.",
+    ),
+    "sensitivities": Shown("What limits cost, and solving again"),
+}
+"""The results that are shown, in the order of the page."""
+
+
 def benchmarks() -> str:
-    """Return the page of all committed results."""
+    """Return the page of committed results: some as tables, the others as a list of files."""
+    results = {
+        path.stem: json.loads(path.read_text())
+        for path in sorted(RESULTS.glob("*.json"))
+    }
+    machines = {
+        f"brachis {each['version']} on {each['machine']}" for each in results.values()
+    }
+    measured = "; ".join(sorted(machines))
+    tables = [_benchmark(results[name], shown) for name, shown in SHOWN.items()]
+    rest = "".join(
+        _line(name, result) for name, result in results.items() if name not in SHOWN
+    )
     return "\n".join(
-        [
-            BENCHMARKS_HEAD,
-            *(
-                _benchmark(json.loads(path.read_text()))
-                for path in sorted(RESULTS.glob("*.json"))
-            ),
-        ]
+        [BENCHMARKS_HEAD.format(measured=measured), *tables, BENCHMARKS_REST + rest]
     )
 
 
-def _benchmark(result: dict[str, Any]) -> str:
-    lines = [
-        f"## {result['title']}\n",
-        f"`{result['command']}`, brachis {result['version']}, {result['machine']}.\n",
-    ]
-    lines += [f"{result['about']}\n"] if result["about"] else []
-    lines += [
-        f"| {' | '.join(result['columns'])} |",
-        "|---" * len(result["columns"]) + "|",
-    ]
-    lines += [f"| {' | '.join(row)} |" for row in result["rows"]]
+def _benchmark(result: dict[str, Any], shown: Shown) -> str:
+    columns, rows = shown.table(result)
+    about = shown.about or result["about"]
+    lines = [f"## {shown.title}\n", f"`{result['command']}`. {about}\n"]
+    lines += [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    lines += [f"| {' | '.join(row)} |" for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def _line(name: str, result: dict[str, Any]) -> str:
+    """Return the line of a file, with the sentences that count what was verified."""
+    found = re.findall(r"(?:^|(?<=\. ))\d+ of \d+ .*?\.(?= |$)", result["about"])
+    about = ". ".join([result["title"], *found])
+    return f"| `{name}` | {about} | `{result['command'].removeprefix('python ')}` |\n"
 
 
 def write_gallery() -> None:

@@ -36,6 +36,14 @@ def test_generated_pages_are_up_to_date(pages):
     )
 
 
+def test_every_result_is_shown_or_listed(pages):
+    results = {path.stem: path for path in (ROOT / "benchmarks/results").glob("*.json")}
+    page = pages.benchmarks()
+    assert set(pages.SHOWN) < set(results)
+    for name in set(results) - set(pages.SHOWN):
+        assert f"| `{name}` |" in page
+
+
 def test_every_example_has_its_picture(pages):
     numbers = {path.name.split("_")[0] for path in (ROOT / "examples").glob("[0-9]*")}
     plugins = {path.name for path in (ROOT / "examples").glob("*_plugin")}
@@ -79,14 +87,25 @@ def test_links_to_files_lead_somewhere():
             )
 
 
-def test_parts_of_the_readme_that_pages_include():
-    site = "".join(page.read_text() for page in DOCS.rglob("*.md"))
-    parts = set(re.findall(r":start-after: (<!-- .* -->)", site))
-    assert len(parts) >= 4
-    for begin in parts:
-        assert README.index(begin) < README.index(
-            begin.replace("<!-- ", "<!-- end of ")
-        )
+def test_every_page_stands_behind_one_of_four_doors():
+    toctrees = re.findall(
+        r"```{toctree}\n(.*?)```", (DOCS / "index.md").read_text(), re.DOTALL
+    )
+    assert len(toctrees) == 4
+    entries = " ".join(tree.partition("\n\n")[2] for tree in toctrees).split()
+    pages = {page.stem for page in DOCS.glob("*.md")} - {"index"}
+    assert sorted(entries) == sorted(pages)
+
+
+WORDS = {"README.md": 1300, "docs": 34_900, "CHANGELOG.md": 500}
+"""Words of the pages, no more."""
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_pages_stay_short(name):
+    pages = [ROOT / name] if name.endswith(".md") else (ROOT / name).rglob("*.md")
+    words = sum(len(page.read_text().split()) for page in pages)
+    assert words <= WORDS[name], f"{name} has {words} words; shorten it elsewhere"
 
 
 def test_citation_is_that_of_this_version():

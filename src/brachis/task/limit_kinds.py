@@ -118,7 +118,7 @@ _ROWS = (
     LimitKind(
         "torque",
         _TORQUE,
-        "Largest torque, N m (force, N); for a joint also a pair [lower, upper]. Absent: URDF. Null: none.",
+        "Largest torque, N m (force, N).",
         form="pair",
         scale="torque and force limits and torque-speed curves",
         urdf="effort",
@@ -128,7 +128,7 @@ _ROWS = (
     LimitKind(
         "velocity",
         {"rad": "rad/s", "m": "m/s"},
-        "Largest speed, rad/s (m/s); for a joint also a pair [lower, upper]. Absent: URDF. Null: none.",
+        "Largest speed, rad/s (m/s).",
         form="pair",
         scale="velocity limits",
         urdf="velocity",
@@ -144,7 +144,7 @@ _ROWS = (
     LimitKind(
         "acceleration",
         {"rad": "rad/s^2", "m": "m/s^2"},
-        "Largest acceleration, rad/s^2 (m/s^2). Null: none.",
+        "Largest acceleration, rad/s^2 (m/s^2).",
         scale="acceleration limits",
         # Wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2.
         usual=UsualLimit(
@@ -154,21 +154,20 @@ _ROWS = (
     LimitKind(
         "position",
         {"rad": "rad", "m": "m"},
-        "Range [low, high], rad (m); null stands for an open end. Absent: URDF. Null: none.",
+        "Range [low, high], rad (m); null stands for an open end.",
         form="range",
     ),
     LimitKind(
         "power",
         {"rad": "W", "m": "W"},
-        "Largest mechanical power (torque x speed), drawn or returned, W. Null: none.",
+        "Largest mechanical power (torque x speed), drawn or returned, W.",
         scale="power limits, also total_power",
         needs_masses=True,
     ),
     LimitKind(
         "rms_torque",
         _TORQUE,
-        "Largest root mean square of the torque over the whole motion, N m (force, N); it determines the heat in a "
-        "motor. Null: none.",
+        "Largest root mean square of the torque over the motion, N m (force, N), for the heat in a motor.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
         needs_masses=True,
@@ -176,13 +175,13 @@ _ROWS = (
     LimitKind(
         "jerk",
         {"rad": "rad/s^3", "m": "m/s^3"},
-        "Largest jerk, rad/s^3 (m/s^3). Null: none.",
+        "Largest jerk, rad/s^3 (m/s^3).",
         scale="jerk limits",
     ),
     LimitKind(
         "torque_rate",
         {"rad": "Nm/s", "m": "N/s"},
-        "Largest rate of change of the torque, N m/s (force, N/s). Null: none.",
+        "Largest rate of change of the torque, N m/s (force, N/s).",
         scale="limits of torque rates",
         needs_masses=True,
     ),

@@ -141,11 +141,11 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
     total_power: AnyPositive | None = None
-    """Largest sum of the powers of all joints, drawn or returned, W. Null: none."""
+    """Largest sum of all joints' powers, drawn or returned, W."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
-    N). The first speed is 0, and no torque is above the one before. The limit is linear between points; the last slope
-    continues to zero torque. It holds in both directions, for driving and braking. Null: none."""
+    N), the first at speed 0, torques never rising. Linear in between; the last slope continues to zero torque. It
+    holds in both directions, for driving and braking."""
 
     __pydantic_config__ = Model.model_config
 
@@ -223,7 +223,7 @@ class SpeedTable(CheckedModel):
     """
 
     s: Annotated[_PathCoordinates, Field(min_length=1)]
-    """Path coordinates from 0 to 1, ascending. A value given twice is a step."""
+    """Ascending path coordinates, 0 to 1. A value given twice is a step."""
     speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
     """Largest speed at each path coordinate, m/s."""
 
@@ -272,14 +272,13 @@ class ProcessSpeed(Model):
             "[begin, end] with begin < end",
         ),
     ]
-    """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
-    allow. At stops, and at ends of the path that are not passed at this speed, the part is shorter by what the tool
-    moves in 0.1 s at the higher speed. There the tool does not exceed this speed, unless it comes from or goes on at a
-    higher one."""
+    """[begin, end]: path coordinates between which the speed is held. At stops, and at ends of the path that are not
+    passed at this speed, the part is shorter by what the tool moves in 0.1 s at the higher speed. There the tool does
+    not exceed this speed, unless it comes from or goes on at a higher one."""
     segment: Count | None = None
-    """Index of the segment whose speed this is; written by brachis."""
+    """Index of the speed's segment; written by brachis."""
     within: tuple[Number, Number] | None = None
-    """[begin, end]: path coordinates between which the tool does not exceed the speed; written by brachis."""
+    """[begin, end] between which the tool does not exceed the speed; written by brachis."""
 
     @property
     def leads(self) -> list[SpeedTable]:
@@ -303,19 +302,18 @@ class ToolLimits(CheckedModel):
         Speed | SpeedTable | None,
         ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = None
-    """Largest speed, m/s: one number, or a table over the path {s: [...], speed: [...]}. Null: none."""
+    """Largest speed, m/s: a number, or a table over the path {s: [...], speed: [...]}."""
     feed: tuple[SpeedTable, ...] = ()
-    """Tables of largest speeds over parts of the path; outside these parts they limit nothing. brachis writes them from
-    the feed rates of the path's points."""
+    """Tables of largest speeds over parts of the path; written by brachis from feed rates."""
     acceleration: Speed | None = None
-    """Largest acceleration, m/s^2. Null: none."""
+    """Largest acceleration, m/s^2."""
     angular_speed: Speed | None = None
-    """Largest angular speed of the tool, rad/s; its free roll does not count. Null: none."""
+    """Largest angular speed of the tool, rad/s, without its free roll."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()
-    """Parts of the path with a constant speed: {speed, s}, or a list of these in order. Between two parts
-    there must be a gap in which the speed can change."""
+    """Parts of the path with a constant speed: {speed, s}, or a list of these in order, with gaps in which the speed
+    can change."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for number, (before, part) in enumerate(

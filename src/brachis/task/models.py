@@ -123,35 +123,31 @@ class Task(CheckedModel):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
-    """Configuration at the start of the path: {joints: ...}, a name out of postures, or free. With free, path_start is
-    required unless the path begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
+    """Posture at the start of the path: {joints: ...}, a name out of postures, or free, which needs path_start unless
+    the path begins with a waypoint. A path of joints that begins with one needs no start."""
     path_start: PathStart = None
-    """Point at which the path begins: a list of all task coordinates (m, angles in rad). For a pose, or with axis:
-    {position: [x, y, z], rpy_deg: [...]}, or another orientation convention; of the position the rows of the task space
-    count. Null: the tool's place in the start posture, or the first waypoint. It must agree with a given start posture.
-    """
+    """Point at which the path begins: a list of all task coordinates (m, rad). For a pose, or with axis: {position:
+    [x, y, z], rpy_deg: [...]}, or another convention; of the position the rows of the task space count. Null: the
+    tool's place in the start posture, with which a given point must agree, or the first waypoint."""
     end: FreePosture = "free"
-    """Configuration at the end of the path: free, {joints: ...} or a name out of postures. Its tool must be at the
-    path's end, to 1e-6 m or rad; the nearest posture on the path is then used."""
+    """Posture at the end, as start. Its tool must be at the path's end, to 1e-6 m or rad; the nearest posture on the
+    path is used."""
     task_space: TaskSpace
     """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
-    joints, or a list of coordinates out of x, y, z. Behind these may be yaw, pitch or roll, rad: the angle about the
-    world's z, y or x axis of a tool that turns about no other axis; or axis, the direction of the tool's z axis. A path
-    of joints gives all joint positions (rad, m) in chain order, and only its timing is planned."""
+    axis, joints (all joint positions; only the timing is planned), or a list of rows: some of x, y, z, then one of yaw,
+    pitch, roll (angle about the world's z, y or x axis, rad) or axis (direction of the tool's z axis)."""
     path: Segments
-    """Segments of the path, in order. A list of points, each with all task coordinates, is the spline through them from
-    the first one on. For a file of points: [{csv: {file: ...}}]. For another frame: {frame: NAME, segments: [...]}."""
+    """Segments in order; or {frame: NAME, segments: [...]}; or a list of points, each with all task coordinates: the
+    spline through them."""
     frames: dict[Name, FramePlacement] = Field(default={})
-    """Places of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...} in the world, or in another one
-    with frame: NAME."""
+    """Places of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
         dict[Name, JointValues],
         must(lambda named: "free" not in named, "free names no posture", "other names"),
     ] = Field(default={})
-    """Postures by name, for start, end and line: {to_posture: NAME}: joint positions, rad (m), in the order of the
-    chain or by joint name."""
+    """Joint positions by name, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None
-    """Name of the frame of path and path_start, with all their points, directions and orientations. Null: the world."""
+    """Name of the frame of path and path_start. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -164,22 +160,20 @@ class Task(CheckedModel):
         ),
         AfterValidator(name_bodies),
     ] = ()
-    """Bodies around the robot and on it, which it keeps clear of; or {file: cell.yaml} (see docs/my_cell.md)."""
+    """Bodies around the robot and on it, or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
-    """The clearance, which pairs of bodies keep it, and whether it is a limit of the plan."""
+    """Clearance, and which pairs of bodies keep it."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
-    """Ranges within which the tool may leave the path's orientation and position."""
+    """Ranges within which the tool may leave the path."""
     margins: Margins = Field(default_factory=Margins)
     """Margins from singular postures and from the ends of joint ranges."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
-    """Joints that are free along the path. auto plans in charts; closed forms are tried as coordinates only while no
-    motion is verified. With pose_free_roll the robot has one more joint, tool_roll, which rolls the tool; the list may
-    leave it out."""
+    """Joints whose motion is optimised. auto plans in charts, and tries closed forms while no motion is verified. With
+    pose_free_roll there is one more joint, tool_roll, which the list may leave out."""
     branch: Name = "auto"
-    """Label of the branch of the closed form. auto: the branch of the start posture, or all branches with start: free.
-    """
+    """Label of the branch of the closed form. auto: that of the start posture, or all with start: free."""
     search: SearchSettings = Field(default_factory=SearchSettings)
     """Search for the fastest motion."""
     spline: SplineSettings = Field(default_factory=SplineSettings)
@@ -194,8 +188,8 @@ class Task(CheckedModel):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: all implausible figures are errors. false: all are warnings. null: only a start posture, or one by
-    name, that looks like degrees is an error."""
+    """true: implausible figures are errors. false: they are warnings. null: only a start posture, or one by name, that
+    looks like degrees is an error."""
 
     @model_validator(mode="before")
     @classmethod

@@ -42,8 +42,7 @@ Direction = Annotated[
 Profile = Annotated[
     Literal["uniform", "smooth"],
     Field(
-        description="Rate of the angle along the segment. uniform: constant. smooth: zero at both ends, so that "
-        "segments with a fixed orientation can follow."
+        description="Rate of the angle along the segment. uniform: constant. smooth: zero at both ends."
     ),
 ]
 
@@ -175,9 +174,9 @@ class Rotation(Model):
     """A rotation about an axis."""
 
     axis: Direction
-    """Axis of the rotation, right-hand rule; any length except zero."""
+    """Axis of the rotation, right-hand rule, of any length."""
     angle_deg: Number
-    """Angle of the rotation with its sign, degrees. It may be more than 360."""
+    """Angle, degrees; also negative, or more than 360."""
     frame: Literal["path", "tool"] = "path"
     """Frame of the axis: path (the world, or path_frame) or tool."""
     profile: Profile = "uniform"
@@ -187,8 +186,7 @@ class Tangent(Model):
     """Turning with the tangent."""
 
     up: Direction | None = None
-    """Direction in the path's frame that stays up for the tool. It must not be parallel to the tangent. Null: the axis
-    of an arc or circle; z for other segments."""
+    """Direction in the path's frame that stays up for the tool. Null: the axis of an arc or circle, else z."""
 
 
 class Rotate(Model):

@@ -39,12 +39,12 @@ class FileUnits(Model):
     """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
 
     length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
-    """Unit of positions. Null: the header's unit, or m."""
+    """Of positions. Null: the header's unit, or m."""
     angle: Literal["rad", "mrad", "deg"] | None = None
-    """Unit of yaw and orientations. Null: the header's unit, or rad. Roll, pitch and yaw, and the angles of KUKA,
-    Staubli and Fanuc, have no default: state their unit."""
+    """Of yaw and orientations. Null: the header's unit, or rad; required for roll, pitch, yaw and angles of KUKA,
+    Staubli and Fanuc."""
     speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = None
-    """Unit of feed rates. Null: the header's unit, which is then required."""
+    """Of feed rates. Null: the header's unit, which is then required."""
 
 
 class FitTolerance(Model):
@@ -53,9 +53,9 @@ class FitTolerance(Model):
     position: Length
     """Largest distance of a point from the path."""
     orientation: Angle = ANGLES["deg"] / 10.0
-    """Largest angle between a given orientation or yaw and the path's; 0.1 deg by default."""
+    """Largest angle between a given orientation or yaw and the path's; by default 0.1 deg."""
     corner: Length | None = None
-    """Largest distance of a point from the path at a rounded corner. Null: as `position`."""
+    """The same at a rounded corner. Null: as position."""
 
     @property
     def at_corners(self) -> float:
@@ -70,24 +70,22 @@ class PointFile(Model):
     """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
 
     file: Name
-    """CSV or G-code file (.nc, .ngc, .gcode, .tap), relative to the task file's folder. The segment starts at the first
-    point of the file."""
+    """CSV or G-code file (.nc, .ngc, .gcode, .tap)."""
     relative: Flag = False
-    """Whether points are relative to the first one, so that the segment may start anywhere. Displacements are along the
-    axes of the path's frame, rotations are in the tool frame."""
+    """Whether points are moved so that the first one is at the segment's start, as in a spline."""
     orientation: OrientationWord | None = Field(
         default=None,
-        description="Convention of the orientation columns, for poses, if their names do not define it: "
+        description="Convention of the orientation columns, if their names do not define it: "
         f"{', '.join(CONVENTIONS)}.",
     )
     units: FileUnits = Field(default_factory=FileUnits)
     """Units of the numbers in the file."""
     tolerance: FitTolerance | None = None
-    """Largest distances of the points from the path, for example {position: 0.1 mm, orientation: 0.5 deg}. The path is
-    then a fit with few knots, suitable for many or noisy points. Null: the path passes through all points."""
+    """Largest distances of the points from the path: {position: 0.1 mm, orientation: 0.5 deg}. Null: the path passes
+    through all points."""
     corner: CornerMode = "blend"
-    """What happens to corners. stop: the tool stops there. blend: they are rounded within the tolerance. refuse: they
-    are listed in an error. Without a tolerance only stop finds corners."""
+    """What happens at corners. blend: they are rounded within the tolerance. stop: the tool stops. refuse: an error
+    lists them. Without a tolerance only stop finds corners."""
 
 
 class FoundCorner(Model):

@@ -53,32 +53,32 @@ class SceneBody(CheckedModel):
     """A body that the robot keeps clear of, fixed to the world or to one of the robot's links; it has one shape."""
 
     name: Name | None = None
-    """Name, unique. Null: its shape and its number in the scene."""
+    """Unique name. Null: its shape and its number."""
     box: tuple[Positive, Positive, Positive] | None = None
     """Lengths along x, y and z, m."""
     sphere: Positive | None = None
     """Radius, m."""
     cylinder: Round | None = None
-    """Cylinder: {radius: m, length: m}."""
+    """Cylinder about z, its middle at the origin: {radius: ..., length: ...}, m."""
     capsule: Round | None = None
-    """Cylinder with round caps: {radius: m, length: m}."""
+    """The same with round caps, which the length leaves out."""
     half_space: HalfSpaceShape | None = None
-    """All that is behind a plane: {normal: [x, y, z], offset: m}."""
+    """All behind a plane: {normal: [x, y, z], offset: 0}; the normal points out, the offset is the distance from the
+    origin along it, m."""
     mesh: Name | None = None
-    """Mesh file, relative to the task file; its convex hull is used."""
+    """Mesh file, of which the convex hull is used."""
     urdf: Name | None = None
-    """URDF file of a cell without moving joints, relative to the task file; its collision geometry is used."""
+    """URDF file of a cell without moving joints, of which the collision geometry is used."""
     scale: Positive = 1.0
     """Factor from the mesh's unit to m."""
     link: Name | None = None
     """Link of the robot that carries it. Null: it is fixed to the world."""
     frame: Name | None = None
-    """Name of the frame, out of frames, in which it is placed, with all of its points and directions. Null: the world.
-    """
+    """Name of the frame in which it is placed, out of frames. Null: the world."""
     position: Vector3 = (0.0, 0.0, 0.0)
-    """Position of its origin in the world, in its frame, or in the link's frame, m."""
+    """Position of its origin in the world, its frame or its link, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw, degrees, as in a URDF."""
+    """Roll, pitch, yaw, degrees."""
 
     @property
     def shape(self) -> str:
@@ -133,18 +133,18 @@ class CollisionSettings(Model):
     clearance: NonNegative = 0.01
     """Least distance between bodies, m."""
     mode: Literal["auto", "avoid", "check", "off"] = "auto"
-    """avoid: distances are a limit of the plan, also those of the robot's own links without a scene. check: only the
-    verification looks at them. off: nothing is checked. auto: avoid if there is a scene, otherwise off."""
+    """avoid: distances are a limit of the plan, also between the robot's links without a scene. check: only the
+    verification looks at them. off: nobody does. auto: avoid with a scene, else off."""
     self_collision: Flag = True
     """Whether the robot also keeps clear of itself."""
     disable: tuple[tuple[Name, Name], ...] = ()
-    """Pairs of links, or names of bodies, that may touch."""
+    """Pairs of links or bodies that may touch."""
     srdf: Name | None = None
-    """SRDF file, relative to the task file, whose disabled pairs may touch too."""
+    """SRDF file whose disabled pairs may touch too."""
     padding: dict[Name, NonNegative] = Field(default={})
-    """By how much the bodies of a link are larger than the URDF says, by link, m."""
+    """Margin added to the bodies of a link, by link, m."""
     capsules: Literal["none", "auto"] = "none"
-    """auto: a robot without collision geometry gets capsules along its links."""
+    """auto: capsules along the links of a robot without collision geometry."""
 
 
 def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:

@@ -62,19 +62,18 @@ class BSplineCurve(CheckedModel):
     degree: Annotated[Count, Field(ge=SMOOTHNESS + 1, le=15)] = 5
     """Degree of the spline."""
     knots: Vector
-    """Knots in ascending order: the first and the last one degree + 1 times, others up to degree - 3 times. Lengths of
-    blends and speeds are in m only if the knots are in m along the curve."""
+    """Ascending knots: the first and last one degree + 1 times, others up to degree - 3 times. Blends and speeds are in
+    m only if the knots are in m along the curve."""
     control_points: Annotated[tuple[Vector, ...], Field(min_length=SMOOTHNESS + 2)]
-    """Control points with all task coordinates (m, angles in rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the
-    curve of quaternions is divided by its length."""
+    """Points with all task coordinates (m, rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the curve of
+    quaternions is divided by its length."""
     relative: Flag = False
-    """Whether the curve is moved to the segment's start, wherever that is, as with csv."""
+    """Whether the curve is moved to the segment's start."""
     joints: JointOrder = None
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = ()
-    """Tables of the prescribed tool speed along the curve: pairs [distance along the curve in m, speed in m/s], linear
-    in between. Outside the tables no speed is prescribed."""
+    """Tables of the largest tool speed along parts of the curve: pairs [distance, m, speed, m/s], linear in between."""
     fit: FitReport | None = None
-    """The points that the curve was fitted to; written by brachis."""
+    """Origin of the points; written by brachis."""
 
     @property
     def has_orientations(self) -> bool:
@@ -123,13 +122,13 @@ class BSplineCurve(CheckedModel):
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw, pitch or roll along the segment, where a row: fixed, or turning with the tangent."
+        description="Yaw, pitch or roll along the segment, if it is a row: fixed, or tangent (turning with it)."
     ),
 ]
 Normal = Annotated[
     Direction | None,
     Field(
-        description="Axis of rotation, right-hand rule, for three position coordinates; any length except zero."
+        description="Axis of rotation, right-hand rule, of any length; with x, y and z."
     ),
 ]
 Centre = Annotated[
@@ -186,7 +185,7 @@ class ArcCenter(Model):
 
     center: Centre
     angle_deg: Number
-    """Swept angle, degrees. Positive: about the normal, or from the first towards the second position coordinate."""
+    """Swept angle, degrees; positive about the normal, or from the first towards the second position coordinate."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -195,7 +194,7 @@ class ArcVia(Model):
     """A circular arc through a point to another one."""
 
     via: Vector
-    """A point between start and end, m: the position coordinates alone."""
+    """Point in between, m: the position coordinates alone."""
     to: Vector
     """End point, m: the position coordinates alone."""
     yaw: Yaw = "fixed"
@@ -206,7 +205,7 @@ class CircleTurns(Model):
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, not zero; its sign is as for the angle of an arc."""
+    """Number of turns, not zero; its sign as that of an arc's angle."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -218,9 +217,9 @@ class HelixTurns(Model):
     turns: Turns = 1.0
     """Number of turns, not zero; positive about the normal."""
     pitch: Number
-    """Rise of each turn along the normal, m; negative against it."""
+    """Rise of each turn along the normal, m."""
     normal: Direction = (0.0, 0.0, 1.0)
-    """Axis of rotation, right-hand rule; any length except zero."""
+    """Axis of rotation, right-hand rule, of any length."""
 
 
 class SplineThrough(CheckedModel):
@@ -229,17 +228,17 @@ class SplineThrough(CheckedModel):
     through: NonEmpty[Coordinates]
     """Waypoints, each with all task coordinates (m, angles in rad)."""
     orientations: tuple[Attitude, ...] | None = None
-    """Orientation of the tool at each waypoint, for poses. Null: the segment's `orientation` counts."""
+    """Orientation of the tool at each waypoint, for poses. Null: the segment's orientation counts."""
     relative: Flag = False
-    """Whether waypoints are relative to the segment's start. Displacements are along the axes of the path's frame,
-    rotations are in the tool frame."""
+    """Whether waypoints are relative to the segment's start. Displacements are in the path's frame, rotations in the
+    tool frame."""
     starts_at: Vector | None = None
-    """Expected start of the segment: all task coordinates. A start more than 1e-4 m or rad away is refused. With
-    `relative`, waypoints are relative to this point."""
+    """Expected start of the segment, all task coordinates: refused if more than 1e-4 m or rad away. With relative,
+    waypoints are relative to this point."""
     starts_oriented: Attitude | None = None
-    """Expected orientation of the tool at the start; only with `orientations`."""
+    """Expected orientation at the start, with orientations."""
     fit: FitReport | None = None
-    """Origin of the waypoints; written by brachis."""
+    """Origin of the points; written by brachis."""
     joints: JointOrder = None
 
     @property
@@ -297,13 +296,11 @@ class SegmentModel(CheckedModel):
     """What all segments share."""
 
     blend: Positive | None = None
-    """Rounds the corner at the END of this segment: the length, m, that is cut from this segment and from the next one.
-    """
+    """Rounds the corner at the END of the segment: length cut from it and from the next one, m."""
     stop: Flag = False
-    """Whether the tool stops at the end of this segment: all joints are at rest there, and the path may have a corner.
-    """
+    """Whether all joints are at rest at the end of the segment; the path may have a corner there."""
     dwell: NonNegative = 0.0
-    """Time for which the arm waits at the end of this segment, s; with it the tool stops there."""
+    """Time for which the arm stops at the end of the segment, s."""
 
     @model_validator(mode="before")
     @classmethod
@@ -367,10 +364,10 @@ class MovingSegment(SegmentModel):
 
     orientation: OrientationMode = None
     """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
-    Null: the `orientations` of a spline, or that of a posture, else fixed."""
+    Null: as a spline's orientations or the posture say, else fixed."""
     speed: Positive | None = None
-    """Process speed: constant speed of the tool along the segment, m/s; see tool_limits.process_speed. Blends beside it
-    are free. It replaces feed rates of points. Null: none."""
+    """Process speed: constant speed of the tool along the segment but its blends, m/s, as tool_limits.process_speed. It
+    replaces feed rates of points."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()

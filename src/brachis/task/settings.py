@@ -39,7 +39,7 @@ class Placement(Model):
     xyz: Vector3 = (0.0, 0.0, 0.0)
     """Position of the origin, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw, degrees, as in a URDF: about the fixed x, then y, then z axis."""
+    """Roll, pitch, yaw about the fixed x, then y, then z axis, degrees, as in a URDF."""
 
     @model_validator(mode="before")
     @classmethod
@@ -116,11 +116,11 @@ class InertiaMatrix(Model):
     izz: NonNegative
     """Moment of inertia, kg m^2."""
     ixy: Number = 0.0
-    """Product of inertia, kg m^2, with the sign as in a URDF."""
+    """Product of inertia, kg m^2, signs as in a URDF."""
     ixz: Number = 0.0
-    """Product of inertia, kg m^2."""
+    """Product of inertia, kg m^2, signs as in a URDF."""
     iyz: Number = 0.0
-    """Product of inertia, kg m^2."""
+    """Product of inertia, kg m^2, signs as in a URDF."""
 
 
 class Payload(Model):
@@ -131,7 +131,7 @@ class Payload(Model):
     com: Vector3 = (0.0, 0.0, 0.0)
     """Centre of mass in the tool frame of the URDF, m."""
     inertia: InertiaMatrix | None = None
-    """Inertia about the centre of mass, in the axes of the tool frame. Null: a point mass."""
+    """Inertia about the centre of mass, in the tool frame's axes. Null: a point mass."""
 
 
 _WORDS: Final = {
@@ -193,49 +193,46 @@ class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
     armature: UrdfFriction = FROM_URDF
-    """Inertia of the drive as seen at the joint, kg m^2 (kg). Absent: armature of an MJCF file or Pinocchio model; a
-    URDF has none. Null: none."""
+    """Inertia of the drive as seen at the joint, kg m^2 (kg). Absent: that of an MJCF file or Pinocchio model."""
     rotor_inertia: PerJoint = 0.0
-    """Inertia of the rotor about its own axis, kg m^2. With gear_ratio it replaces armature: armature = rotor_inertia *
-    gear_ratio^2."""
+    """Inertia of the rotor about its axis, kg m^2, in place of armature = rotor_inertia * gear_ratio^2."""
     gear_ratio: PerJointPositive | None = None
-    """Turns of the rotor per turn of the joint (prismatic joints: rad per m). Null: none."""
+    """Turns of the rotor per turn of the joint (rad per m)."""
     viscous: UrdfFriction = FROM_URDF
-    """Viscous friction, N m s/rad (N s/m). Absent: damping of the URDF. Null: none."""
+    """Viscous friction, N m s/rad (N s/m). Absent: damping of the URDF."""
     coulomb: UrdfFriction = FROM_URDF
-    """Coulomb friction, N m (N). Absent: friction of the URDF. Null: none."""
+    """Coulomb friction, N m (N). Absent: friction of the URDF."""
     coulomb_velocity: PerJointPositive = 0.01
-    """Speed at which Coulomb friction reaches 76 % (tanh 1) of its value, rad/s (m/s)."""
+    """Speed at which Coulomb friction reaches tanh 1 = 76 % of its value, rad/s (m/s)."""
 
 
 class RobotSettings(Model):
     """The robot: its URDF and what the task adds to it."""
 
     urdf: Name | None = None
-    """URDF file, relative to the task file's folder, or the name of an included robot. Required in a task file."""
+    """URDF or MJCF file, or the name of an included robot. Required in a task file."""
     tool_frame: Name | None = None
     """Frame that follows the path. Null: the only leaf link."""
     tool_offset: Placement = Field(default_factory=Placement)
-    """Place of the frame that follows the path, in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}."""
+    """Place of the frame that follows the path in the URDF's tool frame: {xyz: ..., rpy_deg: ...}."""
     base_frame: Name | None = None
     """First frame of the chain. Null: the root of the URDF."""
     mounting: Mounting = Field(default_factory=Placement)
-    """Place of the URDF's root link in the world: floor, wall (its z axis along the world's x axis), ceiling (turned
-    upside down about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame."""
+    """Place of the URDF's root link in the world: floor, wall (z along the world's x axis), ceiling (upside down,
+    turned about x), or {xyz: ..., rpy_deg: ...}."""
     gravity: tuple[Number, Number, Number] = (0.0, 0.0, -9.81)
     """Gravity [x, y, z] in the world frame, m/s^2."""
     locked_joints: dict[Name, Number] = Field(default={})
-    """Joints that do not move: their positions by name, rad (m). A joint that mimics one of them follows it."""
+    """Positions of joints that do not move, by name, rad (m). Joints that mimic them follow."""
     payload: Payload | None = None
-    """Rigid body fixed to the tool frame. Null: none."""
+    """Rigid body fixed to the tool frame: {mass: ..., com: ..., inertia: ...}."""
     limits_file: Name | None = None
-    """File of joint limits, relative to the task file's folder, for example MoveIt's joint_limits.yaml. Values in
-    limits come first, for each joint named there. Null: none."""
+    """File of joint limits, such as MoveIt's joint_limits.yaml; see below."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Share = Field(default=1.0, gt=0.0, le=1.0)
-    """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The motion is planned
-    for these lower limits, not played more slowly. Other limits do not change."""
+    """Factor on all velocity limits, besides limits.scale: 50 % or 0.5. The motion is planned for these lower limits,
+    not played more slowly."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     """Drive inertia and friction."""
 
@@ -251,22 +248,20 @@ class SplineSettings(CheckedModel):
     """The B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(default=3, ge=2, le=7)
-    """Degree of the splines; 3 gives continuous torque, 4 continuous torque rate."""
+    """Degree of the splines: 3 for continuous torque, 4 for a continuous torque rate."""
     intervals: Intervals = "auto"
-    """Number of knot intervals of every phase. auto gives the fastest timing of the best joint path, with knots where
-    it needs them; with limits on jerk, torque rate or means it halves the intervals that lose most time, until two
-    rounds together gain less than half the tolerance. A number makes planning faster and the motion slower. knots:
-    free needs a number."""
+    """Knot intervals of every phase. auto: the fastest timing of the best joint path, with knots where it needs them;
+    with limits on jerk, torque rate or means it halves the intervals that lose most time, until two rounds gain less
+    than half the tolerance. A number, which knots: free needs, makes planning faster and the motion slower."""
     tolerance: Share = Field(default=1.0e-3, gt=0.0, le=0.1)
-    """With intervals: auto, the accepted loss against very many intervals, relative to the end time t_E: 0.1 % or
-    0.001, for example."""
+    """With intervals: auto, accepted loss of end time against very many intervals: 0.1 % or 0.001."""
     knots: Literal["uniform", "free"] = "uniform"
-    """uniform: intervals of equal length; free: their lengths are variables of the optimisation."""
+    """uniform: intervals of equal length. free: their lengths are optimised."""
     shortest_interval: Share = Field(default=0.1, gt=0.0, lt=1.0)
-    """With knots: free, the shortest interval as a fraction of the mean one; never less than 5e-5 t_E."""
+    """With knots: free, the shortest interval over the mean one; never below 5e-5 of the end time."""
     rest: Literal["velocity", "full", "jerk"] = "full"
-    """What is zero at both ends and at stops. velocity: the velocity. full: velocity and acceleration. jerk: velocity,
-    acceleration, jerk, and with them the torque rates; needs degree >= 4."""
+    """What is zero at both ends and at stops. velocity: the velocity. full: also the acceleration. jerk: also jerk and
+    torque rate; needs degree >= 4."""
     points_per_interval: Count = Field(default=3, ge=1, le=100)
     """Collocation points per knot interval."""
 
@@ -302,25 +297,23 @@ class SearchSettings(CheckedModel):
     """The search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
-    """How far the search goes: single, fast, thorough or exhaustive. single plans once, from the best guess, and
-    continues like fast only if that fails. The last two use more guesses."""
+    """How far the search goes: single (one plan, from the best guess; like fast if that fails), fast, thorough,
+    exhaustive (ever more guesses)."""
     guesses: Literal["lattice", "numeric"] = "lattice"
-    """Source of the initial guesses: lattice (a lattice of postures) or numeric (inverse kinematics from the start
-    posture)."""
+    """Source of the initial guesses: lattice (of postures), or numeric (inverse kinematics from the start)."""
     jobs: Jobs = 1
-    """Number of processes that plan at the same time, limited to the number of processors. auto: all processors, if the
-    remaining work takes longer than 3 s, or 0.7 s if an earlier plan has started them. The answer does not depend on it
-    unless the time runs out."""
+    """Processes that plan at the same time, no more than processors. auto: all processors, if the remaining work takes
+    more than 3 s, or 0.7 s if they run already. The answer does not depend on it, unless the time runs out."""
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time limit of the whole plan, s. The best verified motion found by then is returned; if there is none, an
-    unverified one, up to two seconds later."""
+    """Time limit of the whole plan, s. The best verified motion is returned, or else an unverified one up to 2 s
+    later."""
     seed: Count = Field(default=0, ge=0)
     """Seed of the random numbers."""
     least_motion: Flag = True
-    """Whether the smoothest motion is chosen: least joint accelerations, with an end time within 1e-4 (relative) of the
-    fastest. With more than 200 variables, as intervals: auto often has, it is looked for only with `slower`."""
+    """Whether the smoothest motion (least joint accelerations) within 1e-4 of the fastest end time is chosen. With more
+    than 200 variables, as intervals: auto often has, only if slower is set."""
     slower: Share = Field(default=0.0, ge=0.0, le=1.0)
-    """How much slower the smoothest motion may be, for example 1 % or 0.01."""
+    """How much slower the smoothest motion may be: 1 % or 0.01."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         if self.slower and not self.least_motion:
@@ -335,7 +328,7 @@ class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
     name: Name = "auto"
-    """Name of the solver: auto, uno, ipopt (if ipyopt is installed) or uno_interior. auto begins with uno."""
+    """auto (begins with uno), uno, uno_interior, or ipopt if ipyopt is installed."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
     time_limit: Positive = Field(default=60.0, le=1e6)
@@ -348,12 +341,12 @@ class RefinementSettings(Model):
     """Adding collocation points until the limits hold in between them as well."""
 
     tolerance: Share = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
-    """Largest accepted violation of a limit at any time, relative to the limit. For a position: in rad (m), or relative
-    to half its range if that is less than 1 rad (m). The checks do not resolve less than 1e-5."""
+    """Largest accepted violation of a limit at any time, relative to the limit; of a position in rad (m), or relative
+    to half its range if that is below 1 rad (m). The checks do not resolve less than 1e-5."""
     density: Count = Field(default=10, ge=10, le=1000)
-    """Number of points per collocation point at which limits are checked."""
+    """Points per collocation point at which limits are checked."""
     max_rounds: Count = Field(default=10, ge=0, le=1000)
-    """Maximum number of rounds; 0 switches refinement off."""
+    """Maximum number of rounds; 0: no refinement."""
 
 
 def expand_solver_name(solver: object) -> object:
@@ -365,14 +358,14 @@ class BoundarySettings(CheckedModel):
     """Speeds at both ends of the path, or a motion that goes round for ever."""
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
-    """Speed along the path at its start, m/s. It is in rad/s if the tool only turns there; along a path of joints it is
-    the norm of the joint velocities. If it is not zero, velocities of redundant joints are free there, and with
-    spline.rest: full the speed does not change at that instant."""
+    """Speed along the path at its start, m/s; rad/s if the tool only turns there; of a path of joints the norm of their
+    velocities. If it is not zero, velocities of redundant joints are free there, and with spline.rest: full the speed
+    is constant at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
     """The same at the path's end."""
     periodic: Flag = False
-    """Whether a closed path is repeated without stopping: posture, velocity and acceleration at its end equal those at
-    its start; a joint without a range may have made whole turns. With spline.degree: 2 the acceleration jumps there."""
+    """Whether a closed path is repeated without stopping: it ends with the posture (but for whole turns of joints
+    without a range), velocity and acceleration of its start. With spline.degree: 2 the acceleration jumps there."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for key in ("start_speed", "end_speed"):

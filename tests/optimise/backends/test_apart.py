@@ -107,7 +107,7 @@ def test_what_a_solve_had_found_before_it_was_ended_is_its_answer(monkeypatch):
 
     def find_and_hang(monitor, *_):
         for x, violation in (better, 0.0), (START, 0.0), (0.0 * START, 1.0):
-            objective = monitor.problem.objective(x)
+            objective = monitor.program.objective(x)
             monitor.keep(x, objective, violation)
             monitor.between_iterations(objective)
         time.sleep(1e6)

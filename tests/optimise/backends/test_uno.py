@@ -36,7 +36,7 @@ def test_the_best_feasible_iterate_is_the_answer_where_time_runs_out():
     better = np.array([2.0, 0.25])
 
     def run_out_of_time(monitor, x, *_rest):
-        monitor.keep(better, monitor.problem.objective(better), 0.0)
+        monitor.keep(better, monitor.program.objective(better), 0.0)
         monitor.timed_out = True
         return monitor.report("uno", SolveStatus.TIME_LIMIT, 100.0 * x, np.zeros(1), "")
 

@@ -32,7 +32,7 @@ from brachis.optimise.backends.monitor import (
     residual,
 )
 from brachis.optimise.backends.protocol import (
-    Problem,
+    NonlinearProgram,
     Progress,
     SolverOptions,
     SolverReport,
@@ -47,11 +47,11 @@ Below a time limit of 10 s smaller problems, too, are solved apart: one iteratio
 _GRACE = 0.25
 """Seconds after its time limit at which a process is ended; a backend that sees the limit answers before."""
 _SILENCE = 5.0
-"""Seconds without an iteration after which a small problem's process is ended: an iteration takes hundredths."""
+"""Seconds without an iteration after which a small program's process is ended: an iteration takes hundredths."""
 _LONGEST = 1e6
 """Seconds without an iteration after which any process is ended: the system cannot wait for ever."""
 Run = Callable[[SolveMonitor, np.ndarray], SolverReport]
-"""What a backend does: ``run(monitor, x)`` solves the monitor's problem from x, and returns ``monitor.report(...)``."""
+"""What a backend does: ``run(monitor, x)`` solves the monitor's program from x, and returns ``monitor.report(...)``."""
 solve_lock = threading.RLock()
 """Uno's BQPD and IPOPT's MUMPS keep their state in memory that all threads share: two solves at once crash."""
 
@@ -64,7 +64,7 @@ class Solver:
     ----------
     name : str
     run : callable
-        ``run(monitor, x)`` solves the monitor's problem from x; see `SolveMonitor`.
+        ``run(monitor, x)`` solves the monitor's program from x; see `SolveMonitor`.
     is_interior : bool, optional
         Whether it is an interior-point method. It leaves the bounds at first: a start near the optimum does not help.
     """
@@ -75,14 +75,14 @@ class Solver:
 
     def solve(
         self,
-        problem: Problem,
+        program: NonlinearProgram,
         x: np.ndarray,
         options: SolverOptions,
         progress: Progress | None,
     ) -> SolverReport:
-        """Solve `problem` from the start `x`.
+        """Solve `program` from the start `x`.
 
-        A large problem that is not solved in time has Uno's best feasible iterate as its `x`, or the start if none is
+        A large program that is not solved in time has Uno's best feasible iterate as its `x`, or the start if none is
         known, and the status `TIME_LIMIT`; one whose solve is ended for its silence, the status `STALLED`.
 
         Raises
@@ -90,8 +90,8 @@ class Solver:
         KeyboardInterrupt
             The user interrupted; passed on once the backend has returned.
         """
-        bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
-        refuse = partial(_report_point, self.name, problem, x)
+        bounds = (program.lower, program.upper, program.x_lower, program.x_upper)
+        refuse = partial(_report_point, self.name, program, x)
         if options.time_limit <= 0.0:
             return refuse(SolveStatus.TIME_LIMIT, "no time was left")
         if not is_usable(x) or any(np.isnan(bound).any() for bound in bounds):
@@ -101,29 +101,29 @@ class Solver:
             max_entries = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
             # A daemonic process may have no children; the limit then holds between iterations alone.
             alone = multiprocessing.current_process().daemon
-            entries = len(x) * len(problem.lower)
+            entries = len(x) * len(program.lower)
             if (options.apart or entries > max_entries) and not alone:
-                return subprocess_solve(self, problem, x, options, progress)
-            return self.run(SolveMonitor(problem, options, progress), x)
+                return subprocess_solve(self, program, x, options, progress)
+            return self.run(SolveMonitor(program, options, progress), x)
 
 
 def _report_point(
     solver: str,
-    problem: Problem,
+    program: NonlinearProgram,
     x: np.ndarray,
     status: SolveStatus,
     message: str,
     wall_time: float = 0.0,
 ) -> SolverReport:
     """Report a solve without an answer; `x`, (v,), takes its place."""
-    values = (objective_at(problem, x), residual(problem, x))
-    none = np.zeros(len(problem.lower))
+    values = (objective_at(program, x), residual(program, x))
+    none = np.zeros(len(program.lower))
     return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
 
 
 def subprocess_solve(
     solver: Solver,
-    problem: Problem,
+    program: NonlinearProgram,
     x: np.ndarray,
     options: SolverOptions,
     progress: Progress | None,
@@ -131,12 +131,12 @@ def subprocess_solve(
     """Start a process that solves, pass on its progress, and end it."""
     began = time.monotonic()
     until = began + options.time_limit
-    # A fork has the problem at once; beyond Linux the system's libraries do not bear it.
+    # A fork has the program at once; beyond Linux the system's libraries do not bear it.
     method = "fork" if sys.platform.startswith("linux") else "spawn"
     context: Any = multiprocessing.get_context(method)
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(
-        target=_work, args=(sender, solver.run, problem, x, options), daemon=True
+        target=_work, args=(sender, solver.run, program, x, options), daemon=True
     )
     try:
         # The fork touches nothing that threads may hold.
@@ -146,7 +146,7 @@ def subprocess_solve(
             )
             process.start()
         sender.close()
-        is_large = len(x) * len(problem.lower) > ENTRIES
+        is_large = len(x) * len(program.lower) > ENTRIES
         silence = np.inf if is_large else _SILENCE
         answer, best = _receive(receiver, until + _GRACE, silence, progress)
     finally:
@@ -169,7 +169,7 @@ def subprocess_solve(
         status = SolveStatus.TIME_LIMIT
         message = "ended: it did not finish in time"
     point = x if best is None else best
-    return _report_point(solver.name, problem, point, status, message, now - began)
+    return _report_point(solver.name, program, point, status, message, now - began)
 
 
 def _receive(
@@ -202,7 +202,7 @@ def _receive(
 def _work(
     sender: Connection,
     run: Run,
-    problem: Problem,
+    program: NonlinearProgram,
     x: np.ndarray,
     options: SolverOptions,
 ) -> None:
@@ -223,7 +223,7 @@ def _work(
         sender.send((iteration, objective, None if best is sent else best))
         sent = best
 
-    monitor = SolveMonitor(problem, options, progress)
+    monitor = SolveMonitor(program, options, progress)
     try:
         with use_one_thread():
             sender.send(run(monitor, x))

@@ -27,10 +27,10 @@ _STATUS = {
 
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
-    """Solve the monitor's problem from `x`."""
+    """Solve the monitor's program from `x`."""
     import ipyopt
 
-    problem = monitor.problem
+    program = monitor.program
     options = monitor.options
 
     def or_nan(
@@ -67,14 +67,14 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     nothing = np.array([], dtype=int)
     backend = ipyopt.Problem(
         len(x),
-        clip(problem.x_lower),
-        clip(problem.x_upper),
-        len(problem.lower),
-        clip(problem.lower),
-        clip(problem.upper),
-        (problem.jacobian_rows, problem.jacobian_columns),
+        clip(program.x_lower),
+        clip(program.x_upper),
+        len(program.lower),
+        clip(program.lower),
+        clip(program.upper),
+        (program.jacobian_rows, program.jacobian_columns),
         (nothing, nothing),
-        lambda point: objective_at(problem, point, np.nan),
+        lambda point: objective_at(program, point, np.nan),
         or_nan(monitor.gradient),
         or_nan(monitor.rows),
         or_nan(monitor.jacobian, 0.0),  # NaN at the first point ends the process
@@ -92,7 +92,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             "bound_relax_factor": 0.0,
         },
     )
-    multipliers = np.zeros(len(problem.lower))
+    multipliers = np.zeros(len(program.lower))
     with monitor:
         answer, _, code = backend.solve(x.copy(), mult_g=multipliers)
     status = _STATUS.get(int(code), SolveStatus.FAILED)

@@ -1,4 +1,4 @@
-"""What stands between a problem and a backend: it counts, interrupts, keeps the time, and judges the answer."""
+"""What stands between a program and a backend: it counts, interrupts, keeps the time, and judges the answer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from brachis.common.interrupts import SigintHandler
 from brachis.errors import UnreachableError
 from brachis.optimise.backends.protocol import (
-    Problem,
+    NonlinearProgram,
     Progress,
     SolverOptions,
     SolverReport,
@@ -29,7 +29,7 @@ _NEARLY_FEASIBLE = 1e-3
 """Violation of rows up to which an iterate counts, or ten times the tolerance if that is larger."""
 
 Function = Callable[[np.ndarray], float | np.ndarray]
-"""Of the variables of a problem."""
+"""Of the variables of a program."""
 
 
 class SolveMonitor:
@@ -41,7 +41,7 @@ class SolveMonitor:
 
     Parameters
     ----------
-    problem : Problem
+    program : NonlinearProgram
     options : SolverOptions
     progress : Progress or None
 
@@ -52,9 +52,12 @@ class SolveMonitor:
     """
 
     def __init__(
-        self, problem: Problem, options: SolverOptions, progress: Progress | None
+        self,
+        program: NonlinearProgram,
+        options: SolverOptions,
+        progress: Progress | None,
     ) -> None:
-        self.problem = problem
+        self.program = program
         self.options = options
         self.iterations = 0
         self.failure: BaseException | None = None
@@ -150,19 +153,19 @@ class SolveMonitor:
 
     def objective(self, x: np.ndarray) -> float:
         """Objective at x, finite; raises UnreachableError else."""
-        return float(self._finite(self.problem.objective, x))
+        return float(self._finite(self.program.objective, x))
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the objective at x, finite; raises UnreachableError else."""
-        return self._finite(self.problem.gradient, x)
+        return self._finite(self.program.gradient, x)
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Rows at x, all finite; raises UnreachableError else, and everywhere once the solve has to stop."""
-        return self._evaluate(self.problem.rows, x)
+        return self._evaluate(self.program.rows, x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Jacobian entries at x; raises as `rows` does."""
-        return self._evaluate(self.problem.jacobian, x)
+        return self._evaluate(self.program.jacobian, x)
 
     def _evaluate(self, function: Function, x: np.ndarray) -> np.ndarray:
         if self._handler is not None:
@@ -214,10 +217,10 @@ class SolveMonitor:
         """
         if self.failure is not None:
             raise self.failure
-        violation = residual(self.problem, x)
+        violation = residual(self.program, x)
         if self.timed_out and violation > self._feasible_below and self.best:
             x = self.best[1]
-            violation = residual(self.problem, x)
+            violation = residual(self.program, x)
             multipliers = np.zeros_like(multipliers)
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED
@@ -230,7 +233,7 @@ class SolveMonitor:
             status = SolveStatus.ITERATION_LIMIT
         elif violation == np.inf:
             status = SolveStatus.EVALUATION_ERROR
-        objective = objective_at(self.problem, x)
+        objective = objective_at(self.program, x)
         known = (x, objective, violation, multipliers, self.iterations, self.elapsed)
         return SolverReport(solver, status, *known, message)
 
@@ -240,29 +243,31 @@ def is_usable(values: np.ndarray) -> bool:
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
 
-def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> float:
+def objective_at(
+    program: NonlinearProgram, x: np.ndarray, otherwise: float = np.inf
+) -> float:
     """Objective at x; another value where x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            value = problem.objective(x)
+            value = program.objective(x)
     except UnreachableError:
         return otherwise
     return otherwise if np.isnan(value) else value
 
 
-def residual(problem: Problem, x: np.ndarray) -> float:
+def residual(program: NonlinearProgram, x: np.ndarray) -> float:
     """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
-    of_bounds = np.minimum(x - problem.x_lower, problem.x_upper - x)
-    least = float(np.append(row_slack(problem, x), of_bounds).min(initial=0.0))
+    of_bounds = np.minimum(x - program.x_lower, program.x_upper - x)
+    least = float(np.append(row_slack(program, x), of_bounds).min(initial=0.0))
     return np.inf if np.isnan(least) else 0.0 - least
 
 
-def row_slack(problem: Problem, x: np.ndarray) -> np.ndarray:
+def row_slack(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
     """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            rows = problem.rows(x)
+            rows = program.rows(x)
     except UnreachableError:
-        return np.full(len(problem.lower), -np.inf)
-    slack = np.minimum(rows - problem.lower, problem.upper - rows)
+        return np.full(len(program.lower), -np.inf)
+    slack = np.minimum(rows - program.lower, program.upper - rows)
     return np.nan_to_num(slack, nan=-np.inf, neginf=-np.inf)

@@ -1,4 +1,4 @@
-"""The Hessian of the Lagrangian of a problem that knows a part of it.
+"""The Hessian of the Lagrangian of a program that knows a part of it.
 
 A mean of squares over the motion is curved in as many directions as there are variables; an approximation from the last
 few steps learns too few of them. First derivatives give its Gauss-Newton part B. A matrix A approximates the rest. Let
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.optimise.backends.protocol import Curvature, Problem
+from brachis.optimise.backends.protocol import Curvature, NonlinearProgram
 
 _ENOUGH = 0.01
 """Trace of B, as a part of that by the first guess, from which on a solver's multipliers are used."""
@@ -27,11 +27,11 @@ _LEAST_COSINE = 1e-8
 
 
 class SecantHessian:
-    """The Hessian of one problem's Lagrangian, updated from call to call.
+    """The Hessian of one program's Lagrangian, updated from call to call.
 
     Parameters
     ----------
-    problem : Problem
+    program : NonlinearProgram
     known : Curvature
     learnt : (v, v) ndarray, optional
         A at first; by default zero.
@@ -43,23 +43,26 @@ class SecantHessian:
     """
 
     def __init__(
-        self, problem: Problem, known: Curvature, learnt: np.ndarray | None = None
+        self,
+        program: NonlinearProgram,
+        known: Curvature,
+        learnt: np.ndarray | None = None,
     ) -> None:
-        self._problem = problem
+        self._program = program
         self._known = known
         self._multipliers = known.multipliers
         self._least_trace: float | None = None
-        count = len(problem.x_lower)
+        count = len(program.x_lower)
         self.learnt = np.zeros((count, count)) if learnt is None else learnt
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     @classmethod
     def of(
-        cls, problem: Problem, x: np.ndarray, learnt: np.ndarray | None
+        cls, program: NonlinearProgram, x: np.ndarray, learnt: np.ndarray | None
     ) -> SecantHessian | None:
-        """Begin a solve from x, (v,), of a problem that knows a part of its Hessian; None for one that does not."""
-        known = problem.curvature(x)
-        return None if known is None else cls(problem, known, learnt)
+        """Begin a solve from x, (v,), of a program that knows a part of its Hessian; None for one that does not."""
+        known = program.curvature(x)
+        return None if known is None else cls(program, known, learnt)
 
     def __call__(
         self, x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
@@ -105,8 +108,8 @@ class SecantHessian:
         known: np.ndarray,
     ) -> None:
         """Update A by the step from the last iterate to x."""
-        gradient = self._problem.gradient(x)
-        jacobian = self._problem.jacobian(x)
+        gradient = self._program.gradient(x)
+        jacobian = self._program.jacobian(x)
         if self._last is not None:
             last_x, last_gradient, last_jacobian = self._last
             by_rows = self._sum_rows(jacobian - last_jacobian, multipliers)
@@ -116,8 +119,8 @@ class SecantHessian:
 
     def _sum_rows(self, jacobian: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Add up the rows of a Jacobian, (nnz,), with multipliers: (v,)."""
-        terms = jacobian * multipliers[self._problem.jacobian_rows]
-        columns = self._problem.jacobian_columns
+        terms = jacobian * multipliers[self._program.jacobian_rows]
+        columns = self._program.jacobian_columns
         return np.bincount(columns, terms, len(self.learnt))
 
     def _update(self, s: np.ndarray, y: np.ndarray, known: np.ndarray) -> None:

@@ -1,7 +1,7 @@
 """Uno (Vanaret and Leyffer): an active-set SQP with a filter and a trust region, the default.
 
 Bang-bang optima are vertices of the feasible set, which an active-set method reaches in a few steps. The Hessian is
-Uno's limited-memory approximation, or, where a problem knows a part of it, that of `secant`; the subproblem solver is
+Uno's limited-memory approximation, or, where a program knows a part of it, that of `secant`; the subproblem solver is
 its BQPD. https://github.com/cvanaret/Uno
 """
 
@@ -16,7 +16,11 @@ from typing import Any
 import numpy as np
 
 from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
-from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    NonlinearProgram,
+    SolverReport,
+    SolveStatus,
+)
 from brachis.optimise.backends.secant import SecantHessian
 
 NAME = "uno"
@@ -52,13 +56,13 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
-    """Solve the monitor's problem from `x`."""
+    """Solve the monitor's program from `x`."""
     learnt = monitor.options.learnt
     with monitor:
         for radius, scaled in _RESTARTS:
-            units = _units(monitor.problem, x) if scaled else np.ones(len(x))
+            units = _units(monitor.program, x) if scaled else np.ones(len(x))
             stall = _Stall(monitor, units)
-            hessian = SecantHessian.of(monitor.problem, x, learnt)
+            hessian = SecantHessian.of(monitor.program, x, learnt)
             learnt = None  # it may be what has failed
             settings = {"TR_radius": radius * monitor.options.first_step}
             result = call_uno(monitor, x, units, settings, stall, hessian)
@@ -99,10 +103,10 @@ def report_result(
 
 
 @cache
-def _solve_first_problem() -> None:
+def _solve_first_program() -> None:
     """Minimise x^2, once in a process.
 
-    Rounding within Uno depends on the first problem that a process has solved: without this one, answers would
+    Rounding within Uno depends on the first program that a process has solved: without this one, answers would
     differ with what was planned before them.
     """
     import unopy
@@ -131,13 +135,13 @@ def _backend(settings: dict[str, Any]) -> Any:
     return backend
 
 
-def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
+def _units(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
     """Units of the variables, (v,), in which the largest slopes of rows at x are the square roots of what they are.
 
     Uno's subproblem solver breaks down where slopes differ by four orders of magnitude: 100 intervals, a short time.
     """
     slopes = np.ones(len(x))
-    np.maximum.at(slopes, problem.jacobian_columns, np.abs(problem.jacobian(x)))
+    np.maximum.at(slopes, program.jacobian_columns, np.abs(program.jacobian(x)))
     return 1.0 / np.sqrt(slopes)
 
 
@@ -166,7 +170,7 @@ class _Stall:
         is_near = stationarity <= 0.1 and not restores
         # In restoration Uno appends elastic variables.
         x = self._units * point[: len(self._units)]
-        objective = objective_at(monitor.problem, x)
+        objective = objective_at(monitor.program, x)
         self._objectives.append(objective)
         if not restores:
             monitor.keep(x, objective, infeasibility)
@@ -196,14 +200,14 @@ def call_uno(
     """One call of Uno, which is untyped, from x, (v,); its variables are x in units."""
     import unopy
 
-    _solve_first_problem()
-    problem = monitor.problem
+    _solve_first_program()
+    program = monitor.program
     options = monitor.options
     model = unopy.Model(
         unopy.PROBLEM_NONLINEAR,
         len(x),
-        (problem.x_lower / units).tolist(),
-        (problem.x_upper / units).tolist(),
+        (program.x_lower / units).tolist(),
+        (program.x_upper / units).tolist(),
         unopy.ZERO_BASED_INDEXING,
     )
 
@@ -221,16 +225,16 @@ def call_uno(
         scale(monitor.gradient, units),
     )
     widening = min(options.widening, options.tolerance)
-    lower, upper = _spread_bounds(problem.lower, problem.upper, widening)
+    lower, upper = _spread_bounds(program.lower, program.upper, widening)
     model.set_constraints(
         len(lower),
         scale(monitor.rows, 1.0),
         lower.tolist(),
         upper.tolist(),
-        len(problem.jacobian_rows),
-        problem.jacobian_rows.tolist(),
-        problem.jacobian_columns.tolist(),
-        scale(monitor.jacobian, units[problem.jacobian_columns]),
+        len(program.jacobian_rows),
+        program.jacobian_rows.tolist(),
+        program.jacobian_columns.tolist(),
+        scale(monitor.jacobian, units[program.jacobian_columns]),
     )
     if hessian is not None:
         _set_hessian(model, partial(monitor.hessian, hessian), units)

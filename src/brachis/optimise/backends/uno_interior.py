@@ -24,23 +24,23 @@ are not back after 100 iterations; with a third of this, 2 of 8 end up to 0.7 % 
 
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
-    """Solve the monitor's problem from `x`."""
-    problem = monitor.problem
+    """Solve the monitor's program from `x`."""
+    program = monitor.program
 
     def terminate(point: np.ndarray, *state: Any) -> bool:
         """Tell whether to stop after an iteration."""
         *_, objective_multiplier, _infeasibility, _stationarity, complementarity = state
         iterate = np.array(point[: len(x)])  # a restoration appends variables
-        objective = objective_at(problem, iterate)
-        violation = residual(problem, iterate)  # Uno's is of scaled rows
+        objective = objective_at(program, iterate)
+        violation = residual(program, iterate)  # Uno's is of scaled rows
         if objective_multiplier == 0.0:
             complementarity = np.inf
         else:
             monitor.keep(iterate, objective, violation)
         return monitor.ends_interior(objective, violation, complementarity)
 
-    share = _FIRST_GAP / max(len(problem.lower), 1)
-    barrier = float(np.clip(share * objective_at(problem, x), 1e-9, 0.1))
+    share = _FIRST_GAP / max(len(program.lower), 1)
+    barrier = float(np.clip(share * objective_at(program, x), 1e-9, 0.1))
     settings = {"preset": "ipopt", "barrier_initial_parameter": barrier}
     with monitor:
         result = call_uno(monitor, x, np.ones(len(x)), settings, terminate)
