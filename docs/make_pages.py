@@ -252,9 +252,9 @@ SHOWN = {
     "peers": Shown(
         "Other solvers",
         about="All start from the joint path of the pseudo-inverse, or search for a better one; one checker looks at "
-        "every answer at 5,001 times. Limits hold everywhere in the answers of brachis, at 61 places in those of CasADi "
-        "and Drake, at 401 in those of toppra. Drake's SNOPT ends without an answer on the second line, after 20,000 "
-        "iterations.",
+        "every answer at 5,001 times. Limits hold everywhere in the answers of brachis, at 61 places in those of "
+        "CasADi and Drake, at 401 in those of toppra. Drake's SNOPT ends without an answer on the second line, after "
+        "20,000 iterations.",
     ),
     "joint_paths": Shown("Joint paths: toppra"),
     "jerk_paths": Shown(

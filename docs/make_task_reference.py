@@ -97,16 +97,6 @@ start: {joints: [!degrees 30, !degrees -120, 2.0944]}   # rad without a tag
 end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
 ```
 
-**Postures by name** can be used for `start`, `end` and lines. A line ends at the tool's place in the posture, for
-poses with its orientation:
-
-```yml
-postures: {home: [0.5, -2.1, 2.1]}                      # rad (m)
-start: home
-end: home
-path: [{line: {by: [0, 0.3]}, stop: true}, {line: {to_posture: home}}]
-```
-
 **Limits and friction.** If a key is absent, the URDF's value holds; `null` removes it. A number holds for all joints, a
 list is in chain order, a mapping names joints; the others keep the URDF's values. For torque and velocity, lists and
 mappings may contain a pair `[lower, upper]` with lower < 0 < upper. Numbers must be from 1e-6 to 1e12, also after
@@ -117,9 +107,6 @@ torque rate includes the change of Coulomb friction; a larger `coulomb_velocity`
 
 **What is in use** is printed by a plan; it is also in the saved motion and, under `in_use`, in the JSON. `brachis
 inspect task.yaml` shows it without a plan, and refuses what a plan refuses at once.
-
-**`brachis.plan(robot, task)`** puts a `Robot` in place of the `urdf` key and adds the task's `robot` settings. A
-setting that contradicts the robot is an error.
 
 **`torque_speed`** is a curve at the joint, not at the motor; for a drive that brakes with more torque the plan is too
 cautious. A motor with 1.27 N m at 3000 rpm and 4500 rpm without load, behind a gear of 1:50 with efficiency 0.8
@@ -213,8 +200,8 @@ Rows that depend on each other, or that no joint changes, are refused.
 
 **Frames.** The path may be in one of the `frames`, such as that of a workpiece: `path: {frame: workpiece, segments:
 [...]}`, or the key `path_frame`. Segments, files of points, directions, orientations and `path_start` are then in it;
-bodies of the scene and other frames are placed in it with `frame: workpiece`. If the task space has only some of x, y, z, the frame may be
-rotated only within these. Results are in the world frame.
+bodies of the scene and other frames are placed in it with `frame: workpiece`. If the task space has only some of x, y,
+z, the frame may be rotated only within these. Results are in the world frame.
 
 ```yaml
 frames:
@@ -313,9 +300,9 @@ unless the position never changes; so are rounded or noisy points, whose curvatu
 the first and last point. It may wind, cross itself or be passed several times. Repeated points are left out and
 reported. Spikes and changes of unit are refused, with their line. If two points are more than five times as far apart
 as usual, the path between them is straight. [Corners](cam_seam.md#corners) (more than 12 degrees at one place) are
-listed, and rounded by blends. A point's distance is that from a place of the curve on the same turn. `brachis inspect
-TASK` and `brachis plan` print the findings; they are also in `result.fits` and the JSON. `brachis plot --kind fit`
-draws the errors.
+listed, and rounded by blends. Each point is compared with the same turn of the curve. `brachis inspect TASK` and
+`brachis plan` print the findings; they are also in `result.fits` and the JSON. `brachis plot --kind fit` draws the
+errors.
 
 ```yaml
 start: free
