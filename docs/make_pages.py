@@ -40,8 +40,8 @@ GALLERY_HEAD = """\
 
 # Gallery
 
-Every example of the repository, with its end times. Every motion is verified. To run one, use `brachis plan
-examples/NAME.yaml` or `python examples/NAME.py`. `python docs/make_figures.py` makes the pictures and the times.
+Every example of the repository, with its end times. All motions are verified. To run one, use `brachis plan
+examples/NAME.yaml` or `python examples/NAME.py`.
 """
 CARD = """\
 :::{{grid-item-card}} {name}: {title}
