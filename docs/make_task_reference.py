@@ -88,24 +88,13 @@ INTRODUCTION = """# Task files
 <!-- Made by docs/make_task_reference.py. -->
 
 A task file is YAML. Units are SI; `!degrees` and `!millimeters` before a number change it to rad or m. File names are
-relative to the task file. Unknown keys are errors. Below, a key stands with its default (`{...}`: a section of its
-own); `null` means none unless a line says otherwise. For completion in editors, run `brachis schema --out
-task.schema.json` and begin the task file with
-`# yaml-language-server: $schema=task.schema.json`.
+relative to the task file. Unknown keys are errors. Each key below has its default (`{...}`: a section of its own);
+`null` means none unless a line says otherwise. For completion in editors, run `brachis schema --out
+task.schema.json` and begin the task file with `# yaml-language-server: $schema=task.schema.json`.
 
 ```yaml
 start: {joints: [!degrees 30, !degrees -120, 2.0944]}   # rad without a tag
 end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
-```
-
-**Postures by name** can be used for `start`, `end` and lines. A line ends at the tool's place in the posture, for
-poses with its orientation:
-
-```yml
-postures: {home: [0.5, -2.1, 2.1]}                      # rad (m)
-start: home
-end: home
-path: [{line: {by: [0, 0.3]}, stop: true}, {line: {to_posture: home}}]
 ```
 
 **Limits and friction.** If a key is absent, the URDF's value holds; `null` removes it. A number holds for all joints, a
@@ -118,9 +107,6 @@ torque rate includes the change of Coulomb friction; a larger `coulomb_velocity`
 
 **What is in use** is printed by a plan; it is also in the saved motion and, under `in_use`, in the JSON. `brachis
 inspect task.yaml` shows it without a plan, and refuses what a plan refuses at once.
-
-**`brachis.plan(robot, task)`** puts a `Robot` in place of the `urdf` key and adds the task's `robot` settings. A
-setting that contradicts the robot is an error.
 
 **`torque_speed`** is a curve at the joint, not at the motor; for a drive that brakes with more torque the plan is too
 cautious. A motor with 1.27 N m at 3000 rpm and 4500 rpm without load, behind a gear of 1:50 with efficiency 0.8
@@ -214,9 +200,8 @@ Rows that depend on each other, or that no joint changes, are refused.
 
 **Frames.** The path may be in one of the `frames`, such as that of a workpiece: `path: {frame: workpiece, segments:
 [...]}`, or the key `path_frame`. Segments, files of points, directions, orientations and `path_start` are then in it;
-bodies of the scene and other frames are placed in it with `frame: workpiece`. If the workpiece moves, one key changes;
-a sweep over `frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be
-rotated only within these. Results, plots and exports are in the world frame.
+bodies of the scene and other frames are placed in it with `frame: workpiece`. If the task space has only some of x, y,
+z, the frame may be rotated only within these. Results are in the world frame.
 
 ```yaml
 frames:
@@ -248,26 +233,22 @@ Orientations are those of the tool frame in the frame of the path.
 ```yaml
 task_space: pose
 path:
-  - line: {by: [0.3, 0, 0]}               # the tool keeps its orientation
+  - line: {by: [0.3, 0, 0]}               # the tool keeps its orientation: fixed, the default
     blend: 0.05
   - line: {by: [0, 0.4, 0]}               # turns by 90 degrees about the path frame's z axis, at rest at both ends
     orientation: {rotate: {axis: [0, 0, 1], angle_deg: 90, profile: smooth}}
-  - line: {by: [0, 0.3, 0]}               # turns, the shortest way, to an orientation
+  - line: {by: [0, 0.3, 0]}               # turns the shortest way, by less than 180 degrees
     orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
 ```
-
-- `fixed`, the default: the tool keeps its orientation.
-- `{rotate: {axis: ..., angle_deg: ...}}`: it turns about a fixed axis.
-- `{to: {...}}`: it turns to an orientation about one axis, the shortest way, by less than 180 degrees.
-- `tangent` or `{tangent: {up: ...}}`: it turns with the tangent of the path.
 
 Position and orientation advance together. With `profile: uniform` the tool turns by the same angle for every metre.
 Where the next segment turns differently, the turning rate jumps, which is refused like a corner. Then use `profile:
 smooth` (the rate and its first two derivatives are zero at both ends) or a `blend` (it rounds position and
 orientation).
 
-With `tangent` the tool keeps its orientation in a frame with x along the tangent and y along up x tangent: it turns
-about `up` if the path turns, and pitches if the path rises. `up` must be more than 1 degree from the tangent.
+With `tangent` or `{tangent: {up: ...}}` the tool keeps its orientation in a frame with x along the tangent and y along
+up x tangent: it turns about `up` if the path turns, and pitches if the path rises. `up` must be more than 1 degree from
+the tangent.
 
 A spline passes its waypoints with the orientations of `orientations`, one for each; that of the segment's start is
 not among them. In between the orientation is smooth up to the third derivative, whatever the world or tool frame.
@@ -309,20 +290,19 @@ the last point that has one, besides `tool_limits`; it needs a `tolerance`. Colu
 semicolons, tabs or spaces. Decimal commas are read unless commas separate the columns. Units are part of the column
 names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or given by `units`. brachis reports how it understood the file.
 
-The segment starts at the first point, with `start: free` and without `path_start` the path too. A start more than
-1e-4 m or rad away from it is refused, unless `relative: true` moves the points there.
+The segment starts at the first point; with `start: free` and without `path_start` so does the path. A start more than
+1e-4 m or rad away is refused, unless `relative: true` moves the points there.
 
 **Without a tolerance** the path passes through all points. Two successive points with the same position are refused,
-because the motion would have to stop there, unless the position never changes. Rounded or noisy points, whose
-curvature is only noise, are refused.
+unless the position never changes; so are rounded or noisy points, whose curvature is only noise.
 
 **With a tolerance** the path is a quintic B-spline (C4) with few knots, also for 100,000 points. It passes through
 the first and last point. It may wind, cross itself or be passed several times. Repeated points are left out and
 reported. Spikes and changes of unit are refused, with their line. If two points are more than five times as far apart
-as usual, the path between them is straight. Corners (more than 12 degrees at one place) are listed, and rounded by
-blends; the smaller `tolerance.corner`, the slower the robot passes them. A point's distance is that from a place of
-the curve on the same turn. `brachis inspect TASK` and `brachis plan` print the findings; they are also in
-`result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
+as usual, the path between them is straight. [Corners](cam_seam.md#corners) (more than 12 degrees at one place) are
+listed, and rounded by blends. Each point is compared with the same turn of the curve. `brachis inspect TASK` and
+`brachis plan` print the findings; they are also in `result.fits` and the JSON. `brachis plot --kind fit` draws the
+errors.
 
 ```yaml
 start: free

@@ -1,4 +1,4 @@
-"""The TX90L on its linear axis: every joint with a closed form as the redundant one, coarse and fine, as a table."""
+"""The TX90L on its linear axis: each redundant joint with a closed form, with few and many intervals, as a table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A seam as CAM gives it: 20,000 points in mm that scatter, with a corner, fitted, planned and verified.
+"""A seam from CAM: 20,000 noisy points in mm, with a corner, fitted, planned and verified.
 
 Usage: python examples/08_cam_seam.py [FIGURE.png]
 

@@ -1,4 +1,4 @@
-"""What payload, friction, bounded jerk and a slower robot cost: one line with more and more of what the task says."""
+"""What payload, friction, a jerk limit and a speed override cost, added one by one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A circle of the planar arm, gone round for ever, and once from rest to rest.
+"""The planar arm repeats a circle without a stop, and draws it once from rest to rest.
 
 Usage: python examples/10_periodic_circle.py
 """

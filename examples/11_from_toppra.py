@@ -1,4 +1,4 @@
-"""The same path of joints under the same limits, timed by brachis and, where it is installed, by toppra.
+"""The same path of joints under the same limits, timed by brachis and, if it is installed, by toppra.
 
 Usage: python examples/11_from_toppra.py
 """

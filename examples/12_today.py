@@ -1,4 +1,4 @@
-"""A recorded motion, from its CSV file, beside the motion that brachis plans along the same path.
+"""A recorded motion from a CSV file, compared with the plan along the same path.
 
 Usage: python examples/12_today.py [FIGURE]
 

@@ -123,11 +123,11 @@ class Task(CheckedModel):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
-    """Posture at the start of the path: {joints: ...}, a name out of postures, or free, which needs path_start unless
+    """Posture at the start of the path: {joints: ...}, the name of a posture, or free, which needs path_start unless
     the path begins with a waypoint. A path of joints that begins with one needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, rad). For a pose, or with axis: {position:
-    [x, y, z], rpy_deg: [...]}, or another convention; of the position the rows of the task space count. Null: the
+    [x, y, z], rpy_deg: [...]}, or another convention; only the rows of the task space count. Null: the
     tool's place in the start posture, with which a given point must agree, or the first waypoint."""
     end: FreePosture = "free"
     """Posture at the end, as start. Its tool must be at the path's end, to 1e-6 m or rad; the nearest posture on the

@@ -39,12 +39,12 @@ class FileUnits(Model):
     """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
 
     length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
-    """Of positions. Null: the header's unit, or m."""
+    """Unit of positions. Null: the header's unit, or m."""
     angle: Literal["rad", "mrad", "deg"] | None = None
-    """Of yaw and orientations. Null: the header's unit, or rad; required for roll, pitch, yaw and angles of KUKA,
+    """Unit of yaw and orientations. Null: the header's unit, or rad; required for roll, pitch, yaw and angles of KUKA,
     Staubli and Fanuc."""
     speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = None
-    """Of feed rates. Null: the header's unit, which is then required."""
+    """Unit of feed rates. Null: the header's unit, which is then required."""
 
 
 class FitTolerance(Model):

@@ -61,20 +61,20 @@ class SceneBody(CheckedModel):
     cylinder: Round | None = None
     """Cylinder about z, its middle at the origin: {radius: ..., length: ...}, m."""
     capsule: Round | None = None
-    """The same with round caps, which the length leaves out."""
+    """Capsule about z: a cylinder of this length with round caps beyond it, m."""
     half_space: HalfSpaceShape | None = None
     """All behind a plane: {normal: [x, y, z], offset: 0}; the normal points out, the offset is the distance from the
     origin along it, m."""
     mesh: Name | None = None
-    """Mesh file, of which the convex hull is used."""
+    """Mesh file; its convex hull is used."""
     urdf: Name | None = None
-    """URDF file of a cell without moving joints, of which the collision geometry is used."""
+    """URDF file of a cell without moving joints; its collision geometry is used."""
     scale: Positive = 1.0
     """Factor from the mesh's unit to m."""
     link: Name | None = None
     """Link of the robot that carries it. Null: it is fixed to the world."""
     frame: Name | None = None
-    """Name of the frame in which it is placed, out of frames. Null: the world."""
+    """Name of the frame in which it is placed. Null: the world."""
     position: Vector3 = (0.0, 0.0, 0.0)
     """Position of its origin in the world, its frame or its link, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
@@ -134,7 +134,7 @@ class CollisionSettings(Model):
     """Least distance between bodies, m."""
     mode: Literal["auto", "avoid", "check", "off"] = "auto"
     """avoid: distances are a limit of the plan, also between the robot's links without a scene. check: only the
-    verification looks at them. off: nobody does. auto: avoid with a scene, else off."""
+    verification looks at them. off: they are ignored. auto: avoid with a scene, else off."""
     self_collision: Flag = True
     """Whether the robot also keeps clear of itself."""
     disable: tuple[tuple[Name, Name], ...] = ()
@@ -166,7 +166,7 @@ class SceneSource(Model):
     file: Name
     """Scene file, relative to the task file."""
     frame: Name | None = None
-    """Name of the frame, out of frames, of the bodies that state neither frame nor link. Null: the world."""
+    """Name of the frame of the bodies that state neither frame nor link. Null: the world."""
 
 
 class SceneFile(Model):

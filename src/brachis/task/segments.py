@@ -167,7 +167,7 @@ class LineToPosture(Model):
     """A straight line to the tool's place in a posture, with its orientation in task spaces of poses."""
 
     to_posture: Name
-    """Name of the posture, out of postures."""
+    """Name of a posture: the line ends at its tool's place, for poses with its orientation."""
     has_orientations: ClassVar[bool] = True
 
 
@@ -366,8 +366,8 @@ class MovingSegment(SegmentModel):
     """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
     Null: as a spline's orientations or the posture say, else fixed."""
     speed: Positive | None = None
-    """Process speed: constant speed of the tool along the segment but its blends, m/s, as tool_limits.process_speed. It
-    replaces feed rates of points."""
+    """Process speed: constant speed of the tool along the segment except its blends, m/s, as tool_limits.process_speed.
+    It replaces feed rates of points."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()

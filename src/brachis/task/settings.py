@@ -252,7 +252,7 @@ class SplineSettings(CheckedModel):
     intervals: Intervals = "auto"
     """Knot intervals of every phase. auto: the fastest timing of the best joint path, with knots where it needs them;
     with limits on jerk, torque rate or means it halves the intervals that lose most time, until two rounds gain less
-    than half the tolerance. A number, which knots: free needs, makes planning faster and the motion slower."""
+    than half the tolerance. A number (required by knots: free) makes planning faster and the motion slower."""
     tolerance: Share = Field(default=1.0e-3, gt=0.0, le=0.1)
     """With intervals: auto, accepted loss of end time against very many intervals: 0.1 % or 0.001."""
     knots: Literal["uniform", "free"] = "uniform"
@@ -358,13 +358,13 @@ class BoundarySettings(CheckedModel):
     """Speeds at both ends of the path, or a motion that goes round for ever."""
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
-    """Speed along the path at its start, m/s; rad/s if the tool only turns there; of a path of joints the norm of their
-    velocities. If it is not zero, velocities of redundant joints are free there, and with spline.rest: full the speed
-    is constant at that instant."""
+    """Speed along the path at its start, m/s; rad/s if the tool only turns there; for a path of joints, the norm of
+    their velocities. If it is not zero, velocities of redundant joints are free there, and with spline.rest: full the
+    speed is constant at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
     """The same at the path's end."""
     periodic: Flag = False
-    """Whether a closed path is repeated without stopping: it ends with the posture (but for whole turns of joints
+    """Whether a closed path is repeated without stopping: it ends with the posture (except for whole turns of joints
     without a range), velocity and acceleration of its start. With spline.degree: 2 the acceleration jumps there."""
 
     def _mistakes(self) -> Iterator[Mistake]:
