@@ -120,7 +120,7 @@ class Panel:
             The limit over time, NaN where it is far away, and the curves that share it.
         """
         reach = 0.3 * max(np.ptp(self.values), 1e-9)
-        found: dict[bytes, tuple[np.ndarray, list[Curve]]] = {}
+        drawn: dict[bytes, tuple[np.ndarray, list[Curve]]] = {}
         for curve in self.curves:
             lowest = curve.values.min() - reach
             highest = curve.values.max() + reach
@@ -129,8 +129,8 @@ class Panel:
                 is_drawn = np.isfinite(limit) & (is_near | self.is_ratio)
                 if np.any(is_drawn):
                     line = np.where(is_drawn, limit, np.nan) + np.zeros_like(self.t)
-                    found.setdefault(line.tobytes(), (line, []))[1].append(curve)
-        return list(found.values())
+                    drawn.setdefault(line.tobytes(), (line, []))[1].append(curve)
+        return list(drawn.values())
 
     def view(self) -> tuple[float, float]:
         """Return the ends of the axis: `ends`, or those of the values and of the limits near them."""
@@ -278,21 +278,21 @@ def panels_of(
     list of Panel
         One or two of each row, revolute joints first; none of torques without masses.
     """
-    found = []
+    panels = []
     for name in names:
         row = PANELS[name]
         if row.needs_masses and not trajectory.robot.has_masses:
             continue
         if row.unit is None:
-            found += _joint_panels(trajectory, samples, name, degrees=degrees)
+            panels += _joint_panels(trajectory, samples, name, degrees=degrees)
             continue
         values = row.values(trajectory, samples)
         bounds = row.bounds(trajectory, samples) if row.bounds else ()
         curve = Curve(row.name, BLACK, values, *bounds)
-        found.append(
+        panels.append(
             Panel(name, row.symbol, row.unit, samples.t, (curve,), ends=row.ends)
         )
-    return found
+    return panels
 
 
 def _joint_panels(
@@ -304,29 +304,32 @@ def _joint_panels(
     lower, upper = robot.limits.both_ways(name)
     columns = row.values(trajectory, samples).T
     names = trajectory.joint_names
-    found = []
+    panels = []
     for base, is_shown in (("rad", robot.revolute), ("m", ~robot.revolute)):
         unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
         curves = []
         for joint in np.flatnonzero(is_shown).tolist():
             values, low, high = (
-                factor * each[joint] for each in (columns, lower, upper)
+                factor * figures[joint] for figures in (columns, lower, upper)
             )
             curve = Curve(names[joint], joint, values, low, high, row.is_range)
             curves.append(curve)
         if curves:
-            own = row.prismatic if base == "m" else None
-            title, symbol = own or (name, row.symbol)
+            for_prismatic = row.prismatic if base == "m" else None
+            title, symbol = for_prismatic or (name, row.symbol)
             unit = unit.replace("^2", "²").replace("^3", "³")
             ratio = f"{title} in its range" if row.is_range else f"{title} / limit"
-            found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
-    return found
+            panels.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
+    return panels
 
 
 def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, Curve]]:
     """List the curves of a joint with their panels."""
     return [
-        (panel, each) for panel in panels for each in panel.curves if each.name == name
+        (panel, curve)
+        for panel in panels
+        for curve in panel.curves
+        if curve.name == name
     ]
 
 
@@ -384,14 +387,14 @@ def torque_panels(
 
     Without masses the list is empty.
     """
-    parts = panels_of(trajectory, samples, "torque")
+    panels = panels_of(trajectory, samples, "torque")
     titles = titles_of(ratios)
-    limited = [part for part in parts if part.ratio_title in titles]
+    limited = [panel for panel in panels if panel.ratio_title in titles]
     if not limited:
-        return parts
-    symbols = [part.symbol.strip("$") for part in limited]
-    symbol = ", ".join(rf"${each} / {each}_\mathrm{{max}}$" for each in symbols)
-    shown = [part.ratio_title for part in limited]
+        return panels
+    symbols = [panel.symbol.strip("$") for panel in limited]
+    symbol = ", ".join(rf"${tau} / {tau}_\mathrm{{max}}$" for tau in symbols)
+    shown = [panel.ratio_title for panel in limited]
     return [ratio_panel(trajectory, ratios, *shown, symbol=symbol)]
 
 

@@ -198,11 +198,11 @@ def _join_coordinate(
     nodes: Nodes, followed: RecoveredPath
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return knots and control points of s over time, which stays where it is during the waits; see `join_splines`."""
-    at_rest, _ = nodes.at_rest
-    splines = [fit_coordinate(*followed.parts[0], at_rest=at_rest)]
+    is_resting, _ = nodes.at_rest
+    splines = [fit_coordinate(*followed.parts[0], is_resting=is_resting)]
     for (first, end), (t, s) in zip(followed.rests, followed.parts[1:], strict=True):
         splines.append(splines[-1].wait(nodes.t[end] - nodes.t[first]))
-        splines.append(fit_coordinate(t, s, at_rest=at_rest))
+        splines.append(fit_coordinate(t, s, is_resting=is_resting))
     return join_splines(splines)
 
 
@@ -255,22 +255,22 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
     rests = find_rests(nodes)
     moves = split_at_rests(nodes, rests)
     parts = [_follow(task_map, move, tolerance) for move in moves]
-    (segments, _, first_values, _), *others = parts
-    for (first, end), (following, *_) in zip(rests, others, strict=True):
+    (segments, _, first_values, _), *later_parts = parts
+    for (first, end), (following, *_) in zip(rests, later_parts, strict=True):
         dwell = float(nodes.t[end] - nodes.t[first])
         waits = segments[-1].model_copy(update={"stop": True, "dwell": dwell})
         segments = [*segments[:-1], waits, *following]
     path = build_path(segments, first_values[0], task_map.rows)
     places = pairwise([0.0, *path.stops.tolist(), 1.0])
-    found = []
+    coordinates = []
     worst = 0.0
     for (_, t, values, share), ends in zip(parts, places, strict=True):
-        own = path.between(*ends)
-        s = _nearest(task_map, own, values, share, ends)
-        miss = task_map.difference(values, own.sample(s).target)
+        span = path.between(*ends)
+        s = _nearest(task_map, span, values, share, ends)
+        miss = task_map.difference(values, span.sample(s).target)
         worst = max(worst, float(np.max(task_map.norms(miss))))
-        found.append((t, s))
-    return RecoveredPath(tuple(segments), rests, tuple(found), worst)
+        coordinates.append((t, s))
+    return RecoveredPath(tuple(segments), rests, tuple(coordinates), worst)
 
 
 def _follow(
@@ -378,7 +378,7 @@ DEGREE = 3
 """Degree of the spline of the path coordinate."""
 
 
-def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSpline:
+def fit_coordinate(t: np.ndarray, s: np.ndarray, *, is_resting: bool) -> PhaseSpline:
     """Return s over time as the spline of a phase.
 
     The knots lie where s bends. The control points do not decrease, and so the spline does not either.
@@ -387,15 +387,15 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSplin
     ----------
     t, s : (K,) ndarray
         Ascending.
-    at_rest : bool
+    is_resting : bool
         Whether ds/dt vanishes at the ends of the path; at waits, which begin between rows, it nearly does.
     """
     from scipy.interpolate import splrep
 
     duration = t[-1] - t[0]
     t_norm = (t - t[0]) / duration
-    first = 2 if at_rest and s[0] == 0.0 else 1
-    last = 2 if at_rest and s[-1] == 1.0 else 1
+    first = 2 if is_resting and s[0] == 0.0 else 1
+    last = 2 if is_resting and s[-1] == 1.0 else 1
     for rms in (2e-8, 1e-9, 2e-10):  # of what the spline may differ from s
         knots, points, _ = splrep(t_norm, s, k=DEGREE, s=len(s) * rms**2)
         points = points[: len(knots) - DEGREE - 1].clip(s[0], s[-1])
@@ -419,16 +419,19 @@ def _deviations(
     """
     if noise is None:
         return recording.rounding / np.sqrt(3.0)
-    given = numbers(noise, "noise", "rad or m")
+    deviations = numbers(noise, "noise", "rad or m")
     n = recording.q.shape[1]
-    if given.shape not in ((), (n,)) or not ((given > 0.0) & (given < np.inf)).all():
+    if (
+        deviations.shape not in ((), (n,))
+        or not ((deviations > 0.0) & (deviations < np.inf)).all()
+    ):
         raise InputError(
             "the noise is not a valid standard deviation",
             where="noise",
             found=noise,
             allowed=f"one number > 0 rad or m, or {n} of them",
         )
-    return np.broadcast_to(given, n)
+    return np.broadcast_to(deviations, n)
 
 
 def _task_of(
@@ -451,8 +454,8 @@ def _task_of(
         "spline": {},
     }
     if settings is not None:
-        given = settings.to_dict()
-        kept = (
+        stated = settings.to_dict()
+        copied = (
             "tool_limits",
             "custom_limits",
             "search",
@@ -460,7 +463,7 @@ def _task_of(
             "refinement",
             "spline",
         )
-        content |= {key: given[key] for key in kept if key in given}
+        content |= {key: stated[key] for key in copied if key in stated}
     content["spline"]["rest"] = "full" if is_calm else "velocity"
     if not is_resting:
         first, last = _tool_speed(task_map, nodes.q[[0, -1]], nodes.qdot[[0, -1]])

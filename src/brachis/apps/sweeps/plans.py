@@ -262,8 +262,8 @@ def run_plan(plan: Plan) -> Outcome:
             motion = path.read_bytes()
     except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
         return Outcome.of_error(error, time.perf_counter() - began)
-    remarks = [str(each) for each in result.warnings]
-    remarks += [f"not completed: {each}" for each in result.not_completed]
+    remarks = [str(warning) for warning in result.warnings]
+    remarks += [f"not completed: {step}" for step in result.not_completed]
     facts = {
         "status": VERIFIED if result.verified else UNVERIFIED,
         "t_end_s": result.t_end,

@@ -60,8 +60,8 @@ def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
         Both are given, or one is wrong.
     """
     if executor is None:
-        wanted = None if jobs is None else count(jobs, "jobs")
-        return lambda plans: in_processes(plans, wanted)
+        workers = None if jobs is None else count(jobs, "jobs")
+        return lambda plans: in_processes(plans, workers)
     check_executor(executor)
     if jobs is not None:
         raise InputError(

@@ -104,16 +104,16 @@ class Store:
     def write(self, digest: str, outcome: Outcome) -> dict[str, Any]:
         """Store a finished plan; returns its columns."""
         motion = self._place(digest, ".npz")
-        part = self._place(digest, ".parquet")
-        with writing_errors(part):
-            part.parent.mkdir(parents=True, exist_ok=True)
+        columns_file = self._place(digest, ".parquet")
+        with writing_errors(columns_file):
+            columns_file.parent.mkdir(parents=True, exist_ok=True)
         facts = {**dict.fromkeys(COLUMNS), **outcome.facts}
         if outcome.motion is not None:
             with atomic_write(motion) as stream:
                 stream.write(outcome.motion)
             facts["motion"] = motion.relative_to(self.folder).as_posix()
         schema = self._arrow.schema(COLUMNS.items())
-        with atomic_write(part) as stream:
+        with atomic_write(columns_file) as stream:
             table = self._arrow.Table.from_pylist([facts], schema)
             self._parquet.write_table(table, stream)
         return facts
@@ -329,20 +329,22 @@ class SweepResult(Summary):
         Of an even number of plans the median is the faster one of the two in the middle.
         """
         ranked = self.ranked()
-        found: dict[str, Any] = {"plans": len(self.table)}
+        summary: dict[str, Any] = {"plans": len(self.table)}
         for status in (VERIFIED, UNVERIFIED, FAILED):
-            found[status] = self.count(status)
+            summary[status] = self.count(status)
         if ranked:
             median = ranked[(len(ranked) - 1) // 2]
             shown = {"best": ranked[0], "median": median, "worst": ranked[-1]}
             for name, row in shown.items():
-                found[name] = {key: row[key] for key in ("plan", *self.keys, "t_end_s")}
-        found["failures"] = {
+                summary[name] = {
+                    key: row[key] for key in ("plan", *self.keys, "t_end_s")
+                }
+        summary["failures"] = {
             error: {"plans": count, "message": message}
             for error, (count, message) in self.failures().items()
         }
         times = self.table.column("wall_time_s").to_pylist()
-        return {**found, "wall_time_s": sum(filter(None, times))}
+        return {**summary, "wall_time_s": sum(filter(None, times))}
 
     def plot(self, keys: Sequence[str] | None = None) -> Figure:
         """Draw the end times of verified plans over one key, a line, or two, a heat map.

@@ -102,9 +102,9 @@ class Scene:
         distance = 1e3 * closest.distance[0]
         label.text = f"{cell.names(closest.pair[0])}: {distance:.1f} mm"
 
-    def _frame(self, name: str, part: float) -> viser.FrameHandle:
+    def _frame(self, name: str, fraction: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
-        length = part * self._size
+        length = fraction * self._size
         return self._api.add_frame(
             name,
             axes_length=length,
@@ -133,7 +133,7 @@ class Scene:
         frames = placements(self._robot, self._trajectory.position(times))
         shades = np.linspace([190, 214, 235], [25, 75, 125], 6).astype(np.uint8)
         for joint, meshes in bodies.items():
-            positions, quaternions = (each[:, joint] for each in frames)
+            positions, quaternions = (components[:, joint] for components in frames)
             placed = np.hstack([positions, quaternions])
             if np.ptp(placed, axis=0).max() < 1e-9:  # it stands still
                 continue
@@ -141,11 +141,11 @@ class Scene:
                 mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
             ]
             bare = [trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse]
-            whole = trimesh.util.concatenate(bare)
+            mesh_of_body = trimesh.util.concatenate(bare)
             handle = self._api.add_batched_meshes_simple(
                 f"/ghosts/{joint}",
-                whole.vertices,
-                whole.faces,
+                mesh_of_body.vertices,
+                mesh_of_body.faces,
                 batched_positions=positions,
                 batched_wxyzs=quaternions,
                 batched_colors=shades,

@@ -263,10 +263,10 @@ class Viewer(AbstractContextManager["Viewer"]):
         with panel.add_tab("limits"):
             samples = self._scene.samples
             shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
-            self._lines = [add_plot(self._gui, each) for each in shown]
+            self._lines = [add_plot(self._gui, plotted) for plotted in shown]
         with panel.add_tab("bottlenecks"):
-            found = bottleneck.report(self._trajectory, solve=False)
-            lines = found.text(degrees=self._degrees).splitlines()
+            report = bottleneck.report(self._trajectory, solve=False)
+            lines = report.text(degrees=self._degrees).splitlines()
             self._gui.add_html(tables.paragraphs(lines))
         count = f" ({len(candidates)})" if candidates else ""
         with panel.add_tab(f"candidates{count}"):
