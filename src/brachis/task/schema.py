@@ -36,6 +36,6 @@ def json_schema() -> dict[str, Any]:
 
 
 def _subclasses(model: type[Model]) -> Iterator[type[Model]]:
-    for own in model.__subclasses__():
-        yield own
-        yield from _subclasses(own)
+    for subclass in model.__subclasses__():
+        yield subclass
+        yield from _subclasses(subclass)

@@ -67,7 +67,7 @@ class Check:
         Note on the check itself; often empty.
     of_limit : bool
         Whether it compares the motion with a limit, so that `value` is a ratio.
-    is_kept : bool
+    is_enforced : bool
         Whether plans keep it; otherwise they are only checked.
     """
 
@@ -80,7 +80,7 @@ class Check:
     time: float | None = None
     remark: str = ""
     of_limit: bool = False
-    is_kept: bool = True
+    is_enforced: bool = True
 
     def __post_init__(self) -> None:
         """Make plain numbers of NumPy's, and compare."""
@@ -106,13 +106,13 @@ class Check:
     def in_words(self) -> str:
         """Say what was found, and what is allowed."""
         unit = "" if self.unit == "-" else f" {self.unit}"
-        found, _ = write_apart(self.value, self.allowed)
+        value, _ = write_apart(self.value, self.allowed)
         _, allowed, _ = self.figures(degrees=False)
         verdict = "<=" if self.passed else "FAILED, allowed"
         subject = f", {self.subject}" if self.subject else ""
         time = f" at {self.time:.4g} s" if self.time is not None else ""
         remark = f", {self.remark}" if self.remark else ""
-        return f"{found}{unit} {verdict} {allowed}{unit}{subject}{time}{remark}"
+        return f"{value}{unit} {verdict} {allowed}{unit}{subject}{time}{remark}"
 
 
 @dataclass(frozen=True, repr=False)

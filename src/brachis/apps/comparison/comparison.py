@@ -84,27 +84,27 @@ class Use:
 class Comparison(Summary):
     """A recorded motion and the motion planned in its place.
 
-        Attributes
-        ----------
-        recorded : Trajectory
-            The recorded motion, with the path recovered from it.
-        verification : Verification
-            Of the recorded motion, as interpolated from its rows.
-        proven : tuple of RatioBounds
-            What its rows alone prove, limit by limit.
-        result : Result
-            Of the plan along the same path, within the same limits.
+    Attributes
+    ----------
+    recorded : Trajectory
+        The recorded motion, with the path recovered from it.
+    verification : Verification
+        Of the recorded motion, as interpolated from its rows.
+    proven : tuple of RatioBounds
+        What its rows alone prove, limit by limit.
+    result : Result
+        Of the plan along the same path, within the same limits.
 
-        Examples
-        --------
-        >>> import tempfile
-        >>> import brachis
-        >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
     ...     comparison = brachis.compare(f"{folder}/recorded.csv", task=result.task)
-        >>> [use.limit for use in found.uses], isinstance(found, brachis.Comparison)
-        (['torque'], True)
+    >>> [use.limit for use in comparison.uses], isinstance(comparison, brachis.Comparison)
+    (['torque'], True)
     """
 
     recorded: Trajectory
@@ -225,41 +225,41 @@ def compare(
 ) -> Comparison:
     """Plan the path of a recorded motion within the same limits, from the same start posture, and compare.
 
-        If the first plan is slower, a finer one is made; then the recorded joint path is timed anew. The fastest verified
-        motion counts.
+    If the first plan is slower, a finer one is made; then the recorded joint path is timed anew. The fastest verified
+    motion counts.
 
-        Parameters
-        ----------
-        recorded : path or Trajectory
-            CSV file, or the trajectory that `brachis.import_motion` made of it.
-        robot, task, task_space, units, tolerance, noise : optional
-            As in `brachis.import_motion`; for files alone.
-        keep_end : bool, optional
-            Whether the plan also ends in the recorded end posture, not in any posture with the tool there.
-        listener : callable, optional
-            Called with a text about each step.
+    Parameters
+    ----------
+    recorded : path or Trajectory
+        CSV file, or the trajectory that `brachis.import_motion` made of it.
+    robot, task, task_space, units, tolerance, noise : optional
+        As in `brachis.import_motion`; for files alone.
+    keep_end : bool, optional
+        Whether the plan also ends in the recorded end posture, not in any posture with the tool there.
+    listener : callable, optional
+        Called with a text about each step.
 
-        Returns
-        -------
-        Comparison
+    Returns
+    -------
+    Comparison
 
-        Raises
-        ------
-        InputError
-            As `brachis.import_motion` and `brachis.plan`.
-        PlanningError
-            No plan could be made.
+    Raises
+    ------
+    InputError
+        As `brachis.import_motion` and `brachis.plan`.
+    PlanningError
+        No plan could be made.
 
-        Examples
-        --------
-        >>> import tempfile
-        >>> import brachis
-        >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
     ...     comparison = brachis.compare(f"{folder}/recorded.csv", task=result.task)
-        >>> comparison.result.verified, comparison.saved > -1e-3
-        (True, True)
+    >>> comparison.result.verified, comparison.saved > -1e-3
+    (True, True)
     """
     check_callable(listener, "listener")
     if not isinstance(recorded, Trajectory):
@@ -274,10 +274,10 @@ def compare(
         )
     results = []
     failures = []
-    for candidate_task in tasks_of(recorded, keep_end=keep_end):
+    for path_task in tasks_of(recorded, keep_end=keep_end):
         try:
             result = plan(
-                recorded.robot, candidate_task, listener=listener, check_advice=False
+                recorded.robot, path_task, listener=listener, check_advice=False
             )
         except PlanningError as error:
             failures.append(error)

@@ -89,14 +89,14 @@ def _fit_between(
         first = start.after if start else 0
         rows = range(first, end.before if end else len(points))
         of_user = slice(len(before), len(before) + len(rows))
-        whole = points.only([*before, *rows, *after])  # copies
+        section = points.only([*before, *rows, *after])  # copies
         if start is not None:
-            whole.position[0] = start.place
+            section.position[0] = start.place
         if end is not None:
-            whole.position[-1] = end.place
-        fit = _fit_one(whole, tolerance, scatter, note)
-        speeds = speed_runs(fit.sigma, whole.speed)
-        curves.append(FittedCurve(whole, fit.only(of_user), speeds))
+            section.position[-1] = end.place
+        fit = _fit_one(section, tolerance, scatter, note)
+        speeds = speed_runs(fit.sigma, section.speed)
+        curves.append(FittedCurve(section, fit.only(of_user), speeds))
     return curves
 
 
@@ -118,8 +118,8 @@ def _blend_between(
         float(first.fit.position_errors[is_last].max(initial=0.0)),
         float(second.fit.position_errors[is_first].max(initial=0.0)),
     )
-    left = tolerance.at_corners - taken
-    if left < 0.05 * tolerance.at_corners:
+    remaining = tolerance.at_corners - taken
+    if remaining < 0.05 * tolerance.at_corners:
         raise first.points.wrong(
             -1,
             f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
@@ -127,7 +127,7 @@ def _blend_between(
             allowed=f"{1e3 * tolerance.at_corners:.3g} mm",
             hint="Give a larger tolerance.corner, or set corner: stop",
         )
-    return blend_size(corner.angle, left, shortest)
+    return blend_size(corner.angle, remaining, shortest)
 
 
 def _fit_one(
@@ -148,9 +148,9 @@ def _fit_one(
     found = f"{1e3 * fit.position_errors[i]:.3g} mm"
     allowed = f"{1e3 * tolerance.position:.3g} mm"
     looks = str(scatter) if scatter.deviation else ""
-    wanted = 6.0 * scatter.deviation
-    if looks and wanted > tolerance.position:
-        looks += f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
+    advised = 6.0 * scatter.deviation
+    if looks and advised > tolerance.position:
+        looks += f"; give a tolerance of {1e3 * advised:.2g} mm or more"
     if fit.position_errors[i] <= tolerance.position:
         kind = "orientation"
         found = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
@@ -187,12 +187,14 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     runs = []
     # The stubs do not say what it returns: slices, in order.
     for run in np.ma.clump_unmasked(np.ma.masked_invalid(ways)):  # type: ignore[no-untyped-call]
-        of_way = ways[run]
-        values = np.minimum(np.append(of_way[0], of_way), np.append(of_way, of_way[-1]))
+        speeds = ways[run]
+        values = np.minimum(np.append(speeds[0], speeds), np.append(speeds, speeds[-1]))
         changes = np.diff(values) != 0.0
-        kept = np.append(True, changes) | np.append(changes, True)
+        is_needed = np.append(True, changes) | np.append(changes, True)
         at = sigma[run.start : run.stop + 1]
-        runs.append(tuple(zip(at[kept].tolist(), values[kept].tolist(), strict=True)))
+        runs.append(
+            tuple(zip(at[is_needed].tolist(), values[is_needed].tolist(), strict=True))
+        )
     return tuple(runs)
 
 
@@ -234,13 +236,13 @@ def fit_curves(
     note = plausibility_note(points)
     curves = _fit_between(points, corners, tolerance, scatter, note)
     starts = sum_up([curve.length for curve in curves]).tolist()
-    found = []
+    reports = []
     for i, corner in enumerate(corners):
         blend = 0.0
         if not stops:
             blend = _blend_between(curves[i], curves[i + 1], corner, tolerance)
             curves[i] = replace(curves[i], blend=blend)
-        found.append(_report_corner(points, corner, starts[i + 1], blend))
+        reports.append(_report_corner(points, corner, starts[i + 1], blend))
     sigmas = [
         start + curve.fit.sigma for start, curve in zip(starts, curves, strict=False)
     ]
@@ -257,7 +259,7 @@ def fit_curves(
         orientation_error=float(angles.max()),
         orientation_tolerance=tolerance.orientation,
         intervals=sum(len(curve.fit.breaks) - 1 for curve in curves),
-        corners=tuple(found),
+        corners=tuple(reports),
         told=(*points.notes, *[str(scatter)] * (scatter.deviation > 0.0)),
         doubt=note,
         profile=_profile(along, distances, angles),
