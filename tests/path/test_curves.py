@@ -35,7 +35,7 @@ def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> Path
 
 
 def curve_of(segment: dict[str, Any], start: Any, rows: list[str]) -> Curve:
-    return path_of([segment], start, rows).pieces[0].curve
+    return path_of([segment], start, rows).spans[0].curve
 
 
 def assert_derivatives(curve: Curve, step: float = 1e-5) -> None:

@@ -127,12 +127,12 @@ SEAM = {**RIGHT, "speed": 0.1}
 )  # fmt: skip
 def test_segments_have_speeds(path: list[dict[str, Any]], held: Any) -> None:
     given = problem(path)
-    pieces = given.path.pieces
+    spans = given.path.spans
     breaks = dict(
-        zip([piece.segment for piece in pieces], given.path.breaks, strict=False)
+        zip([span.segment for span in spans], given.path.breaks, strict=False)
     )
     ends = dict(
-        zip([piece.segment for piece in pieces], given.path.breaks[1:], strict=False)
+        zip([span.segment for span in spans], given.path.breaks[1:], strict=False)
     )
     found = [leg for leg in given.legs if leg.speed is not None]
     assert len(found) == len(held)

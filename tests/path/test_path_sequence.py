@@ -67,7 +67,7 @@ def test_without_a_blend_the_third_derivative_would_jump() -> None:
         [0, 0, 0],
         ["x", "y", "yaw"],
     )
-    first, _, last = (piece.curve for piece in path.pieces)
+    first, _, last = (piece.curve for piece in path.spans)
     jump = (
         last.derivatives(np.zeros(1), 1)[1]
         - first.derivatives(np.array([first.length]), 1)[1]
@@ -126,7 +126,7 @@ def test_blends_may_meet_in_the_middle() -> None:
         {"line": {"by": [-1, 0]}},
     ]
     path = path_of(segments, [0, 0], ["x", "y"])
-    assert len(path.pieces) == 4
+    assert len(path.spans) == 4
     middle = path.sample(path.breaks[2:3])
     np.testing.assert_allclose(middle.target, [[1, 0.5]], atol=1e-12)
     np.testing.assert_allclose(middle.xi / path.total, [[0, 1]], atol=1e-12)
@@ -149,7 +149,7 @@ def test_blends_may_meet_in_the_middle() -> None:
 )
 def test_smooth_continuations_need_no_blend(segments: list[dict[str, Any]]) -> None:
     path = path_of(segments, [0, 0], ["x", "y"])
-    assert len(path.pieces) == 2
+    assert len(path.spans) == 2
     assert (
         np.abs(
             np.diff(path.sample(path.breaks[1] + np.array([-1e-9, 1e-9])).xi_ds, axis=0)

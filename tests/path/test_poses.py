@@ -172,7 +172,7 @@ def test_a_smooth_turn_joins_a_constant_orientation() -> None:
             {"line": {"by": [0.2, 0, 0]}},
         ]
     )
-    assert len(path.pieces) == 3
+    assert len(path.spans) == 3
     sample = path.sample(path.breaks)
     for what in (sample.xi, sample.xi_ds, sample.xi_dds):
         np.testing.assert_allclose(what[:, 3:], 0.0, atol=1e-9)
@@ -189,13 +189,13 @@ def test_the_same_uniform_turn_may_go_on() -> None:
         "line": {"by": [0.6, 0, 0]},
         "orientation": {"rotate": {"axis": [0, 0, 2], "angle_deg": 60}},
     }
-    assert len(pose_path([half, other]).pieces) == 2
+    assert len(pose_path([half, other]).spans) == 2
 
 
 def test_without_continuation_the_turning_rate_would_jump() -> None:
     """The continuity tests above can fail: the same corner, between the segments themselves, is far from continuous."""
     path = pose_path(SEGMENTS["blends"])
-    first, last = path.pieces[0].curve, path.pieces[2].curve
+    first, last = path.spans[0].curve, path.spans[2].curve
     before = first.derivatives(np.array([first.length]), 1)[1]
     after = last.derivatives(np.zeros(1), 1)[1]
     assert np.linalg.norm((after - before)[:, 3:]) > 1
@@ -264,7 +264,7 @@ def test_the_tangent_of_a_circle_has_a_constant_twist(segment: dict[str, Any]) -
         sample.xi, np.broadcast_to(sample.xi[0], (40, 6)), atol=1e-11
     )
     np.testing.assert_allclose(sample.xi_ds, 0.0, atol=1e-10)
-    angle = path.length * path.pieces[0].curve.curve.turn  # type: ignore[attr-defined]
+    angle = path.length * path.spans[0].curve.curve.turn  # type: ignore[attr-defined]
     np.testing.assert_allclose(
         np.linalg.norm(sample.xi, axis=1), np.hypot(path.length, angle), atol=1e-11
     )

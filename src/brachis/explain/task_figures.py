@@ -208,7 +208,7 @@ def _blends(problem: Problem) -> Iterator[Figure]:
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()
     places: dict[int | None, tuple[float, float]] = {}
-    for number, (before, piece) in enumerate(pairwise(problem.path.pieces), 1):
+    for number, (before, piece) in enumerate(pairwise(problem.path.spans), 1):
         if piece.segment is None:
             places[before.segment] = (breaks[number], breaks[number + 1])
     groups: defaultdict[str | float | None, list[int]] = defaultdict(list)

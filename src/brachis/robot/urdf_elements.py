@@ -91,9 +91,9 @@ def read_tree(text: str, where: str) -> UrdfTree:
 def _place_of(element: Element, where: str) -> str:
     """Return where an element is: the file, its line, and the link or joint that it is part of."""
     place = f"{where}, line {element.sourceline}"
-    for each in (element, *element.iterancestors()):
-        if each.tag in ("link", "joint"):
-            return f"{place}: {each.tag} {each.get('name')!r}"
+    for ancestor in (element, *element.iterancestors()):
+        if ancestor.tag in ("link", "joint"):
+            return f"{place}: {ancestor.tag} {ancestor.get('name')!r}"
     return place
 
 
