@@ -75,8 +75,8 @@ def _list_stops(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
             continue
         sides = ((parts[number], -1), (parts[number + 1], 0))
         saved = 0.0
-        for part, end in sides:
-            course = lay_course(*part, _PLACES)
+        for (phase, x), end in sides:
+            course = lay_course(phase, x, _PLACES)
             saved += least_time(course) - least_time(course, end)
         words = "with a blend in place of" if _is_corner(problem, number) else "without"
         change = f"{words} the stop at s = {leg.end:.4g}"
@@ -98,11 +98,11 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
             continue
         length = path_speed(problem.task_map, problem.path, float(-end))
         mean = length / answer.program.end_time(answer.x)
-        more = _SHARE_OF_SPEED * (speed or mean)
-        changed = boundary.model_copy(update={key: speed + answer.step * more})
+        increase = _SHARE_OF_SPEED * (speed or mean)
+        changed = boundary.model_copy(update={key: speed + answer.step * increase})
         task = problem.task.model_copy(update={"boundary": changed})
         saved = -answer.change(replace(problem, task=task)) / answer.step
-        change = f"boundary.{key}: {speed + more:.2g} in place of {speed:.2g}"
+        change = f"boundary.{key}: {speed + increase:.2g} in place of {speed:.2g}"
         accuracy: Accuracy = "least" if problem.r and not speed else "estimate"
         yield TaskSaving(change, saved, accuracy)
 
@@ -145,22 +145,20 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
         shares = np.abs(direction) / widths
         if not shares.any():
             continue
-        most = int(np.argmax(shares))
-        length = _RANGE_SHARE / shares[most]
+        joint_index = int(np.argmax(shares))
+        length = _RANGE_SHARE / shares[joint_index]
         step = length * direction
         moved = posture + step
         inside = moved.clip(limits.position_lower, limits.position_upper)
         if (moved != inside).any():
             continue
         saved = float(length * (slopes @ slopes))
-        amount = f"{abs(step[most]):.3g} {robot.position_units[most]}"
-        if robot.position_units[most] == "rad":
-            amount += f" ({np.degrees(abs(step[most])):.3g} deg)"
-        way = "higher" if step[most] > 0.0 else "lower"
-        joint = robot.joint_names[most]
-        change = (
-            f"another {name} posture, {joint} {amount} {way} and the tool in its place,"
-        )
+        amount = f"{abs(step[joint_index]):.3g} {robot.position_units[joint_index]}"
+        if robot.position_units[joint_index] == "rad":
+            amount += f" ({np.degrees(abs(step[joint_index])):.3g} deg)"
+        side = "higher" if step[joint_index] > 0.0 else "lower"
+        joint = robot.joint_names[joint_index]
+        change = f"another {name} posture, {joint} {amount} {side} and the tool in its place,"
         yield TaskSaving(change, saved, "estimate")
 
 

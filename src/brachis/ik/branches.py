@@ -244,7 +244,7 @@ def fit(
     geometry: ChainGeometry,
     redundant: tuple[int, ...],
     joints: RemainingJoints,
-    *more: object,
+    *arguments: object,
 ) -> S:
     """Make a solver of joints in their order or, where it does not fit, in the reverse order.
 
@@ -268,7 +268,7 @@ def fit(
     reasons = []
     for order in (joints, joints.reverse()):
         try:
-            return solver(geometry, redundant, order, *more)
+            return solver(geometry, redundant, order, *arguments)
         except NotApplicableError as reason:
             reasons.append(str(reason))
     raise NotApplicableError("; ".join(dict.fromkeys(reasons)))

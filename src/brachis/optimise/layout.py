@@ -180,8 +180,8 @@ class VariableLayout:
     @cached_property
     def point(self) -> np.ndarray:
         """Points, (z,), at which variables matter: T, those of each curve, then h."""
-        own = np.arange(len(self._grid.t_norm))
-        return np.concatenate([own, self.sparsity.point, self._grid.point])
+        curve_points = np.arange(len(self._grid.t_norm))
+        return np.concatenate([curve_points, self.sparsity.point, self._grid.point])
 
     @cached_property
     def variable(self) -> np.ndarray:

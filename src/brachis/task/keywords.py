@@ -199,9 +199,9 @@ def check_keywords(
 def _as_keyword(parts: Sequence[str]) -> str:
     """Write a dotted key as a keyword: ``limits={'torque': ...}``."""
     names_section = parts[1:-1] and _SECTION_OF.get(parts[1]) == parts[0]
-    first, *inner = parts[1:] if names_section else parts
+    first, *inner_keys = parts[1:] if names_section else parts
     text = "..."
-    for key in reversed(inner):
+    for key in reversed(inner_keys):
         text = f"{{{key!r}: {text}}}"
     return f"{first}={text}"
 

@@ -140,7 +140,7 @@ class FitReport(Model):
     @property
     def listed_corners(self) -> str:
         """The first ten corners."""
-        return name_first([str(corner) for corner in self.corners], ", ", most=10)
+        return name_first([str(corner) for corner in self.corners], ", ", count=10)
 
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""

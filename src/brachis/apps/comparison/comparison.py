@@ -18,7 +18,7 @@ from brachis.common.files import file_name
 from brachis.common.progress import Listener
 from brachis.common.summary import Summary
 from brachis.errors import PathError, PlanningError
-from brachis.planner import Given, plan
+from brachis.planner import RobotOrTask, plan
 from brachis.result import Result
 from brachis.robot.task_map import JOINTS
 from brachis.task import Source, Task
@@ -213,7 +213,7 @@ class Comparison(Summary):
 @check_keywords
 def compare(
     recorded: str | os.PathLike[str] | Trajectory,
-    robot: Given = None,
+    robot: RobotOrTask = None,
     *,
     task: Source | None = None,
     task_space: str | Sequence[str] | None = None,

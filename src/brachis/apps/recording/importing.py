@@ -28,7 +28,7 @@ from brachis.common.arrays import spread, with_like_signs
 from brachis.common.files import file_name
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import Path, build_path
-from brachis.planner import Given
+from brachis.planner import RobotOrTask
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace
@@ -56,7 +56,7 @@ _SURE = 3.0
 @check_keywords
 def import_motion(
     path: str | os.PathLike[str],
-    robot: Given = None,
+    robot: RobotOrTask = None,
     *,
     task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
@@ -177,7 +177,7 @@ def import_motion(
     )
 
 
-def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
+def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | None]:
     """Return the robot with the settings of the task, and the task, which may stand in the robot's place."""
     if task is None and robot is not None and not is_robot(robot):
         task = robot  # type: ignore[assignment]

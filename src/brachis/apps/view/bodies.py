@@ -326,7 +326,9 @@ def scene_meshes(trajectory: Trajectory) -> Meshes:
     meshes: Meshes = defaultdict(list)
     if scene is None:
         return meshes
-    for number, solid in enumerate(scene.solids[scene.own :], scene.own):
+    for number, solid in enumerate(
+        scene.solids[scene.robot_count :], scene.robot_count
+    ):
         mesh = _mesh_of(solid)
         mesh.apply_transform(scene.placements[number])
         meshes[int(scene.joints[number])].append(mesh)

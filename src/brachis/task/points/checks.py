@@ -166,7 +166,7 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
     if not again.size:
         return points
     count = write_count(len(again), "row")
-    rows = name_first([str(row) for row in points.rows[again]], ", ", most=5)
+    rows = name_first([str(row) for row in points.rows[again]], ", ", count=5)
     note = f"left out {count} at the place of the row before: {points.row}s {rows}"
     return replace(remaining, notes=(*remaining.notes, note))
 
