@@ -261,7 +261,7 @@ class UnknownNameError(InputError):
         name: str,
         valid: Iterable[str],
         *,
-        further_names: Sequence[str] = (),
+        more_names: Sequence[str] = (),
         where: str | None = None,
         hint: str | None = None,
     ) -> None:
@@ -269,7 +269,7 @@ class UnknownNameError(InputError):
         self.name = name
         self.valid = tuple(valid)
         super().__init__(
-            f"there is no {kind} named {' or '.join(map(repr, (name, *further_names)))}",
+            f"there is no {kind} named {' or '.join(map(repr, (name, *more_names)))}",
             allowed=", ".join(self.valid) or "none",
             where=where,
             hint=hint or suggest(name, self.valid),
@@ -282,10 +282,8 @@ def check_names(
     """Refuse names that do not exist; see `UnknownNameError`."""
     unknown = [name for name in names if name not in valid]
     if unknown:
-        first, *further_names = unknown
-        raise UnknownNameError(
-            kind, first, valid, further_names=further_names, where=where
-        )
+        first, *more_names = unknown
+        raise UnknownNameError(kind, first, valid, more_names=more_names, where=where)
 
 
 class LimitError(InputError):
@@ -474,17 +472,15 @@ class MissingAttributeError(AttributeError):
 
 def _attribute_meant(instance: object, name: str) -> str | None:
     """Return the attribute of an object, or of one of its parts, that may be meant by a name."""
-    attributes = [
-        attribute for attribute in dir(instance) if not attribute.startswith("_")
-    ]
+    public = [entry for entry in dir(instance) if not entry.startswith("_")]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
-        if word in attributes or "." in word:
+        if word in public or "." in word:
             return word
         for field, value in vars(instance).items():
             known = hasattr(type(value), word) or word in getattr(value, "__dict__", ())
-            if field in attributes and known:
+            if field in public and known:
                 return f"{field}.{word}"
-    return nearest(name, attributes, is_attribute=True)
+    return nearest(name, public, is_attribute=True)
 
 
 def no_attribute(

@@ -257,9 +257,7 @@ class PhasePlane:
         floor, ceiling = kernel.bounds_of_pairs(*lines, _TINY)
         self._floor[chunk] = floor[inside]
         # The rows at the stations themselves keep u from swinging between its neighbours.
-        lines = _as_lines(
-            *(to_stations(coefficients, steps) for coefficients in (a, b, low, high))
-        )
+        lines = _as_lines(*(to_stations(term, steps) for term in (a, b, low, high)))
         at_stations = kernel.bounds_of_pairs(*lines, _TINY)[1]
         last = end + 1 if end == len(self._steps) else end
         stations = slice(begin, last)
