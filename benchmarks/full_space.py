@@ -75,7 +75,7 @@ class AllJointsMap(JointMap):
 
 
 class FullSpace:
-    """The transcription as a `brachis.optimise.backends.protocol.Problem`.
+    """The transcription as a `brachis.optimise.backends.protocol.NonlinearProgram`.
 
     Parameters
     ----------

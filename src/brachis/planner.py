@@ -49,7 +49,7 @@ from brachis.search.schedule import has_charts
 from brachis.search.stages import FinishedCandidate
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.timing import SlowTimingWarning, find_timing_gap
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import MotionSource, motion_of
 
 RobotOrTask = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -68,7 +68,7 @@ def plan(
     /,
     task: Source | None = None,
     *,
-    start_from: Motion | None = None,
+    start_from: MotionSource | None = None,
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,

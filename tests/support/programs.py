@@ -1,4 +1,4 @@
-"""Small nonlinear programs with known optima that implement `brachis.optimise.backends.Problem`."""
+"""Small nonlinear programs with known optima that implement `brachis.optimise.backends.NonlinearProgram`."""
 
 from __future__ import annotations
 

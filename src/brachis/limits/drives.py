@@ -35,7 +35,7 @@ from brachis.common.labels import Label
 from brachis.limits.joint import power_partials, powers
 from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot
-from brachis.robot.limits import Curve
+from brachis.robot.limits import TorqueSpeedCurve
 from brachis.task import LIMIT_KINDS, Task
 
 
@@ -101,7 +101,7 @@ class RoundedCurve:
     bends: np.ndarray
 
     @classmethod
-    def below(cls, curve: Curve) -> RoundedCurve | None:
+    def below(cls, curve: TorqueSpeedCurve) -> RoundedCurve | None:
         """Round a curve; None for a curve that does not fall.
 
         Its last slope goes on until no torque is left. A level beginning is left out, and the piece that follows it

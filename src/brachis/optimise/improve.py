@@ -18,7 +18,7 @@ from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.backends import (
-    Problem,
+    NonlinearProgram,
     Progress,
     Solver,
     SolverOptions,
@@ -355,7 +355,7 @@ class SolverSession:
         until = self.deadline.within(self.options.time_limit)
 
         def solve_with(
-            backend: Solver, problem: Problem, x: np.ndarray
+            backend: Solver, problem: NonlinearProgram, x: np.ndarray
         ) -> SolverReport:
             """Solve in the time that is left."""
             nonlocal learnt

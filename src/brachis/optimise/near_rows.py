@@ -19,7 +19,7 @@ import numpy as np
 from brachis.optimise.backends import (
     FEASIBLE,
     Curvature,
-    Problem,
+    NonlinearProgram,
     SolverReport,
     SolveStatus,
     residual,
@@ -52,16 +52,16 @@ _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 
 
 class NearRows:
-    """A program without some of its rows; a `Problem`.
+    """A program without some of its rows; a `NonlinearProgram`.
 
     Parameters
     ----------
-    program : Problem
+    program : NonlinearProgram
     numbers : (c',) int ndarray
         Indices of the rows to keep, ascending.
     """
 
-    def __init__(self, program: Problem, numbers: np.ndarray) -> None:
+    def __init__(self, program: NonlinearProgram, numbers: np.ndarray) -> None:
         self._program = program
         self._numbers = numbers
         is_near = np.zeros(len(program.lower), dtype=bool)
@@ -103,7 +103,7 @@ class NearRows:
         return Curvature(find_hessian, curvature.multipliers[self._numbers])
 
 
-class HasValues(Problem, Protocol):
+class HasValues(NonlinearProgram, Protocol):
     """A problem whose rows are values of limits at places."""
 
     @property
@@ -114,7 +114,7 @@ class HasValues(Problem, Protocol):
 def solve_near_rows(
     program: HasValues,
     x: np.ndarray,
-    solve: Callable[[Problem, np.ndarray], SolverReport],
+    solve: Callable[[NonlinearProgram, np.ndarray], SolverReport],
     *,
     is_answer: bool = False,
     kept_rows: Sequence[int] = (),
@@ -171,7 +171,7 @@ def solve_near_rows(
 def solve_near_values(
     program: HasValues,
     x: np.ndarray,
-    solve: Callable[[Problem, np.ndarray], SolverReport],
+    solve: Callable[[NonlinearProgram, np.ndarray], SolverReport],
 ) -> SolverReport:
     """Solve a program from a point, with the values that come near their bounds anywhere.
 
@@ -206,7 +206,7 @@ def solve_near_values(
 
 
 def _complete(
-    program: Problem, numbers: np.ndarray, reports: Sequence[SolverReport]
+    program: NonlinearProgram, numbers: np.ndarray, reports: Sequence[SolverReport]
 ) -> SolverReport:
     """Combine the reports; the last solve had the rows with these numbers."""
     last = reports[-1]

@@ -354,7 +354,7 @@ def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
 
 
 class PathProgram(PhaseSequence[PathPhase]):
-    """The NLP over the path of all phases; a `Problem` for the solvers.
+    """The NLP over the path of all phases; a `NonlinearProgram` for the solvers.
 
     Parameters
     ----------

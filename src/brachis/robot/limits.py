@@ -17,7 +17,7 @@ from brachis.task import FROM_URDF, LIMIT_KINDS, LimitSpec, check_robot_settings
 from brachis.task.fields import LARGEST, LEAST
 from brachis.task.limit_models import map_by_joint, per_joint_values
 
-Curve = tuple[tuple[float, float], ...]
+TorqueSpeedCurve = tuple[tuple[float, float], ...]
 """Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
 
 FARTHEST = 1e6
@@ -65,7 +65,7 @@ class Limits(_JointArrays, Summary):  # type: ignore[misc]
     """
 
     total_power: float
-    torque_speed: tuple[Curve, ...]
+    torque_speed: tuple[TorqueSpeedCurve, ...]
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
@@ -348,7 +348,7 @@ def _resolve_total_power(spec: LimitSpec) -> float:
     return float(scaled)
 
 
-def _resolve_curve(points: Any, joint: str, factor: float) -> Curve:
+def _resolve_curve(points: Any, joint: str, factor: float) -> TorqueSpeedCurve:
     """Check the points (speed, torque) of a joint's curve, and scale its torques."""
     if points is None:
         return ()

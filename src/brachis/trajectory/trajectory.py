@@ -405,10 +405,10 @@ class HasMotion(Protocol):
         """Return the motion."""
 
 
-Motion = Trajectory | HasMotion | str | os.PathLike[str]
+MotionSource = Trajectory | HasMotion | str | os.PathLike[str]
 
 
-def motion_of(source: Motion, where: str = "trajectory") -> Trajectory:
+def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
     """Return the trajectory that is given, as the argument `where` of a public function.
 
     Raises
@@ -436,11 +436,11 @@ def motion_of(source: Motion, where: str = "trajectory") -> Trajectory:
 
 def of_motion(
     function: Callable[Concatenate[Trajectory, _P], _R],
-) -> Callable[Concatenate[Motion, _P], _R]:
+) -> Callable[Concatenate[MotionSource, _P], _R]:
     """Let a function of a trajectory take all that `motion_of` does."""
 
     @wraps(function)
-    def taking(trajectory: Motion, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+    def taking(trajectory: MotionSource, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Call the function with the trajectory of what is given."""
         return function(motion_of(trajectory), *args, **kwargs)
 

@@ -20,7 +20,7 @@ from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace, RowsAndAngle
 from brachis.robot.urdf_bodies import turns_about
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import MotionSource, motion_of
 from brachis.verify.checks import (
     check_continuity,
     check_ends,
@@ -37,7 +37,7 @@ from brachis.verify.report import Check, Verification, VerifyOptions
 
 
 def verify_trajectory(
-    trajectory: Motion,
+    trajectory: MotionSource,
     options: VerifyOptions | None = None,
     *,
     robot: Robot | None = None,

@@ -13,7 +13,7 @@ from brachis.apps.export.rows import rows_of
 from brachis.apps.export.tables import write_csv, write_json, write_parquet
 from brachis.common.files import atomic_write, file_name
 from brachis.errors import InputError, check_names
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import MotionSource, motion_of
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
 
 
 def write(
-    trajectory: Motion,
+    trajectory: MotionSource,
     path: str | os.PathLike[str],
     *,
     form: str | None = None,

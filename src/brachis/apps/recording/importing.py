@@ -16,7 +16,7 @@ import numpy as np
 
 from brachis import ik
 from brachis.apps.recording.nodes import (
-    Nodes,
+    RecordedNodes,
     find_rests,
     nodes_of,
     split_at_rests,
@@ -129,7 +129,7 @@ def import_motion(
     error = recording.rounding if noise is None else _SURE * deviation
     virtual = (0, bound.n - given_robot.n)  # virtual joints stand still
     states = np.pad(nodes.states, ((0, 0), (0, 0), virtual))
-    nodes = with_rests(Nodes(nodes.t, states, nodes.notes))
+    nodes = with_rests(RecordedNodes(nodes.t, states, nodes.notes))
     if tolerance is None:
         slopes = np.abs(task_map.jacobian(task_map.twists(nodes.q)))
         moved = slopes[:, :, : len(deviation)] @ deviation
@@ -195,7 +195,7 @@ def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | 
 
 
 def _join_coordinate(
-    nodes: Nodes, followed: RecoveredPath
+    nodes: RecordedNodes, followed: RecoveredPath
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return knots and control points of s over time, which stays where it is during the waits; see `join_splines`."""
     is_resting, _ = nodes.at_rest
@@ -217,7 +217,7 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
     assert trajectory.recovered is not None
     _, task_map = bind(trajectory.robot, JOINTS)
     states = np.stack([trajectory.q, trajectory.qdot, trajectory.qddot])
-    nodes = Nodes(trajectory.times, states)
+    nodes = RecordedNodes(trajectory.times, states)
     return recover_path(task_map, nodes, trajectory.recovered.tolerance).segments
 
 
@@ -243,7 +243,9 @@ class RecoveredPath:
     miss: float
 
 
-def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> RecoveredPath:
+def recover_path(
+    task_map: TaskMap, nodes: RecordedNodes, tolerance: float
+) -> RecoveredPath:
     """Recover the path that a motion prescribes in a task space, within a tolerance, m and rad; it stops at waits.
 
     Raises
@@ -274,7 +276,7 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
 
 
 def _follow(
-    task_map: TaskMap, nodes: Nodes, tolerance: float
+    task_map: TaskMap, nodes: RecordedNodes, tolerance: float
 ) -> tuple[list[Segment], np.ndarray, np.ndarray, np.ndarray]:
     """Fit segments to a part of a motion between waits; see `recover_path`.
 
@@ -438,7 +440,7 @@ def _task_of(
     settings: Task | None,
     robot: Robot,
     task_map: TaskMap,
-    nodes: Nodes,
+    nodes: RecordedNodes,
     segments: Sequence[Segment],
     space: str | Sequence[str],
 ) -> Task:

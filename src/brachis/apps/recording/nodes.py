@@ -41,7 +41,7 @@ _NARROWEST = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class RecordedNodes:
     """A motion in quintic pieces between nodes.
 
     Attributes
@@ -80,7 +80,7 @@ class Nodes:
         return not self.qdot[ends].any(), not self.qddot[ends].any()
 
 
-def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
+def nodes_of(recording: Recording, deviation: np.ndarray) -> RecordedNodes:
     """Find velocities and accelerations.
 
     Parameters
@@ -113,7 +113,7 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
         for end in (0, -1):
             if np.all(np.abs(states[order, end]) <= small):
                 states[order, end] = 0.0
-    return Nodes(t, states[:3], tuple(notes))
+    return RecordedNodes(t, states[:3], tuple(notes))
 
 
 def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
@@ -363,7 +363,7 @@ def _place_jump(
     return np.array([first, last]), np.stack([begin, end], axis=1)
 
 
-def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
+def find_rests(nodes: RecordedNodes) -> list[tuple[int, int]]:
     """Find the waits inside a motion: numbers of the first and the last node of each.
 
     A wait has five rows or more, none of them the first or the last one of the motion.
@@ -381,17 +381,19 @@ def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
     ]
 
 
-def with_rests(nodes: Nodes) -> Nodes:
+def with_rests(nodes: RecordedNodes) -> RecordedNodes:
     """Return the motion without the rounding of its positions, velocities and accelerations at rest."""
     states = nodes.states.copy()
     for first, end in find_rests(nodes):
         states[0, first : end + 1] = nodes.q[first]
         states[1:, first : end + 1] = 0.0
-    return Nodes(nodes.t, states, nodes.notes)
+    return RecordedNodes(nodes.t, states, nodes.notes)
 
 
-def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:
+def split_at_rests(
+    nodes: RecordedNodes, rests: list[tuple[int, int]]
+) -> list[RecordedNodes]:
     """Return the parts between waits in which the motion moves."""
     edges = [0, *chain(*rests), len(nodes.t) - 1]
     moves = [slice(a, b + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [Nodes(nodes.t[move], nodes.states[:, move]) for move in moves]
+    return [RecordedNodes(nodes.t[move], nodes.states[:, move]) for move in moves]

@@ -10,8 +10,8 @@ import numpy as np
 from brachis.apps.bottleneck.saturation import THRESHOLD, knot_times
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
-    Curve,
     Panel,
+    PanelCurve,
     at_distinct_times,
     curves_of,
     joint_rows_of,
@@ -70,7 +70,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
 
 def _traces(
-    panel: Panel, curve: Curve, axis: str, *, is_named: bool
+    panel: Panel, curve: PanelCurve, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
     """Draw one curve, and its limits, which the page draws thin and dashed."""
     look = style.joint_style(curve.style)

@@ -14,7 +14,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
-from brachis.apps.plots.panels import Curve, Panel, curves_of
+from brachis.apps.plots.panels import Panel, PanelCurve, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
 from brachis.robot.from_task import in_use
@@ -186,7 +186,7 @@ def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
     return joints
 
 
-def _find_peak(panel: Panel, curve: Curve, tolerance: float) -> dict[str, str]:
+def _find_peak(panel: Panel, curve: PanelCurve, tolerance: float) -> dict[str, str]:
     """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
     ratios = np.abs(curve.ratios if curve.is_limited else curve.values)
     worst = np.argmax(ratios)

@@ -92,7 +92,7 @@ class Outcome:
         return cls(facts)
 
 
-Row = tuple[Mapping[str, Any], Plan | BrachisError]
+SweepRow = tuple[Mapping[str, Any], Plan | BrachisError]
 """Values of the varied keys, and the plan, or an error if the task is refused: one row of the sweep's table."""
 
 
@@ -105,12 +105,12 @@ class SweepPlan:
     settings : SweepSettings
     base : mapping
         The task, not checked yet.
-    rows : tuple of Row
+    rows : tuple of SweepRow
     """
 
     settings: SweepSettings
     base: Mapping[str, Any]
-    rows: tuple[Row, ...]
+    rows: tuple[SweepRow, ...]
 
 
 def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
@@ -192,7 +192,7 @@ def _plan(
     return Plan(digest, task, urdf, brachis.__version__)
 
 
-def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None:
+def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) -> None:
     """Refuse keys that make every task wrong, and names that the robot does not have.
 
     Raises

@@ -9,7 +9,7 @@ from brachis.optimise.backends.monitor import objective_at, residual
 from brachis.optimise.backends.protocol import (
     FEASIBLE,
     Curvature,
-    Problem,
+    NonlinearProgram,
     Progress,
     SolverOptions,
     SolverReport,
@@ -20,7 +20,7 @@ __all__ = [
     "FEASIBLE",
     "NAMES",
     "Curvature",
-    "Problem",
+    "NonlinearProgram",
     "Progress",
     "SolveStatus",
     "Solver",

@@ -32,7 +32,7 @@ from brachis.optimise.backends.monitor import (
     residual,
 )
 from brachis.optimise.backends.protocol import (
-    Problem,
+    NonlinearProgram,
     Progress,
     SolverOptions,
     SolverReport,
@@ -75,7 +75,7 @@ class Solver:
 
     def solve(
         self,
-        problem: Problem,
+        problem: NonlinearProgram,
         x: np.ndarray,
         options: SolverOptions,
         progress: Progress | None,
@@ -109,7 +109,7 @@ class Solver:
 
 def _report_point(
     solver: str,
-    problem: Problem,
+    problem: NonlinearProgram,
     x: np.ndarray,
     status: SolveStatus,
     message: str,
@@ -123,7 +123,7 @@ def _report_point(
 
 def subprocess_solve(
     solver: Solver,
-    problem: Problem,
+    problem: NonlinearProgram,
     x: np.ndarray,
     options: SolverOptions,
     progress: Progress | None,
@@ -202,7 +202,7 @@ def _receive(
 def _work(
     sender: Connection,
     run: Run,
-    problem: Problem,
+    problem: NonlinearProgram,
     x: np.ndarray,
     options: SolverOptions,
 ) -> None:

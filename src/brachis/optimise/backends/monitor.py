@@ -13,7 +13,7 @@ import numpy as np
 from brachis.common.interrupts import SigintHandler
 from brachis.errors import UnreachableError
 from brachis.optimise.backends.protocol import (
-    Problem,
+    NonlinearProgram,
     Progress,
     SolverOptions,
     SolverReport,
@@ -41,7 +41,7 @@ class SolveMonitor:
 
     Parameters
     ----------
-    problem : Problem
+    problem : NonlinearProgram
     options : SolverOptions
     progress : Progress or None
 
@@ -52,7 +52,10 @@ class SolveMonitor:
     """
 
     def __init__(
-        self, problem: Problem, options: SolverOptions, progress: Progress | None
+        self,
+        problem: NonlinearProgram,
+        options: SolverOptions,
+        progress: Progress | None,
     ) -> None:
         self.problem = problem
         self.options = options
@@ -240,7 +243,9 @@ def is_usable(values: np.ndarray) -> bool:
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
 
-def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> float:
+def objective_at(
+    problem: NonlinearProgram, x: np.ndarray, otherwise: float = np.inf
+) -> float:
     """Objective at x; another value where x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -250,14 +255,14 @@ def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> 
     return otherwise if np.isnan(value) else value
 
 
-def residual(problem: Problem, x: np.ndarray) -> float:
+def residual(problem: NonlinearProgram, x: np.ndarray) -> float:
     """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
     of_bounds = np.minimum(x - problem.x_lower, problem.x_upper - x)
     least = float(np.append(row_slack(problem, x), of_bounds).min(initial=0.0))
     return np.inf if np.isnan(least) else 0.0 - least
 
 
-def row_slack(problem: Problem, x: np.ndarray) -> np.ndarray:
+def row_slack(problem: NonlinearProgram, x: np.ndarray) -> np.ndarray:
     """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):

@@ -57,7 +57,7 @@ class Curvature:
     multipliers: np.ndarray
 
 
-class Problem(Protocol):
+class NonlinearProgram(Protocol):
     """A sparse nonlinear program; `brachis.optimise.program.Program` is one."""
 
     x_lower: np.ndarray

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.optimise.backends.protocol import Curvature, Problem
+from brachis.optimise.backends.protocol import Curvature, NonlinearProgram
 
 _ENOUGH = 0.01
 """Trace of B, as a part of that by the first guess, from which on a solver's multipliers are used."""
@@ -31,7 +31,7 @@ class SecantHessian:
 
     Parameters
     ----------
-    problem : Problem
+    problem : NonlinearProgram
     known : Curvature
     learnt : (v, v) ndarray, optional
         A at first; by default zero.
@@ -43,7 +43,10 @@ class SecantHessian:
     """
 
     def __init__(
-        self, problem: Problem, known: Curvature, learnt: np.ndarray | None = None
+        self,
+        problem: NonlinearProgram,
+        known: Curvature,
+        learnt: np.ndarray | None = None,
     ) -> None:
         self._problem = problem
         self._known = known
@@ -55,7 +58,7 @@ class SecantHessian:
 
     @classmethod
     def of(
-        cls, problem: Problem, x: np.ndarray, learnt: np.ndarray | None
+        cls, problem: NonlinearProgram, x: np.ndarray, learnt: np.ndarray | None
     ) -> SecantHessian | None:
         """Begin a solve from x, (v,), of a problem that knows a part of its Hessian; None for one that does not."""
         known = problem.curvature(x)

@@ -16,7 +16,11 @@ from typing import Any
 import numpy as np
 
 from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
-from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    NonlinearProgram,
+    SolverReport,
+    SolveStatus,
+)
 from brachis.optimise.backends.secant import SecantHessian
 
 NAME = "uno"
@@ -131,7 +135,7 @@ def _backend(settings: dict[str, Any]) -> Any:
     return backend
 
 
-def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
+def _units(problem: NonlinearProgram, x: np.ndarray) -> np.ndarray:
     """Units of the variables, (v,), in which the largest slopes of rows at x are the square roots of what they are.
 
     Uno's subproblem solver breaks down where slopes differ by four orders of magnitude: 100 intervals, a short time.
