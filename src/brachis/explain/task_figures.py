@@ -161,7 +161,7 @@ def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
     return carried
 
 
-Figure = tuple[Sensitivity, Callable[[float], Problem]]
+TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
 """A figure of a task, what it costs not known yet, and the problem with another value of it."""
 
 
@@ -178,7 +178,7 @@ def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
     return tuple(costs)
 
 
-def _speeds(problem: Problem) -> Iterator[Figure]:
+def _speeds(problem: Problem) -> Iterator[TaskFigure]:
     """List process speeds; parts of the path with the same speed have one figure."""
     limits = problem.task.tool_limits
 
@@ -209,7 +209,7 @@ def _speeds(problem: Problem) -> Iterator[Figure]:
         yield Sensitivity(label, None, speed, speed, 0.0, s), partial(change, speed)
 
 
-def _blends(problem: Problem) -> Iterator[Figure]:
+def _blends(problem: Problem) -> Iterator[TaskFigure]:
     """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()

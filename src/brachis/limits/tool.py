@@ -8,7 +8,7 @@ With J the Jacobian of a velocity of the tool, v = J(q) qdot and its direction e
 and likewise for the size of the acceleration a = J qddot + Jdot qdot. A vector of zero size gets the direction zero: it
 is far from its limit.
 
-The largest speed of the tool frame's origin may depend on the path coordinate: piecewise linear (`SpeedTable`).
+The largest speed of the tool frame's origin may depend on the path coordinate: piecewise linear (`SpeedProfile`).
 
 Tolerances that are more than ranges of the tool's virtual joints are a cone, a sphere, and a box in the world's axes.
 With the angles a (side) and b (lead) the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
@@ -33,8 +33,7 @@ from brachis.limits.protocol import (
 )
 from brachis.robot import Robot
 from brachis.robot.task_map import Pose
-from brachis.task import SpeedTable as SpeedTableModel
-from brachis.task import Task
+from brachis.task import SpeedTable, Task
 
 PROCESS_SPEED = "process speed"
 """Name of what gives the tool's speed, from which the largest speed next to it follows."""
@@ -62,7 +61,7 @@ class ToolRatios(Limit):
         )
 
 
-class SpeedTable:
+class SpeedProfile:
     """Largest sizes of a motion at path coordinates: piecewise linear, with steps made into ramps on their faster side.
 
     Parameters
@@ -146,7 +145,7 @@ class ToolMotionLimit(ToolRatios):
         self,
         robot: Robot,
         quantity: str,
-        tables: Sequence[SpeedTable],
+        tables: Sequence[SpeedProfile],
         labels: Sequence[Label],
     ) -> None:
         # The largest figure of a table stands for all of them.
@@ -201,9 +200,9 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     labels = []
     if speed is not None:
         tables.append(
-            SpeedTable(speed.s, speed.speed)
-            if isinstance(speed, SpeedTableModel)
-            else SpeedTable([0.0], [speed])
+            SpeedProfile(speed.s, speed.speed)
+            if isinstance(speed, SpeedTable)
+            else SpeedProfile([0.0], [speed])
         )
         labels.append(_label("speed", "m/s"))
     leads = [lead for section in limits.process_speed for lead in section.leads]
@@ -221,7 +220,7 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
         ),
     ):
         for table in tables_of_speed:
-            tables.append(SpeedTable(table.s, table.speed, covers_path=False))
+            tables.append(SpeedProfile(table.s, table.speed, covers_path=False))
             s = f"s = {table.s[0]:.4g} to {table.s[-1]:.4g}"
             active = text and f"at {s}, {text}"
             labels.append(
@@ -244,7 +243,7 @@ def build_constant(
     figure = getattr(task.tool_limits, quantity.replace(" ", "_"))
     if figure is None:
         return None
-    table = SpeedTable([0.0], [figure])
+    table = SpeedProfile([0.0], [figure])
     return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
 
 

@@ -111,7 +111,7 @@ class Join:
         )
 
 
-class Corner(NamedTuple):
+class Kink(NamedTuple):
     """A join where curves do not continue each other; what jumps, in words; what to try."""
 
     join: Join
@@ -128,10 +128,10 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
     ]
 
 
-def row_corner(join: Join) -> Corner | None:
+def row_corner(join: Join) -> Kink | None:
     """Return what jumps from one curve of rows to the next, or None where three derivatives continue."""
     jump = _mismatch(join, *join.sides())
-    return Corner(join, jump, f"Set {join.rounding}") if jump else None
+    return Kink(join, jump, f"Set {join.rounding}") if jump else None
 
 
 def _mismatch(join: Join, before: Array, after: Array) -> str | None:
@@ -161,7 +161,7 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
     return f"a jump of {np.linalg.norm(after[3] - before[3]):.4g} 1/m^2 in the third derivative"
 
 
-def refuse_corners(corners: Sequence[Corner | None]) -> None:
+def refuse_corners(corners: Sequence[Kink | None]) -> None:
     """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
     refused = [corner for corner in corners if corner is not None]
     if not refused:
@@ -185,13 +185,13 @@ def angle_between(first: Array, second: Array) -> float:
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
 
 
-def pose_corner(join: Join) -> Corner | None:
+def pose_corner(join: Join) -> Kink | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
     on_the_spot = [
         stands_still(curve, join.positions) for curve in (join.first, join.second)
     ]
     if on_the_spot[0] != on_the_spot[1]:
-        return Corner(
+        return Kink(
             join,
             "a stop: the position moves on one side, and the tool turns on the spot on the other",
             f"Turn the tool along a segment, by its orientation, or set {join.stopping}",
@@ -199,12 +199,12 @@ def pose_corner(join: Join) -> Corner | None:
     before, after = join.sides()
     jump = _mismatch(join, before[:, : join.positions], after[:, : join.positions])
     if jump:
-        return Corner(join, jump, f"Set {join.rounding}")
+        return Kink(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
     jump = _turning_mismatch(join, before, after, unit)
     otherwise = join.stopping if on_the_spot[0] else join.rounding
     advice = f"Set profile: smooth where the tool turns, or {otherwise}"
-    return Corner(join, jump, advice) if jump else None
+    return Kink(join, jump, advice) if jump else None
 
 
 def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str | None:

@@ -33,7 +33,7 @@ from brachis.search.guesses import FAMILY, bring_onto_path
 from brachis.search.joint_choice import SELECTABLE
 from brachis.search.least_motion import LeastMotion
 from brachis.search.schedule import has_charts
-from brachis.search.stages import FinishedCandidate, InitialGuess, PathMap
+from brachis.search.stages import FinishedCandidate, InitialGuess, SearchMap
 from brachis.task import Posture, Task, Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
@@ -242,7 +242,7 @@ def _in_coordinates(
     motion: Trajectory,
     s: np.ndarray,
     q: np.ndarray,
-) -> tuple[PathMap, np.ndarray, str]:
+) -> tuple[SearchMap, np.ndarray, str]:
     """Joint map, its curves (S, 1 + r), and family, for path coordinates (S,) and postures (S, n)."""
     if isinstance(problem.task_map, JointSpace):
         return JointSpaceMap(problem.robot, problem.path), s[:, None], FAMILY

@@ -34,7 +34,7 @@ SLOW = "not refined: no faster than another over as many knots"
 """Status of a candidate that does not beat the best one before refinement."""
 NO_TIMING = "the limits allow no timing"
 """Status of a candidate whose joint path cannot be followed within the limits."""
-PathMap = ClosedFormMap | ChartMap | JointSpaceMap
+SearchMap = ClosedFormMap | ChartMap | JointSpaceMap
 """Joint maps along a path."""
 
 
@@ -81,7 +81,7 @@ class InitialGuess(Summary):
     """
 
     problem: Problem
-    joint_map: PathMap
+    joint_map: SearchMap
     joint_path: np.ndarray
     estimate: float
     origin: str

@@ -66,21 +66,21 @@ _EntryOrNull = Annotated[
     AnyPositive | _Pair | None,
     ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
 ]
-UrdfLimit = Annotated[
+PairEntry = Annotated[
     Literal["urdf"] | AnyPositive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
     ByForm(
         "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
         "zero or null; null (no limit), urdf (as in the URDF)"
     ),
 ]
-OwnLimit = Annotated[
+NumberEntry = Annotated[
     AnyPositive | NonEmpty[AnyPositive] | dict[Name, AnyPositive | None] | None,
     ByForm(
         "a number > 0 for all joints, a list of numbers > 0, "
         "a mapping of joint name to number > 0 or null, null (no limit)"
     ),
 ]
-PositionLimit = Annotated[
+RangeEntry = Annotated[
     Literal["urdf"] | NonEmpty[Interval] | dict[Name, Interval | None] | None,
     ByForm(
         "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), "
@@ -92,7 +92,7 @@ TorqueCurve = Annotated[
 ]
 """Points [speed, torque]."""
 
-_FORMS = {"number": OwnLimit, "pair": UrdfLimit, "range": PositionLimit}
+_FORMS = {"number": NumberEntry, "pair": PairEntry, "range": RangeEntry}
 _JointLimits: Any = make_dataclass(
     "_JointLimits",
     [

@@ -63,7 +63,7 @@ FAILED = "failed"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PlanOutcome:
     """What came of a plan.
 
     Attributes
@@ -80,7 +80,7 @@ class Outcome:
     @classmethod
     def of_error(
         cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
-    ) -> Outcome:
+    ) -> PlanOutcome:
         """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
         kind = type(error).__name__
         facts = {
@@ -233,7 +233,7 @@ def robot_of(plan: Plan) -> Robot:
     return robot_from_settings(plan.task.robot, urdf_text=plan.urdf)
 
 
-def run_plan(plan: Plan) -> Outcome:
+def run_plan(plan: Plan) -> PlanOutcome:
     """Make a plan; a worker calls this.
 
     Raises
@@ -261,7 +261,7 @@ def run_plan(plan: Plan) -> Outcome:
             result.save(path)
             motion = path.read_bytes()
     except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
-        return Outcome.of_error(error, time.perf_counter() - began)
+        return PlanOutcome.of_error(error, time.perf_counter() - began)
     remarks = [str(warning) for warning in result.warnings]
     remarks += [f"not completed: {step}" for step in result.not_completed]
     facts = {
@@ -276,4 +276,4 @@ def run_plan(plan: Plan) -> Outcome:
         "wall_time_s": wall_time,
         "remarks": "; ".join(remarks) or None,
     }
-    return Outcome(facts, motion)
+    return PlanOutcome(facts, motion)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brachis.apps.export.rows import require_library
-from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED, Outcome
+from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED, PlanOutcome
 from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.files import (
     atomic_write,
@@ -101,7 +101,7 @@ class Store:
         """Name a file of a plan, in one of 256 folders: a folder with thousands of files is slow to write to."""
         return self.folder / "plans" / digest[:2] / f"{digest}{suffix}"
 
-    def write(self, digest: str, outcome: Outcome) -> dict[str, Any]:
+    def write(self, digest: str, outcome: PlanOutcome) -> dict[str, Any]:
         """Store a finished plan; returns its columns."""
         motion = self._place(digest, ".npz")
         columns_file = self._place(digest, ".parquet")

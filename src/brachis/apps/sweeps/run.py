@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import brachis
-from brachis.apps.sweeps.plans import FAILED, Outcome, Plan, SweepPlan, load_sweep
+from brachis.apps.sweeps.plans import FAILED, Plan, PlanOutcome, SweepPlan, load_sweep
 from brachis.apps.sweeps.pools import Outcomes, Pool, pool_for
 from brachis.apps.sweeps.result import TABLE, Store, SweepResult
 from brachis.common import interrupts
@@ -124,7 +124,7 @@ def sweep(
         facts = (
             facts_by_digest[plan.digest]
             if isinstance(plan, Plan)
-            else Outcome.of_error(plan).facts
+            else PlanOutcome.of_error(plan).facts
         )
         rows[number] = (changes, facts)
     keys = planned.settings.keys

@@ -11,14 +11,14 @@ from brachis.apps.plots.postures import plane_of
 from brachis.apps.view.bodies import bodies_of, placements, prescribed_path
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
-from brachis.scene.scene import Scene as BodyScene
+from brachis.scene.scene import Scene
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import viser
 
 
-class Scene:
+class ViewerScene:
     """A robot and its motion in the browser.
 
     Parameters
@@ -91,7 +91,7 @@ class Scene:
         if self._cell is not None and "closest pair" in self.layers:
             self._show_closest(self._cell, q)
 
-    def _show_closest(self, cell: BodyScene, q: np.ndarray) -> None:
+    def _show_closest(self, cell: Scene, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
         line, label = self.layers["closest pair"]
         if not line.visible:

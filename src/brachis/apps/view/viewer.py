@@ -24,7 +24,7 @@ from brachis.apps.view.panel import (
     line_at,
     shown_panels,
 )
-from brachis.apps.view.scene import Scene, speed_colours
+from brachis.apps.view.scene import ViewerScene, speed_colours
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.common import interrupts
 from brachis.errors import BrachisError
@@ -89,7 +89,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._server = start_server(host, port)
         self._gui = self._server.gui
         try:
-            self._scene = Scene(self._server, trajectory)
+            self._scene = ViewerScene(self._server, trajectory)
             self._add_panels(candidates, verified=verified)
             self.show()
         except BaseException:
