@@ -78,8 +78,11 @@ def check_executor(value: object) -> None:
     InputError
     """
     if not hasattr(value, "submit"):
-        allowed = "an executor, such as concurrent.futures.ProcessPoolExecutor()"
-        raise _wrong_type(value, "executor", allowed)
+        raise _wrong_type(
+            value,
+            "executor",
+            "an executor, such as concurrent.futures.ProcessPoolExecutor()",
+        )
 
 
 def check_list(value: object, where: str, of: str) -> None:
@@ -110,9 +113,12 @@ def check_array(
     InputError
     """
     if not isinstance(value, np.ndarray):
-        shown = f"{type(value).__name__} {value!r:.60}"
-        allowed = f"a numpy array, {shape}"
-        raise InputError("wrong type", where=where, found=shown, allowed=allowed)
+        raise InputError(
+            "wrong type",
+            where=where,
+            found=f"{type(value).__name__} {value!r:.60}",
+            allowed=f"a numpy array, {shape}",
+        )
     if value.dtype.kind not in "fiu":
         raise InputError(
             "the array does not hold real numbers",
@@ -193,6 +199,10 @@ def check_most(
     InputError
     """
     if value > largest:
-        size = f"{value:.4g} {unit}"
-        allowed = f"at most {largest:g} {unit}"
-        raise InputError(problem, where=where, found=size, allowed=allowed, hint=hint)
+        raise InputError(
+            problem,
+            where=where,
+            found=f"{value:.4g} {unit}",
+            allowed=f"at most {largest:g} {unit}",
+            hint=hint,
+        )

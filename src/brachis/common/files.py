@@ -248,9 +248,10 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            "the file cannot be written", where=str(path), found=reason
+            "the file cannot be written",
+            where=str(path),
+            found=getattr(error, "strerror", None) or str(error),
         ) from error
 
 

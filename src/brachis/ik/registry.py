@@ -110,8 +110,7 @@ def check_families(families: Sequence[Family]) -> None:
             continue
         problem = _refuse_name(family.name, taken)
         if problem:
-            name = repr(family.name)
-            raise InputError(problem, where=f"{where}.name", found=name)
+            raise InputError(problem, where=f"{where}.name", found=repr(family.name))
         taken.add(family.name)
 
 

@@ -158,8 +158,11 @@ def build_user_limits(
             )
         for label in limit.labels:
             if str(label) in labels:
-                problem = "this label exists already; its subject and kind together must be unique"
-                raise InputError(problem, where=f"{where}.labels", found=str(label))
+                raise InputError(
+                    "this label exists already; its subject and kind together must be unique",
+                    where=f"{where}.labels",
+                    found=str(label),
+                )
         _check_functions(limit, robot)
         if has_check(model):
             moments = sample_moments(robot)
@@ -183,8 +186,11 @@ def _check_members(limit: Limit) -> None:
     parts = ("kind", "labels", "lower", "upper")
     missing = [name for name in parts if not hasattr(limit, name)]
     if missing:
-        problem = "the limit lacks required attributes"
-        raise InputError(problem, where=limit.origin, found=f"no {', '.join(missing)}")
+        raise InputError(
+            "the limit lacks required attributes",
+            where=limit.origin,
+            found=f"no {', '.join(missing)}",
+        )
     labels = limit.labels
     here = f"{limit.origin}.labels"
     if not (isinstance(labels, tuple | list) and all(map(_is_label, labels))):
@@ -249,15 +255,19 @@ def _check_functions(limit: Limit, robot: Robot) -> None:
     partials = limit.partials(known)
     here = f"{limit.origin}.partials"
     if not isinstance(partials, Partials):
-        problem = "the return value is not a brachis.limits.Partials"
-        raise InputError(problem, where=here, found=partials)
+        raise InputError(
+            "the return value is not a brachis.limits.Partials",
+            where=here,
+            found=partials,
+        )
     arrays = {
         name: array for name, array in vars(partials).items() if array is not None
     }
     if not arrays.keys() - {"s"}:
-        allowed = "at least one of q, qdot, qddot, qdddot"
         raise InputError(
-            "all partial derivatives are None", where=here, allowed=allowed
+            "all partial derivatives are None",
+            where=here,
+            allowed="at least one of q, qdot, qddot, qdddot",
         )
     count, n = known.q.shape
     for name, array in arrays.items():

@@ -176,8 +176,12 @@ def _check_start(key: str, off: Array, context: SegmentContext) -> None:
     for away, of, looks in ((moved, unit, hint), (turned, "rad", None)):
         distance = np.linalg.norm(away)
         if distance > START_TOLERANCE:
-            off_by = f"{place(context.rows, context.start)}, {distance:.4g} {of} off"
-            raise _starts_elsewhere(context, key, off_by, looks)
+            raise _starts_elsewhere(
+                context,
+                key,
+                f"{place(context.rows, context.start)}, {distance:.4g} {of} off",
+                looks,
+            )
 
 
 def _starts_elsewhere(

@@ -103,8 +103,10 @@ def name_failures(where: str, method: str) -> Iterator[None]:
     except Exception as error:
         if not where.startswith(f"{_SECTION}."):
             raise
-        problem = f"the plug-in's {method} failed: {type(error).__name__}: {error}"
-        raise InputError(problem, where=where) from error
+        raise InputError(
+            f"the plug-in's {method} failed: {type(error).__name__}: {error}",
+            where=where,
+        ) from error
 
 
 def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
@@ -119,9 +121,11 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
         with name_failures(where, "bind"):
             limit = model.bind(robot)
     except (TypeError, ValueError) as error:
-        problem = f"the limit cannot be built for this robot: {error}"
-        name = type(model).__name__
-        raise InputError(problem, where=where, found=name) from error
+        raise InputError(
+            f"the limit cannot be built for this robot: {error}",
+            where=where,
+            found=type(model).__name__,
+        ) from error
     if isinstance(limit, type) or not hasattr(limit, "origin"):
         raise InputError(
             "bind did not return a brachis.limits.Limit",
@@ -171,8 +175,9 @@ def check_ratios(
         try:
             ratios = np.array(ratios)
         except ValueError as error:
-            problem = f"the array has the wrong shape: {error}"
-            raise InputError(problem, where=here) from error
+            raise InputError(
+                f"the array has the wrong shape: {error}", where=here
+            ) from error
     moments = len(motion[0])
     check_array(ratios, (moments, size), here, remark=f" for {moments} moments")
     check_finite(ratios, here)

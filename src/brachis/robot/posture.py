@@ -61,8 +61,12 @@ def read_posture(
             allowed="a position for each joint",
         )
     if not all(isinstance(q_i, Real) and not isinstance(q_i, bool) for q_i in values):
-        problem = "a joint position is not a number"
-        raise InputError(problem, where=where, found=values, allowed=_ALLOWED)
+        raise InputError(
+            "a joint position is not a number",
+            where=where,
+            found=values,
+            allowed=_ALLOWED,
+        )
     q = np.array(values, dtype=float)
     if not np.all(np.abs(q) <= FARTHEST):
         raise InputError(

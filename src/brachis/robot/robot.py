@@ -101,12 +101,11 @@ class Robot(Summary):
     def __new__(cls, *arguments: object, **named_fields: object) -> Self:
         """Refuse a file name, which is for `from_urdf`."""
         if arguments or (named_fields and "model" not in named_fields):
-            allowed = 'brachis.Robot.from_urdf("robot.urdf")'
             raise InputError(
                 "a robot cannot be made from these arguments",
                 where="Robot",
                 found=arguments or named_fields,
-                allowed=allowed,
+                allowed='brachis.Robot.from_urdf("robot.urdf")',
             )
         return super().__new__(cls)
 

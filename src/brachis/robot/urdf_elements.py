@@ -154,8 +154,9 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     for element in robot.findall(kind):
         name = element.get("name")
         if not name:
-            place = f"{where}, line {element.sourceline}"
-            raise UrdfError(f"a <{kind}> has no name", where=place)
+            raise UrdfError(
+                f"a <{kind}> has no name", where=f"{where}, line {element.sourceline}"
+            )
         if name in named:
             repeated[name] = None
         named[name] = element

@@ -150,7 +150,8 @@ def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:
     try:
         root = etree.fromstring(text.encode())
     except etree.XMLSyntaxError as error:
-        problem = "the SRDF file is not XML"
-        raise TaskError(problem, where=where, found=str(error)) from error
+        raise TaskError(
+            "the SRDF file is not XML", where=where, found=str(error)
+        ) from error
     elements = root.iter("disable_collisions")
     return [(element.get("link1"), element.get("link2")) for element in elements]

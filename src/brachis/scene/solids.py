@@ -152,8 +152,10 @@ def read_solids(
             try:
                 geometry = _geometry(collision, folder)
             except (InputError, ValueError) as error:
-                problem = f"the collision geometry cannot be read: {error}"
-                raise UrdfError(problem, where=f"link {name!r}") from error
+                raise UrdfError(
+                    f"the collision geometry cannot be read: {error}",
+                    where=f"link {name!r}",
+                ) from error
             placement = origin_of(collision, "origin")
             yield Solid(label, name, geometry, placement, padding.get(name, 0.0))
 

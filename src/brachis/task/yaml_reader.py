@@ -113,8 +113,10 @@ def _describe(node: yaml.Node) -> str:
 
 def _refuse_tag(_loader: _Loader, node: yaml.Node) -> NoReturn:
     """Refuse a tag that neither YAML nor the units define (MarkedYAMLError)."""
-    problem = str(UnknownNameError("tag", node.tag, _UNITS))
-    raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+    raise yaml.MarkedYAMLError(
+        problem=str(UnknownNameError("tag", node.tag, _UNITS)),
+        problem_mark=node.start_mark,
+    )
 
 
 for _tag in _UNITS:

@@ -125,11 +125,12 @@ def read_result(path: Path) -> dict[str, Any]:
     except FileNotFoundError as error:
         raise ResultFileError("the file does not exist", where=where) from error
     except _BROKEN as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ResultFileError(
             "the file is not a brachis result",
             where=where,
-            found=reason,
+            found=getattr(error, "strerror", None)
+            or str(error)
+            or type(error).__name__,
             allowed="a file written by brachis plan",
         ) from error
     schema = meta.get("schema")

@@ -424,12 +424,11 @@ def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
         return Trajectory.load(source)
     motion = getattr(source, "trajectory", None)
     if not isinstance(motion, Trajectory):
-        allowed = "a Trajectory, a Result, or the npz file of one"
         raise InputError(
             "this is not a motion",
             where=where,
             found=type(source).__name__,
-            allowed=allowed,
+            allowed="a Trajectory, a Result, or the npz file of one",
         )
     return motion
 

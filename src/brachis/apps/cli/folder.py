@@ -66,9 +66,12 @@ def check_output(
     if is_folder(out):
         raise InputError(problem, where=str(out), found="a folder of this name")
     if not is_folder(out.parent):
-        obstacle = f"no folder {out.parent}"
-        hint = "Make the folder first"
-        raise InputError(problem, where=str(out), found=obstacle, hint=hint)
+        raise InputError(
+            problem,
+            where=str(out),
+            found=f"no folder {out.parent}",
+            hint="Make the folder first",
+        )
     if not is_file(out):
         return
     for path in inputs:

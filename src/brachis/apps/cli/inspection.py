@@ -420,9 +420,11 @@ def _robot_of_urdf(
     for text in lock:
         name, equals, value = text.partition("=")
         if not equals:
-            allowed = "name=value, in rad or m"
             raise InputError(
-                "not understood", where="--lock", found=text, allowed=allowed
+                "not understood",
+                where="--lock",
+                found=text,
+                allowed="name=value, in rad or m",
             )
         locked[name] = float(numbers(value, f"--lock {name}", "rad or m"))
     robot = brachis.Robot.from_urdf(

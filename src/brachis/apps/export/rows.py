@@ -139,5 +139,6 @@ def require_library(
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        name = library or module.partition(".")[0]
-        raise NotInstalledError(user, name, extra) from error
+        raise NotInstalledError(
+            user, library or module.partition(".")[0], extra
+        ) from error

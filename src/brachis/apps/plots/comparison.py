@@ -93,8 +93,9 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
         case, choice, t_end = row
         if (case, choice) in cells:
             problem = "this case and choice are already in another row"
-            duplicate = f"{_name(case)} with {choice!r}"
-            raise InputError(problem, where=where, found=duplicate)
+            raise InputError(
+                problem, where=where, found=f"{_name(case)} with {choice!r}"
+            )
         cells[case, choice] = t_end
     return cells
 

@@ -194,8 +194,7 @@ def _run(
     except KeyboardInterrupt as interrupt:
         interrupts.clear()
         counts = f"{len(facts_by_digest)} of {len(plans)} plans"
-        message = (
+        raise KeyboardInterrupt(
             f"{counts} are stored in {store.folder}; the same sweep goes on from there"
-        )
-        raise KeyboardInterrupt(message) from interrupt
+        ) from interrupt
     return facts_by_digest

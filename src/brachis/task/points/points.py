@@ -234,8 +234,12 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     problem = "the orientations have the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"
-    allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
-    raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
+    raise TaskError(
+        problem,
+        found=values.shape,
+        allowed="SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw",
+        where=where,
+    )
 
 
 def _speeds(speed: Any, units: FileUnits, source: str) -> Array:
@@ -273,5 +277,8 @@ def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> 
     """Refuse the first of the rows of which anything is bad."""
     rows = np.flatnonzero(bad.any(axis=tuple(range(1, bad.ndim))))
     if rows.size:
-        value = np.atleast_1d(values)[rows[0]].tolist()
-        raise TaskError(problem, found=value, where=f"{source}: row {rows[0]}")
+        raise TaskError(
+            problem,
+            found=np.atleast_1d(values)[rows[0]].tolist(),
+            where=f"{source}: row {rows[0]}",
+        )

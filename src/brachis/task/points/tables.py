@@ -327,8 +327,9 @@ def _factor_of(
     elif task_unit is not None and factors[task_unit] != factors[unit]:
         problem = "the header contradicts the task's units"
     if problem:
-        found = f"{unit} for {name}"
-        raise TaskError(problem, found=found, allowed=task_unit, where=where)
+        raise TaskError(
+            problem, found=f"{unit} for {name}", allowed=task_unit, where=where
+        )
     return factors[unit]
 
 
