@@ -153,17 +153,12 @@ def _models_at(location: _Location, model: type[Model]) -> list[type]:
             ] or models
             continue
         fields = [_fields_of(parent) for parent in models]
-        if any(
-            step in fields_of_parent for fields_of_parent in fields
-        ):  # else a name in a mapping
-            annotations = [
-                fields_of_parent.get(str(step)) for fields_of_parent in fields
-            ]
+        if any(step in annotations for annotations in fields):
             models = [
                 inner
-                for fields_of_parent in annotations
-                for inner in models_in(fields_of_parent)
-            ]
+                for annotations in fields
+                for inner in models_in(annotations.get(str(step)))
+            ]  # else it is a name in a mapping
     return models
 
 
