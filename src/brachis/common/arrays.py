@@ -157,14 +157,14 @@ def extrapolate(
 
 
 def rates(
-    parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
+    evaluate: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
     """Time derivatives of functions of a motion, by central differences along it.
 
     Parameters
     ----------
-    parts : callable
-        ``parts(x, xdot, xddot, xdddot)`` returns arrays (2 K, ...) for arrays (2 K, c).
+    evaluate : callable
+        ``evaluate(x, xdot, xddot, xdddot)`` returns arrays (2 K, ...) for arrays (2 K, c).
     motion : sequence of (K, c) ndarray
         Value and three time derivatives at K moments.
 
@@ -181,7 +181,9 @@ def rates(
     h = 3e-5 / np.maximum(np.max(speeds, axis=0), 1.0)
     step = np.concatenate([h, -h])[:, None]
     both = [np.tile(array, (2, 1)) for array in motion]
-    sides = (np.split(array, 2) for array in parts(*extrapolate(both, step), both[3]))
+    sides = (
+        np.split(array, 2) for array in evaluate(*extrapolate(both, step), both[3])
+    )
     return [
         (ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1)))
         for ahead, behind in sides

@@ -34,7 +34,7 @@ _SHARE_OF_SPEED = 0.1
 _SELF_MOTION_STEP = 1e-5
 """By how much a posture is changed for a derivative, m or rad."""
 
-Part = tuple[Phase, np.ndarray]
+PhasePoint = tuple[Phase, np.ndarray]
 """A phase and its variables."""
 
 
@@ -50,12 +50,12 @@ def task_savings(
         Of its program.
     answer : OptimalMotion
     """
-    parts = motion.program.split(motion.x)
+    phase_points = motion.program.split(motion.x)
     savings = [
         *_list_dwells(problem),
-        *_list_stops(problem, parts),
+        *_list_stops(problem, phase_points),
         *_list_ends(problem, answer),
-        *_list_rest(problem, parts),
+        *_list_rest(problem, phase_points),
         *_list_postures(problem, answer),
     ]
     costly = (saving for saving in savings if saving.saved > 0.0)
@@ -68,12 +68,14 @@ def _list_dwells(problem: Problem) -> Iterator[TaskSaving]:
         yield TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
 
 
-def _list_stops(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
+def _list_stops(
+    problem: Problem, phase_points: list[PhasePoint]
+) -> Iterator[TaskSaving]:
     """Bound what the motion would gain along the same joint path without each of its stops."""
     for number, leg in enumerate(problem.legs[:-1]):
         if not leg.stops:
             continue
-        sides = ((parts[number], -1), (parts[number + 1], 0))
+        sides = ((phase_points[number], -1), (phase_points[number + 1], 0))
         saved = 0.0
         for (phase, x), end in sides:
             course = lay_course(phase, x, _PLACES)
@@ -107,14 +109,16 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
         yield TaskSaving(change, saved, accuracy)
 
 
-def _list_rest(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
+def _list_rest(
+    problem: Problem, phase_points: list[PhasePoint]
+) -> Iterator[TaskSaving]:
     """Estimate what the motion would gain if its accelerations could jump where it rests."""
     spline = problem.task.spline
     order = max((limit.order for limit in problem.limits), default=0)
     if spline.vanishing == 1 or order > 2:  # limits on jerk need a smooth acceleration
         return
     saved = 0.0
-    for phase, x in parts:
+    for phase, x in phase_points:
         for end, conditions in enumerate((phase.boundary.start, phase.boundary.end)):
             derivatives = conditions[0].derivatives
             if len(derivatives) > 1 and not derivatives.any():

@@ -111,7 +111,7 @@ class OptimalMotion:
     def change(self, changed: Problem) -> float:
         """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
         phases = []
-        parts = []
+        x_by_phase = []
         for number, (phase, x_of_phase) in enumerate(self.program.split(self.x)):
             path = changed.leg_paths[number]
             joint_map = phase.joint_map.along(path, phase.joint_map.start)
@@ -121,10 +121,10 @@ class OptimalMotion:
             arguments = (joint_map, phase.limits, phase.grid, boundary)
             shifted = Phase(*arguments, margin=None, pause=phase.pause)
             phases.append(shifted)
-            parts.append(_carry_over(phase, x_of_phase, shifted))
+            x_by_phase.append(_carry_over(phase, x_of_phase, shifted))
         program = self.program.with_phases(phases)
         try:
-            after = self.value(program, np.concatenate(parts))
+            after = self.value(program, np.concatenate(x_by_phase))
         except UnreachableError:
             return 0.0
         change = after - self._unchanged

@@ -166,8 +166,8 @@ class FactoredSolver(FormulaSolver):
                 self._sided.append(slot)
         self._choices = list(itertools.product(*self._signs))
         self.branches: tuple[str, ...] = tuple(
-            "_".join(filter(None, parts)) or "slides"
-            for parts in itertools.product(*labels)
+            "_".join(filter(None, sides)) or "slides"
+            for sides in itertools.product(*labels)
         )
 
     @abstractmethod

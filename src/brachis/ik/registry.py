@@ -275,14 +275,14 @@ class _Matcher:
         """All that the answer depends on, apart from the families."""
         geometry = self._geometry
         task_map = self._task_map
-        parts = (
+        content = (
             *(geometry.joint_names, geometry.revolute, geometry.axes, geometry.points),
             *(geometry.tool_position, geometry.tool_rotation),
             *ranges_to_check(self._robot),
             type(task_map),
             *(getattr(task_map, entry.name) for entry in fields(task_map)[1:]),
         )
-        return pickle.dumps(parts)
+        return pickle.dumps(content)
 
     def match(self, names: tuple[str, ...]) -> TriedDecomposition:
         """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""

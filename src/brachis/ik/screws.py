@@ -245,8 +245,8 @@ class ChainGeometry(Chain):
     def of(cls, robot: Robot) -> ChainGeometry:
         """Take the screws of a robot's chain."""
         chain = robot.chain
-        parts = {entry.name: getattr(chain, entry.name) for entry in fields(chain)}
-        return cls(**parts, joint_names=robot.joint_names)
+        arrays = {entry.name: getattr(chain, entry.name) for entry in fields(chain)}
+        return cls(**arrays, joint_names=robot.joint_names)
 
     @cached_property
     def _generators(self) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -44,17 +44,19 @@ class Nodes:
     qddot_before: np.ndarray
 
 
-def join_nodes(parts: Sequence[Nodes]) -> Nodes:
+def join_nodes(nodes_by_phase: Sequence[Nodes]) -> Nodes:
     """Put nodes of one phase after the other together; where they meet, those of the later one count."""
-    begins = np.cumsum([0.0, *(nodes.times[-1] for nodes in parts[:-1])])
-    times = [begin + nodes.times for begin, nodes in zip(begins, parts, strict=True)]
-    later = [nodes.qddot_before[1:] for nodes in parts]
+    begins = np.cumsum([0.0, *(nodes.times[-1] for nodes in nodes_by_phase[:-1])])
+    times = [
+        begin + nodes.times for begin, nodes in zip(begins, nodes_by_phase, strict=True)
+    ]
+    later = [nodes.qddot_before[1:] for nodes in nodes_by_phase]
     return Nodes(
         _join(times),
-        _join([nodes.q for nodes in parts]),
-        _join([nodes.qdot for nodes in parts]),
-        _join([nodes.qddot for nodes in parts]),
-        np.concatenate([parts[0].qddot_before[:1], *later]),
+        _join([nodes.q for nodes in nodes_by_phase]),
+        _join([nodes.qdot for nodes in nodes_by_phase]),
+        _join([nodes.qddot for nodes in nodes_by_phase]),
+        np.concatenate([nodes_by_phase[0].qddot_before[:1], *later]),
     )
 
 

@@ -268,5 +268,5 @@ class JointSpaceMap(JointMap):
         path = state.path
         qdot_y = path.xi_ds * state.ydot
         qddot_y = path.xi_dds * state.ydot**2 + path.xi_ds * state.yddot
-        parts = (qdot_y, qddot_y, 2.0 * qdot_y)
-        return JointDerivatives(*(derivative[:, :, None] for derivative in parts))
+        slopes = (qdot_y, qddot_y, 2.0 * qdot_y)
+        return JointDerivatives(*(slope[:, :, None] for slope in slopes))

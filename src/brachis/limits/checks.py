@@ -183,8 +183,8 @@ def build_user_limits(
 
 def _check_members(limit: Limit) -> None:
     """Refuse a limit that lacks a member, or has one that is not allowed."""
-    parts = ("kind", "labels", "lower", "upper")
-    missing = [name for name in parts if not hasattr(limit, name)]
+    required = ("kind", "labels", "lower", "upper")
+    missing = [name for name in required if not hasattr(limit, name)]
     if missing:
         raise InputError(
             "the limit lacks required attributes",
@@ -339,8 +339,8 @@ def _differentiate(
         f"{limit.origin}.values",
         remark=f" for {total} moments",
     )
-    parts = values.reshape(len(steps), len(reach), count, -1)
-    ahead, behind, far_ahead, far_behind = np.moveaxis(parts, 1, -1)
+    by_step = values.reshape(len(steps), len(reach), count, -1)
+    ahead, behind, far_ahead, far_behind = np.moveaxis(by_step, 1, -1)
     return (ahead - behind) / (2.0 * _STEP), (far_ahead - far_behind) / (4.0 * _STEP)
 
 

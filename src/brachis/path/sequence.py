@@ -217,11 +217,11 @@ class Path:
         else:
             which = np.searchsorted(self.breaks[1:-1], values, side="right")
             runs = np.flatnonzero(np.diff(which)) + 1
-            parts = [
+            by_span = [
                 self._on_span(which[begin], values[begin:end], order)
                 for begin, end in pairwise([0, *runs.tolist(), values.size])
             ]
-            result = np.concatenate(parts, axis=1)
+            result = np.concatenate(by_span, axis=1)
         result *= self.total ** np.arange(order + 1)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T

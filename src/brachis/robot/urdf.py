@@ -434,8 +434,8 @@ def default_chain(text: str, where: str) -> DefaultChain:
         ):
             limb[leaf] = chain
     trunk = _common_beginning(longest)
-    parts = trunk and 2 * count_moving(trunk) < most_joints
-    base = end_of(tree.joints[trunk[-1]], "child") if parts else None
+    has_trunk = trunk and 2 * count_moving(trunk) < most_joints
+    base = end_of(tree.joints[trunk[-1]], "child") if has_trunk else None
     last_joint = _common_beginning(limb.values())[-1]
     return DefaultChain(base, end_of(tree.joints[last_joint], "child"), tuple(limb))
 

@@ -82,13 +82,13 @@ def given_guess(
     passed = np.clip(motion.path_coordinate(t), 0.0, 1.0)
     ends = np.concatenate([[0.0], np.interp(splits, passed, t), [motion.t_end]])
     times = [np.linspace(*pair, 401) for pair in itertools.pairwise(ends)]
-    parts = []
+    s_by_leg = []
     for leg, leg_times in zip(problem.legs, times, strict=True):
         s = np.clip(motion.path_coordinate(leg_times), leg.begin, leg.end)
         s[[0, -1]] = [leg.begin, leg.end]
-        parts.append(s)
+        s_by_leg.append(s)
     t = np.concatenate(times)
-    s = np.concatenate(parts)
+    s = np.concatenate(s_by_leg)
     joint_map, curves, family = _in_coordinates(
         problem, decompositions, motion, s, _positions(problem, motion, t)
     )

@@ -196,10 +196,10 @@ def check_keywords(
     )
 
 
-def _as_keyword(parts: Sequence[str]) -> str:
+def _as_keyword(names: Sequence[str]) -> str:
     """Write a dotted key as a keyword: ``limits={'torque': ...}``."""
-    names_section = parts[1:-1] and _SECTION_OF.get(parts[1]) == parts[0]
-    first, *inner_keys = parts[1:] if names_section else parts
+    names_section = names[1:-1] and _SECTION_OF.get(names[1]) == names[0]
+    first, *inner_keys = names[1:] if names_section else names
     text = "..."
     for key in reversed(inner_keys):
         text = f"{{{key!r}: {text}}}"

@@ -98,12 +98,12 @@ def _shorten(text: str) -> str:
 
 
 def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
-    problem, *parts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
+    problem, *facts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
     key = _write_location(detail["loc"], detail.get("ctx", {}).get("key", ""))
     return TaskError(
         problem,
         where=f"{source}: {key}" if key else source,
-        **dict(zip(("found", "allowed", "hint"), parts, strict=False)),
+        **dict(zip(("found", "allowed", "hint"), facts, strict=False)),
     )
 
 

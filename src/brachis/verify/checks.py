@@ -164,9 +164,9 @@ def check_stops(motion: CheckedMotion) -> list[Check]:
     sides = (np.append(before, index), np.append(np.ones(len(before)), u))
     states = MotionStates.at(motion.pieces, *sides)
     checks += check_rest(motion, "{} at stops", states)
-    parts = [motion.during(phase) for phases in dwells for phase in phases]
-    if parts:
-        still = MotionStates.join(parts)
+    dwell_states = [motion.during(phase) for phases in dwells for phase in phases]
+    if dwell_states:
+        still = MotionStates.join(dwell_states)
         allowed = options.rest_velocity_tolerance
         title = "velocity in dwells"
         checks.append(

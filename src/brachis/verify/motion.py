@@ -403,9 +403,9 @@ def _check_count(count: int) -> None:
 def _path_coordinates(motion: CheckedMotion) -> np.ndarray:
     """Spread s over every piece of the path, however short: no small blend is stepped over; and add that of tables."""
     breaks = motion.path.breaks
-    parts = np.linspace(0.0, 1.0, motion.options.points_per_interval)
-    _check_count(len(breaks) * len(parts))
-    s = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
+    fractions = np.linspace(0.0, 1.0, motion.options.points_per_interval)
+    _check_count(len(breaks) * len(fractions))
+    s = (breaks[:-1, None] + np.diff(breaks)[:, None] * fractions).ravel()
     return np.concatenate([s, *(table.s for table in list_speed_tables(motion.task))])
 
 

@@ -149,8 +149,8 @@ class DocumentedCommand(TyperCommand):
         super().__init__(*args, **keywords)
         docstring = inspect.getdoc(self.callback) or ""  # none under python -OO
         titles = r"\n\n(Parameters|Examples)\n-+\n"
-        self.help, *parts = re.split(titles, docstring)
-        sections = dict(zip(parts[::2], parts[1::2], strict=True))
+        self.help, *titled_texts = re.split(titles, docstring)
+        sections = dict(zip(titled_texts[::2], titled_texts[1::2], strict=True))
         # The help must not wrap examples, so that each can be copied.
         self.epilog = f"\b\nExamples:\n{indent(sections.get('Examples', ''), '  ')}"
         entry = re.compile(r"^(\w+) : .*\n((?: +.*\n?)+)", re.MULTILINE)

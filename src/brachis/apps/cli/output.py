@@ -62,11 +62,11 @@ def print_table(
         uncut = map(cell_len, texts if is_number else ())
         least.append(max((1, *shortened, *uncut)))
     is_lined = sum(width + 3 for width in least) + 1 <= console.width
-    parts = [[*range(len(columns))]]
+    column_groups = [[*range(len(columns))]]
     if not is_lined:
-        parts = _split_columns(least, console.width)
-    for number, indices in enumerate(parts, start=1):
-        count = f" ({number} of {len(parts)})" if len(parts) > 1 else ""
+        column_groups = _split_columns(least, console.width)
+    for number, indices in enumerate(column_groups, start=1):
+        count = f" ({number} of {len(column_groups)})" if len(column_groups) > 1 else ""
         table = Table(
             title=title + count,
             title_justify="left",
@@ -90,14 +90,14 @@ def print_table(
 
 def _split_columns(least: Sequence[int], width: int) -> list[list[int]]:
     """Share the columns out to tables without lines that fit; the first column is in each."""
-    parts = [[0]]
+    column_groups = [[0]]
     for i in range(1, len(least)):
-        indices = [*parts[-1], i]
+        indices = [*column_groups[-1], i]
         if len(indices) > 2 and sum(least[k] + 2 for k in indices) - 2 > width:
-            parts.append([0, i])
+            column_groups.append([0, i])
         else:
-            parts[-1] = indices
-    return parts
+            column_groups[-1] = indices
+    return column_groups
 
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
@@ -134,12 +134,12 @@ def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
 
     if data[key] is None:
         return "free"
-    parts = []
+    positions = []
     columns = (data["joint_names"], data[key], data["position_units"])
     for name, value, si_unit in zip(*columns, strict=True):
         unit, factor = shown_unit(si_unit, degrees=degrees)
-        parts.append(f"{name} {factor * value:z.4f} {unit}")
-    return ", ".join(parts)
+        positions.append(f"{name} {factor * value:z.4f} {unit}")
+    return ", ".join(positions)
 
 
 def print_error(message: str) -> None:

@@ -256,9 +256,9 @@ def recover_path(
     """
     rests = find_rests(nodes)
     moves = split_at_rests(nodes, rests)
-    parts = [_follow(task_map, move, tolerance) for move in moves]
-    (segments, _, first_values, _), *later_parts = parts
-    for (first, end), (following, *_) in zip(rests, later_parts, strict=True):
+    followed = [_follow(task_map, move, tolerance) for move in moves]
+    (segments, _, first_values, _), *followed_later = followed
+    for (first, end), (following, *_) in zip(rests, followed_later, strict=True):
         dwell = float(nodes.t[end] - nodes.t[first])
         waits = segments[-1].model_copy(update={"stop": True, "dwell": dwell})
         segments = [*segments[:-1], waits, *following]
@@ -266,7 +266,7 @@ def recover_path(
     places = pairwise([0.0, *path.stops.tolist(), 1.0])
     coordinates = []
     worst = 0.0
-    for (_, t, values, share), ends in zip(parts, places, strict=True):
+    for (_, t, values, share), ends in zip(followed, places, strict=True):
         span = path.between(*ends)
         s = _nearest(task_map, span, values, share, ends)
         miss = task_map.difference(values, span.sample(s).target)

@@ -280,7 +280,7 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
     scale = np.maximum(np.abs(states[2]).max(axis=0), _TINY)
     overshoots = _overshoots(t, states, scale)
     times = [t]
-    parts = [states[:3]]
+    state_arrays = [states[:3]]
     for i in np.flatnonzero(overshoots > 0.01):
         begin = states[:, i]
         end = states[:, i + 1]
@@ -290,10 +290,10 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
         refined = np.concatenate([begin[:3, None], nodes, end[:3, None]], axis=1)
         if _overshoots(refined_t, refined, scale).max() < 0.5 * overshoots[i]:
             times.append(t[i] + after)
-            parts.append(nodes)
+            state_arrays.append(nodes)
     merged = np.concatenate(times)
     order = np.argsort(merged, kind="stable")
-    return merged[order], np.concatenate(parts, axis=1)[:, order], len(times) - 1
+    return merged[order], np.concatenate(state_arrays, axis=1)[:, order], len(times) - 1
 
 
 def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -104,9 +104,9 @@ def sweep(
         numbers = range(len(planned.rows))
         table = TABLE
         if part is not None:
-            first, parts = _read_part(part, len(numbers))
-            numbers = numbers[first - 1 :: parts]
-            table = f"{TABLE}-{first}-of-{parts}"
+            first, part_count = _read_part(part, len(numbers))
+            numbers = numbers[first - 1 :: part_count]
+            table = f"{TABLE}-{first}-of-{part_count}"
         pool = pool_for(jobs, executor)
         if merge:
             pool = partial(_refuse_missing, planned)
@@ -134,15 +134,15 @@ def sweep(
 def _read_part(text: str, plans: int) -> tuple[int, int]:
     """Read ``i/n``, of no more parts than plans."""
     numbers = re.fullmatch(r"([0-9]+)/([0-9]+)", text)
-    first, parts = map(int, numbers.groups()) if numbers else (0, 0)
-    if not 1 <= first <= parts <= plans:
+    first, part_count = map(int, numbers.groups()) if numbers else (0, 0)
+    if not 1 <= first <= part_count <= plans:
         raise InputError(
             "this is not a part of the sweep",
             where="part",
             found=text,
             allowed=f"i/n, such as 2/8: part i of n, 1 <= i <= n <= {plans}",
         )
-    return first, parts
+    return first, part_count
 
 
 def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:

@@ -224,9 +224,13 @@ class SweepSettings(Model):
             dict(zip(self.grid, values, strict=True))
             for values in itertools.product(*columns)
         ]
-        parts = (grid, self.rows or ({},), self.random.draws() if self.random else [{}])
+        varied = (
+            grid,
+            self.rows or ({},),
+            self.random.draws() if self.random else [{}],
+        )
         changes = [
-            {**cell, **row, **draw} for cell, row, draw in itertools.product(*parts)
+            {**cell, **row, **draw} for cell, row, draw in itertools.product(*varied)
         ]
         return list({_alike(change): change for change in reversed(changes)}.values())[
             ::-1

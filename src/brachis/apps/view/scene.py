@@ -168,8 +168,8 @@ class ViewerScene:
     def _draw_trace(self) -> None:
         """Draw the way of the tool in 32 colours of its speed; viser shows colours of single points too light."""
         speed = self.samples.tool_speed
-        parts = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
-        shades = np.round(31.0 * parts).astype(int)
+        fractions = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
+        shades = np.round(31.0 * fractions).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, 32))
         points = self.samples.tool_position
         for shade in np.unique(shades).tolist():
@@ -236,8 +236,8 @@ class ViewerScene:
         camera.position = camera.look_at + distance * away
 
 
-def speed_colours(parts: np.ndarray) -> np.ndarray:
+def speed_colours(fractions: np.ndarray) -> np.ndarray:
     """Colours (K, 3) from 0 to 255 of speeds (K,) as parts of the largest one: Matplotlib's plasma but its pale end."""
     from matplotlib import colormaps
 
-    return colormaps["plasma"](0.88 * parts, bytes=True)[:, :3]
+    return colormaps["plasma"](0.88 * fractions, bytes=True)[:, :3]

@@ -239,15 +239,15 @@ def fill_gaps(points: Points) -> Points:
     long = chords > times * usual
     if len(points) < 20 or not np.any(long):
         return points
-    parts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
+    counts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
     index = np.arange(len(points))
-    at = spread(index, np.where(long, parts, 1).astype(int))
+    at = spread(index, np.where(long, counts, 1).astype(int))
     columns = interpolate_columns(at, index, points.columns)
     position, turning = np.hsplit(columns, [points.dimension])
     if points.has_quaternions:
         turning = with_like_signs(turning)
-    ways = write_count(int(np.count_nonzero(long)), "way")
-    note = f"taken as straight: {ways} longer than {times:g} times the usual spacing"
+    gaps = write_count(int(np.count_nonzero(long)), "way")
+    note = f"taken as straight: {gaps} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
     notes = (*points.notes, note)
     return replace(rows, position=position, turning=turning, notes=notes)

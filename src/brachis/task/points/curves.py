@@ -183,11 +183,11 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     if speed is None or len(sigma) < 2:
         return ()
     sigma = np.maximum.accumulate(sigma)
-    ways = speed[1:]
+    step_speeds = speed[1:]
     runs = []
     # The stubs do not say what it returns: slices, in order.
-    for run in np.ma.clump_unmasked(np.ma.masked_invalid(ways)):  # type: ignore[no-untyped-call]
-        speeds = ways[run]
+    for run in np.ma.clump_unmasked(np.ma.masked_invalid(step_speeds)):  # type: ignore[no-untyped-call]
+        speeds = step_speeds[run]
         values = np.minimum(np.append(speeds[0], speeds), np.append(speeds, speeds[-1]))
         changes = np.diff(values) != 0.0
         is_needed = np.append(True, changes) | np.append(changes, True)
@@ -330,5 +330,5 @@ def cut_at_corners(
         told=points.notes,
         doubt=plausibility_note(points),
     )
-    parts = (points.only(slice(first, last + 1)) for first, last in pairwise(cuts))
-    return tuple(parts), report
+    sections = (points.only(slice(first, last + 1)) for first, last in pairwise(cuts))
+    return tuple(sections), report
