@@ -349,7 +349,7 @@ class FinishedCandidate(Candidate):
     def is_settled(self) -> bool:
         """Whether it is verified, or fails only at what the task wants checked and not kept."""
         return all(
-            check.passed or not check.is_enforced for check in self.verification.checks
+            check.passed or not check.is_kept for check in self.verification.checks
         )
 
     @property

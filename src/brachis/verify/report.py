@@ -67,7 +67,7 @@ class Check:
         Note on the check itself; often empty.
     of_limit : bool
         Whether it compares the motion with a limit, so that `value` is a ratio.
-    is_enforced : bool
+    is_kept : bool
         Whether plans keep it; otherwise they are only checked.
     """
 
@@ -80,7 +80,7 @@ class Check:
     time: float | None = None
     remark: str = ""
     of_limit: bool = False
-    is_enforced: bool = True
+    is_kept: bool = True
 
     def __post_init__(self) -> None:
         """Make plain numbers of NumPy's, and compare."""

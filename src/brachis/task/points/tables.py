@@ -320,17 +320,15 @@ def _factor_of(
             where=where,
             hint=f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task",
         )
-    problem = None
     if unit not in factors:
         problem = f"unknown unit of {kind}"
-        task_unit = ", ".join(factors)
-    elif task_unit is not None and factors[task_unit] != factors[unit]:
+        allowed = ", ".join(factors)
+    elif task_unit is None or factors[task_unit] == factors[unit]:
+        return factors[unit]
+    else:
         problem = "the header contradicts the task's units"
-    if problem:
-        raise TaskError(
-            problem, found=f"{unit} for {name}", allowed=task_unit, where=where
-        )
-    return factors[unit]
+        allowed = task_unit
+    raise TaskError(problem, found=f"{unit} for {name}", allowed=allowed, where=where)
 
 
 def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Points:

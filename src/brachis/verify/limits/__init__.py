@@ -51,7 +51,7 @@ def check_limits(
             worst.time,
             worst.remark,
             of_limit=True,
-            is_enforced=worst.is_enforced,
+            is_kept=worst.is_kept,
         )
         for name, worst in results
         if worst is not None

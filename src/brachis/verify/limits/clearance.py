@@ -47,8 +47,8 @@ def worst_clearance(motion: CheckedMotion) -> Worst | None:
         least = search.proven
         remark = f"search stopped early: {remark}, the proven lower bound is {1e3 * least:.2f} mm"
     ratio = max(1.0 + (clearance - least) / UNIT, 0.0)
-    is_enforced = motion.task.collision_mode == "avoid"
-    return Worst(ratio, subject, search.time, remark, is_enforced)
+    is_kept = motion.task.collision_mode == "avoid"
+    return Worst(ratio, subject, search.time, remark, is_kept)
 
 
 class _Search:

@@ -25,7 +25,7 @@ class Worst(NamedTuple):
         s.
     remark : str
         Note on the check; often empty.
-    is_enforced : bool
+    is_kept : bool
         Whether plans keep the limit.
     """
 
@@ -33,7 +33,7 @@ class Worst(NamedTuple):
     subject: str
     time: float
     remark: str = ""
-    is_enforced: bool = True
+    is_kept: bool = True
 
 
 LimitCheck = Callable[[CheckedMotion], Worst | None]
