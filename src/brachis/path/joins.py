@@ -166,12 +166,12 @@ def refuse_corners(corners: Sequence[Kink | None]) -> None:
     refused = [corner for corner in corners if corner is not None]
     if not refused:
         return
-    join, found, advice = refused[0]
+    join, jump, advice = refused[0]
     further_keys = ", ".join(f"path[{later.index}]" for later, *_ in refused[1:])
     raise PathError(
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
-        found=found,
+        found=jump,
         allowed="segments that continue each other",
         where=join.where,
         hint=advice + (f"; likewise {further_keys}" if further_keys else ""),

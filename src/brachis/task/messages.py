@@ -246,16 +246,16 @@ def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
 
 def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     """Describe a mistake by the table; a wrong type by the keys of the mapping and what the key is for as well."""
-    found = show(detail["input"])
+    shown = show(detail["input"])
     location = detail["loc"]
     if location and location[-1] == "[key]":
-        return "a name must be a string", found, "a string, in quotes if need be"
+        return "a name must be a string", shown, "a string, in quotes if need be"
     if detail["type"] in _TYPES:
         allowed = _TYPES[detail["type"]]
         keys = _keys_at(location, model) if allowed == _MAPPING else []
         if keys:
             allowed += f" with keys out of {', '.join(keys)}"
-        return "wrong type", found, allowed, _description_at(location, model)
+        return "wrong type", shown, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
     facts = detail.get("ctx", {})
     words = re.findall(r"'(\w+)'", facts.get("expected", ""))
@@ -266,7 +266,7 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     unit = unit_of(".".join(_names_in(location)))
     if problem == _OUT_OF_RANGE and unit:
         allowed += f", in {unit}"
-    return problem, found, allowed or None, hint
+    return problem, shown, allowed or None, hint
 
 
 _MAPPING = "a mapping"

@@ -181,8 +181,8 @@ def report(
     --------
     >>> import brachis
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
-    >>> found = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
-    >>> [sensitivity.label.subject for sensitivity in found.sensitivities.limits][0]
+    >>> report = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
+    >>> [sensitivity.label.subject for sensitivity in report.sensitivities.limits][0]
     'j1'
     """
     if isinstance(motion, str | os.PathLike):

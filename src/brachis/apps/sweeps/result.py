@@ -216,7 +216,7 @@ class SweepResult(Summary):
     --------
     >>> import tempfile
     >>> import brachis
-    >>> found = brachis.sweep(
+    >>> result = brachis.sweep(
     ...     {
     ...         "sweep": 1,
     ...         "task": "examples/01_scara_line.yaml",
@@ -226,9 +226,9 @@ class SweepResult(Summary):
     ...     tempfile.mkdtemp(),
     ...     jobs=1,
     ... )
-    >>> [row["spline.intervals"] for row in found.ranked()]
+    >>> [row["spline.intervals"] for row in result.ranked()]
     [7, 6]
-    >>> round(found.trajectory(1).t_end, 1)
+    >>> round(result.trajectory(1).t_end, 1)
     2.8
     """
 

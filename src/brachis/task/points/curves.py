@@ -145,7 +145,7 @@ def _fit_one(
     if ratios[i] <= 1.0 + 1e-6:
         return fit
     kind = "position"
-    found = f"{1e3 * fit.position_errors[i]:.3g} mm"
+    miss = f"{1e3 * fit.position_errors[i]:.3g} mm"
     allowed = f"{1e3 * tolerance.position:.3g} mm"
     looks = str(scatter) if scatter.deviation else ""
     advised = 6.0 * scatter.deviation
@@ -153,7 +153,7 @@ def _fit_one(
         looks += f"; give a tolerance of {1e3 * advised:.2g} mm or more"
     if fit.position_errors[i] <= tolerance.position:
         kind = "orientation"
-        found = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
+        miss = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
         allowed = f"{np.rad2deg(tolerance.orientation):.3g} deg"
         scattered = f"{np.rad2deg(scatter.turning):.2g} deg (standard deviation)"
         looks = f"orientations that scatter by {scattered}" if scatter.turning else ""
@@ -161,7 +161,7 @@ def _fit_one(
     raise points.wrong(
         i,
         f"no smooth curve is within the tolerance of {kind}",
-        found=f"{found} at {points.describe(i)}",
+        found=f"{miss} at {points.describe(i)}",
         allowed=allowed,
         hint=note or hint,
     )
