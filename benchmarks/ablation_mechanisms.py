@@ -135,7 +135,9 @@ def return_empty(*_arguments: Any, **_keywords: Any) -> Any:
     return ()
 
 
-def solve_all_rows(program: Any, x: Any, solve: Callable[..., Any]) -> Any:
+def solve_all_rows(
+    program: Any, x: Any, solve: Callable[..., Any], **_keywords: Any
+) -> Any:
     """Take the place of `solve_near_rows`."""
     return solve(program, x)
 

@@ -49,17 +49,17 @@ class Remedy:
     ----------
     key : str
         Dotted key, for example ``boundary.end_speed``.
-    asked : float
+    current : float
         The number in the task.
     guess : float
         A number that may be enough.
     unit : str
     is_known : bool
-        Whether the guess is as near to what is asked as it can be.
+        Whether the guess is as near to the current number as it can be.
     """
 
     key: str
-    asked: float
+    current: float
     guess: float
     unit: str = ""
     is_known: bool = False
@@ -67,7 +67,7 @@ class Remedy:
     @property
     def verb(self) -> str:
         """What to do with the number: ``lower`` or ``raise``."""
-        return "lower" if self.guess < self.asked else "raise"
+        return "lower" if self.guess < self.current else "raise"
 
 
 _NAMES_HERE = {
@@ -261,7 +261,7 @@ class UnknownNameError(InputError):
         name: str,
         valid: Iterable[str],
         *,
-        others: Sequence[str] = (),
+        more_names: Sequence[str] = (),
         where: str | None = None,
         hint: str | None = None,
     ) -> None:
@@ -269,7 +269,7 @@ class UnknownNameError(InputError):
         self.name = name
         self.valid = tuple(valid)
         super().__init__(
-            f"there is no {kind} named {' or '.join(map(repr, (name, *others)))}",
+            f"there is no {kind} named {' or '.join(map(repr, (name, *more_names)))}",
             allowed=", ".join(self.valid) or "none",
             where=where,
             hint=hint or suggest(name, self.valid),
@@ -282,8 +282,8 @@ def check_names(
     """Refuse names that do not exist; see `UnknownNameError`."""
     unknown = [name for name in names if name not in valid]
     if unknown:
-        first, *others = unknown
-        raise UnknownNameError(kind, first, valid, others=others, where=where)
+        first, *more_names = unknown
+        raise UnknownNameError(kind, first, valid, more_names=more_names, where=where)
 
 
 class LimitError(InputError):
@@ -425,14 +425,14 @@ def nearest(
     """
     if not isinstance(name, str):
         return None
-    by_small = {one.lower(): one for one in valid}
+    by_small = {candidate.lower(): candidate for candidate in valid}
     small = name.lower()
     known = [
-        one
-        for one in _NAMES_HERE.get(small, ())
-        if one in by_small.values() or (is_attribute and "." in one)
+        candidate
+        for candidate in _NAMES_HERE.get(small, ())
+        if candidate in by_small.values() or (is_attribute and "." in candidate)
     ]
-    begun = [one for one in by_small if small.startswith(f"{one}_")]
+    begun = [candidate for candidate in by_small if small.startswith(f"{candidate}_")]
     if known and small not in by_small:
         return known[0]
     near = difflib.get_close_matches(small, by_small, n=1, cutoff=0.5)
@@ -453,9 +453,9 @@ def suggest(
 class MissingAttributeError(AttributeError):
     """An object has no such attribute; the message names the one that may be meant, also of its parts."""
 
-    def __init__(self, thing: object, name: str) -> None:
+    def __init__(self, instance: object, name: str) -> None:
         super().__init__()
-        self._thing = thing
+        self._instance = instance
         self._name = name
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -465,22 +465,22 @@ class MissingAttributeError(AttributeError):
     def __str__(self) -> str:
         """Look for the name that may be meant; most such errors are caught, and nobody reads them."""
         name = self._name
-        meant = None if name.startswith("_") else _attribute_meant(self._thing, name)
-        message = f"{type(self._thing).__name__!r} object has no attribute {name!r}"
+        meant = None if name.startswith("_") else _attribute_meant(self._instance, name)
+        message = f"{type(self._instance).__name__!r} object has no attribute {name!r}"
         return message + (f". Did you mean {meant!r}?" if meant else "")
 
 
-def _attribute_meant(thing: object, name: str) -> str | None:
+def _attribute_meant(instance: object, name: str) -> str | None:
     """Return the attribute of an object, or of one of its parts, that may be meant by a name."""
-    own = [each for each in dir(thing) if not each.startswith("_")]
+    public = [entry for entry in dir(instance) if not entry.startswith("_")]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
-        if word in own or "." in word:
+        if word in public or "." in word:
             return word
-        for part, value in vars(thing).items():
+        for field, value in vars(instance).items():
             known = hasattr(type(value), word) or word in getattr(value, "__dict__", ())
-            if part in own and known:
-                return f"{part}.{word}"
-    return nearest(name, own, is_attribute=True)
+            if field in public and known:
+                return f"{field}.{word}"
+    return nearest(name, public, is_attribute=True)
 
 
 def no_attribute(

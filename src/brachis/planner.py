@@ -49,9 +49,9 @@ from brachis.search.schedule import has_charts
 from brachis.search.stages import FinishedCandidate
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.timing import SlowTimingWarning, find_timing_gap
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import MotionSource, motion_of
 
-Given = Source | Robot | None
+RobotOrTask = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
 _OWN_KEYWORDS = (
     "start_from",
@@ -64,11 +64,11 @@ _OWN_KEYWORDS = (
 
 
 def plan(
-    robot_or_task: Given = None,
+    robot_or_task: RobotOrTask = None,
     /,
     task: Source | None = None,
     *,
-    start_from: Motion | None = None,
+    start_from: MotionSource | None = None,
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
@@ -149,16 +149,16 @@ def plan(
         report_progress(listener, progress) as report,
     ):
         began = time.perf_counter()
-        robot, asked = _read(robot_or_task, task, keywords)
+        robot, loaded_task = _read(robot_or_task, task, keywords)
         known = None if start_from is None else motion_of(start_from, "start_from")
         loaded = time.perf_counter()
-        deadline = Deadline.after(asked.search.time_limit - (loaded - began))
+        deadline = Deadline.after(loaded_task.search.time_limit - (loaded - began))
         try:
-            remarks = of_robot(robot) + of_task(asked)
-            remarks = report_issues(remarks, strict=asked.strict)
-            _report_plan(robot, asked, report)
-            problem = Problem.of(robot, asked, own_limits)
-            remarks += report_issues(of_places(problem), strict=asked.strict)
+            remarks = of_robot(robot) + of_task(loaded_task)
+            remarks = report_issues(remarks, strict=loaded_task.strict)
+            _report_plan(robot, loaded_task, report)
+            problem = Problem.of(robot, loaded_task, own_limits)
+            remarks += report_issues(of_places(problem), strict=loaded_task.strict)
             opening = partial(_open_search, families=families, report=report)
             search = search_motion(problem, robot, known, opening, deadline, report)
             best = search.best
@@ -167,24 +167,24 @@ def plan(
                 f"{best.status}: t_E = {best.t_end:.4f} s, after {searched - began:.2f} s"
             )
 
-            left = Deadline(0.0) if search.interrupted else deadline
-            smoothed = _find_smoother(best, problem, left, report)
+            remaining = Deadline(0.0) if search.interrupted else deadline
+            smoothed = _find_smoother(best, problem, remaining, report)
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
-            remarks += report_issues(end_time, strict=asked.strict)
+            remarks += report_issues(end_time, strict=loaded_task.strict)
             motion = best if smoothed is None else smoothed
             gap = None
             if not deadline.passed:
                 gap = find_timing_gap(motion.trajectory, problem.limits)
             if gap is not None and not end_time:
-                is_given = asked.spline.intervals != "auto"
-                slow = gap.issues(has_fixed_intervals=is_given)
+                is_fixed = loaded_task.spline.intervals != "auto"
+                slow = gap.issues(has_fixed_intervals=is_fixed)
                 for issue in slow:
                     warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
                 remarks += slow
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
-            try_remedies(error, robot, asked, families, own_limits, until)
+            try_remedies(error, robot, loaded_task, families, own_limits, until)
             raise
         total = time.perf_counter() - began
         report(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
@@ -236,15 +236,15 @@ def _find_smoother(
     if not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")
-    found = find_least_motion(best, deadline, report)
+    smoothest = find_least_motion(best, deadline, report)
     is_exact = best.problem.robot.n != problem.robot.n
-    if is_exact and found.trajectory is not best.trajectory:
-        return widen_plan(found, problem)
-    return found
+    if is_exact and smoothest.trajectory is not best.trajectory:
+        return widen_plan(smoothest, problem)
+    return smoothest
 
 
 def _read(
-    first: Given, task: Source | None, keywords: TaskKeywords
+    first: RobotOrTask, task: Source | None, keywords: TaskKeywords
 ) -> tuple[Robot, Task]:
     """Return the robot, and the task with all that the robot was made with."""
     check_keywords(keywords, "plan", _OWN_KEYWORDS)
@@ -263,22 +263,22 @@ def _read(
     named = locate(first)  # type: ignore[arg-type]
     if isinstance(named, str | os.PathLike):
         read_file(Path(named))  # a missing file is the first thing to say
-    asked = task_with(task, **keywords)
-    robot = robot_for(named, asked.robot)
-    return robot, asked.model_copy(update={"robot": robot.settings})
+    loaded_task = task_with(task, **keywords)
+    robot = robot_for(named, loaded_task.robot)
+    return robot, loaded_task.model_copy(update={"robot": robot.settings})
 
 
 def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
     """Report the robot, the path and the task space of a plan."""
-    given = task.task_space
-    space = given if isinstance(given, str) else f"[{', '.join(given)}]"
+    rows = task.task_space
+    space = rows if isinstance(rows, str) else f"[{', '.join(rows)}]"
     joints = write_count(robot.n, "joint")
     segments = write_count(len(task.path), "segment")
     report(f"planning for {joints} along a path of {segments}, task space {space}")
 
 
 def transcribe(
-    robot_or_task: Given = None,
+    robot_or_task: RobotOrTask = None,
     /,
     task: Source | None = None,
     *,
@@ -319,8 +319,8 @@ def transcribe(
     True
     """
     ik.check_families(families)
-    robot, asked = _read(robot_or_task, task, keywords)
-    problem = Problem.of(robot, asked, own_limits)
+    robot, loaded_task = _read(robot_or_task, task, keywords)
+    problem = Problem.of(robot, loaded_task, own_limits)
     start = first_guess(problem, decompositions_of(problem, families))
     return TaskProgram(start), start.family
 
@@ -331,7 +331,7 @@ OnProgress = Callable[[int, int, Outcome], None]
 
 
 def plan_many(
-    tasks: Iterable[Source | tuple[Given, Source]],
+    tasks: Iterable[Source | tuple[RobotOrTask, Source]],
     *,
     jobs: int = 1,
     executor: Executor | None = None,
@@ -384,21 +384,25 @@ def plan_many(
     >>> [type(outcome).__name__ for outcome in outcomes]
     ['Result', 'PathError']
     """
-    is_one = isinstance(tasks, str | os.PathLike | Mapping | Task)
-    if is_one or not isinstance(tasks, Iterable):
+    is_single = isinstance(tasks, str | os.PathLike | Mapping | Task)
+    if is_single or not isinstance(tasks, Iterable):
         raise InputError(
-            "this is one task, not a list of tasks" if is_one else "wrong type",
+            "this is one task, not a list of tasks" if is_single else "wrong type",
             where="tasks",
-            found=type(tasks).__name__ if is_one else repr(tasks),
+            found=type(tasks).__name__ if is_single else repr(tasks),
             allowed="a list of tasks",
         )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
-    given = list(tasks)
+    task_list = list(tasks)
     processes = process_count(count(jobs, "jobs"))
-    work = run_in_processes(_plan_one, given, keywords, jobs=processes, listener=ignore)
+    work = run_in_processes(
+        _plan_one, task_list, keywords, jobs=processes, listener=ignore
+    )
     if executor is not None:
         check_executor(executor)
-        futures = [executor.submit(_plan_one, task, keywords, ignore) for task in given]
+        futures = [
+            executor.submit(_plan_one, task, keywords, ignore) for task in task_list
+        ]
         work = (future.result() for future in futures)
     outcomes: list[Outcome] = []
     with (
@@ -407,17 +411,17 @@ def plan_many(
     ):
         for outcome in made:
             outcomes.append(outcome)
-            report(f"planned {len(outcomes)} of {write_count(len(given), 'task')}")
+            report(f"planned {len(outcomes)} of {write_count(len(task_list), 'task')}")
             if callable(progress):
-                progress(len(outcomes), len(given), outcome)
+                progress(len(outcomes), len(task_list), outcome)
     return outcomes
 
 
 def _plan_one(
-    given: Any, keywords: TaskKeywords, listener: Callable[[str], None]
+    item: Any, keywords: TaskKeywords, listener: Callable[[str], None]
 ) -> Outcome:
     """Plan one task; Ctrl-C does not end this plan alone."""
-    robot, task = given if isinstance(given, tuple) else (None, given)
+    robot, task = item if isinstance(item, tuple) else (None, item)
     heard = SigintHandler.heard
     outcome: Outcome
     try:

@@ -38,12 +38,12 @@ def path_of(name: str) -> Path:
     return shipped_folder("robots") / name / "robot.urdf"
 
 
-def is_robot(given: object) -> bool:
+def is_robot(source: object) -> bool:
     """Return whether something is a robot: a `Robot`, a URDF or MJCF file, or a name from `names` or like one."""
-    if isinstance(given, Robot):
+    if isinstance(source, Robot):
         return True
-    return isinstance(given, str | os.PathLike) and (
-        Path(given).suffix.lower() in ROBOT_SUFFIXES or _is_name(given)
+    return isinstance(source, str | os.PathLike) and (
+        Path(source).suffix.lower() in ROBOT_SUFFIXES or _is_name(source)
     )
 
 
@@ -60,13 +60,13 @@ def locate(
     return path_of(robot) if isinstance(robot, str) and _is_name(robot) else robot
 
 
-def _is_name(given: str | os.PathLike[str]) -> bool:
+def _is_name(source: str | os.PathLike[str]) -> bool:
     """Return whether this is a name, its first letters or a misspelt name, and not the name of a file."""
     known = names()
-    path = Path(given)
-    if given in known or path.suffix or len(path.parts) != 1 or is_file(path):
-        return given in known
-    word = str(given)
+    path = Path(source)
+    if source in known or path.suffix or len(path.parts) != 1 or is_file(path):
+        return source in known
+    word = str(source)
     begins = any(name.startswith(word) for name in known)
     return begins or bool(difflib.get_close_matches(word, known, cutoff=0.75))
 

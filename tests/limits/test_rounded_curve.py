@@ -44,7 +44,7 @@ def test_it_lies_below_the_curve_by_little_and_falls_to_zero_at_most(pieces):
         np.concatenate([np.linspace(0.0, 2.0 * speed[-1], 2001), near.clip(0.0)])
     )
     values, true = rounded.values(speeds), true_torque(curve, speeds)
-    eps = 1e-7 + 1e-9 * rounded.at_rest
+    eps = 1e-7 + 1e-9 * rounded.stall_torque
     within = np.minimum(
         values, 50.0
     )  # what lies above the torque at rest is cut by the plain limit
@@ -78,6 +78,6 @@ def test_its_slope_equals_differences_inside_corners_and_off_them(curve):
 
 def test_a_level_beginning_is_left_to_the_plain_limit():
     rounded = RoundedCurve.below(((0.0, 50.0), (1.0, 50.0), (2.0, 10.0)))
-    assert rounded.at_rest == pytest.approx(90.0)
+    assert rounded.stall_torque == pytest.approx(90.0)
     np.testing.assert_allclose(rounded.values(np.array([1.0, 1.5])), [50.0, 30.0])
     assert RoundedCurve.below(((0.0, 50.0), (1.0, 50.0))) is None

@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.errors import PathError, TaskError
 from brachis.limits import Label, Moments, limits_of
-from brachis.limits.tool import SpeedTable, ToolMotionLimit
+from brachis.limits.tool import SpeedProfile, ToolMotionLimit
 from brachis.robot import bind
 from brachis.search.given_motion import EXACT, GIVEN
 from brachis.search.portfolio import Search
@@ -99,7 +99,7 @@ def test_the_real_tool_is_limited_and_sampled():
     for quantity in ("speed", "angular speed", "acceleration"):
         expected = arm.chain.tool_sizes(quantity, *own)
         label = Label("tool", quantity, "-")
-        limit = ToolMotionLimit(robot, quantity, [SpeedTable([0.0], [1.0])], [label])
+        limit = ToolMotionLimit(robot, quantity, [SpeedProfile([0.0], [1.0])], [label])
         np.testing.assert_allclose(limit.values(moving)[:, 0], expected, rtol=1e-12)
         partials = limit.partials(moving)
         for slopes in (partials.q, partials.qdot):

@@ -12,7 +12,7 @@ import pytest
 import brachis
 from brachis.apps.plots import plot_timeline
 from brachis.errors import TaskError
-from brachis.limits.tool import SpeedTable
+from brachis.limits.tool import SpeedProfile
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
 
@@ -139,7 +139,7 @@ def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
 
 
 def test_steps_become_ramps_on_their_faster_side():
-    table = SpeedTable(
+    table = SpeedProfile(
         [0.0, 0.4, 0.4, 0.401, 0.401, 1.0], [1.0, 1.0, 3.0, 3.0, 2.0, 2.0]
     )
     s = np.linspace(0.0, 1.0, 100_001)
@@ -152,5 +152,5 @@ def test_steps_become_ramps_on_their_faster_side():
         slope[inside], np.gradient(found, s)[inside], atol=1e-6 * np.abs(slope).max()
     )
     assert table.at(np.array([np.nan]))[0][0] == np.inf
-    flat = SpeedTable(np.linspace(0.0, 1.0, 10_001), np.full(10_001, 0.7))
+    flat = SpeedProfile(np.linspace(0.0, 1.0, 10_001), np.full(10_001, 0.7))
     assert len(flat.places) == 2

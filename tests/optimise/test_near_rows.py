@@ -156,7 +156,7 @@ def test_rows_that_are_kept_whatever_their_distance(solve):
     start = 0.999 * np.array([np.cos(-1.3), np.sin(-1.3), 0.0])
     far = int(np.argmax(1.0 - Disc().rows(start)))
     solve_near_rows(Disc(), start, solve)
-    solve_near_rows(Disc(), start, solve, kept=[far])
+    solve_near_rows(Disc(), start, solve, kept_rows=[far])
     assert solve.rows[-1] == solve.rows[0] + 1
 
 

@@ -14,7 +14,7 @@ from support.poses import row_path
 
 
 def curve_of(segment, start, rows):
-    return row_path([segment], start, rows).pieces[0].curve
+    return row_path([segment], start, rows).spans[0].curve
 
 
 def assert_derivatives(curve, step=1e-5):

@@ -36,7 +36,7 @@ def through(count, **keys):
 
 
 def at_waypoints(path):
-    curve = path.pieces[0].curve
+    curve = path.spans[0].curve
     return path.sample(curve.knots / curve.length).target
 
 
@@ -61,7 +61,7 @@ def test_one_waypoint_is_a_line_with_a_uniform_turn():
 @pytest.mark.parametrize("count", [3, 6])
 def test_the_twist_and_two_derivatives_continue_at_waypoints(count):
     path = through(count)
-    curve = path.pieces[0].curve
+    curve = path.spans[0].curve
     inner, h = curve.knots[1:-1] / curve.length, 1e-9
     before, after = path.sample(inner - h), path.sample(inner + h)
     fine = path.sample(np.linspace(0, 1, 2001))
@@ -137,7 +137,7 @@ def test_a_spline_on_the_spot():
         atol=1e-12,
     )
     assert_allclose(target[:, :3], np.broadcast_to(START, (7, 3)), atol=1e-12)
-    curve = path.pieces[0].curve
+    curve = path.spans[0].curve
     assert_allclose(np.diff(curve.knots), STEPS.magnitude(), atol=1e-12)
     once = pose_path(
         [{"spline": {"through": [START], "orientations": orientations[:1]}}]

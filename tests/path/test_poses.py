@@ -251,7 +251,7 @@ def test_a_smooth_turn_joins_a_constant_orientation():
             {"line": {"by": [0.2, 0, 0]}},
         ]
     )
-    assert len(path.pieces) == 3
+    assert len(path.spans) == 3
     sample = path.sample(path.breaks)
     for what in (sample.xi, sample.xi_ds, sample.xi_dds):
         assert_allclose(what[:, 3:], 0.0, atol=1e-9)
@@ -268,7 +268,7 @@ def test_the_same_uniform_turn_may_go_on():
         "line": {"by": [0.6, 0, 0]},
         "orientation": {"rotate": {"axis": [0, 0, 2], "angle_deg": 60}},
     }
-    assert len(pose_path([half, other]).pieces) == 2
+    assert len(pose_path([half, other]).spans) == 2
 
 
 @pytest.mark.parametrize("frame", ["path", "tool"])

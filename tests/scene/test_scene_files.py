@@ -247,7 +247,7 @@ def test_a_cell_is_read_from_a_urdf(tmp_path):
     assert_allclose(placed["cell: table"][:3, 3], [0.6, 0.0, 0.35])
     assert_allclose(placed["cell: post"][:3, 3], [0.6, 0.25, 1.0])
     assert_allclose(placed["cell: post"][:3, 2], [1.0, 0.0, 0.0], atol=1e-7)
-    assert [solid.name for solid in scene.solids[scene.own :]] == [
+    assert [solid.name for solid in scene.solids[scene.robot_count :]] == [
         "cell: table",
         "cell: post",
     ]

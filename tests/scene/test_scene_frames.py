@@ -102,7 +102,7 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
     of = {"file": str(tmp_path / "cell.yaml"), "frame": "user1"}
     jsonschema.validate({**task().to_dict(), "scene": of}, json_schema())
     found = scene(task(scene=of))
-    cell, post, _ = found.placements[found.own :]
+    cell, post, _ = found.placements[found.robot_count :]
     user = transform(TABLE) * transform(USER)
     top = user * transform({"xyz": [0, 0, 0.3]})
     assert_allclose(cell, top.homogeneous, atol=1e-12)

@@ -52,8 +52,8 @@ def smooth_places(path: PosePath, distance: float, count: int = 60) -> np.ndarra
     s = np.random.default_rng(4).uniform(0.0, 1.0, 4 * count)
     sequence = path
     rough = [
-        start + (piece.curve.knots - piece.first) / sequence.total
-        for start, piece in zip(sequence.breaks[:-1], sequence.pieces, strict=True)
+        start + (span.curve.knots - span.first) / sequence.total
+        for start, span in zip(sequence.breaks[:-1], sequence.spans, strict=True)
     ]
     return s[np.abs(s[:, None] - np.concatenate(rough)).min(axis=1) > distance][:count]
 

@@ -168,10 +168,10 @@ def _follow(
     postures = posture[None]
     for k in range(1, 11):
         target = task_map.of_placements(position + k * step, rotation)
-        found = newton.nearest(target, postures[-1:])
-        if not ((found > lower) & (found < upper)).all():  # NaN is not within
+        reached = newton.nearest(target, postures[-1:])
+        if not ((reached > lower) & (reached < upper)).all():  # NaN is not within
             return None
-        postures = np.concatenate([postures, found])
+        postures = np.concatenate([postures, reached])
     return postures
 
 
@@ -185,17 +185,17 @@ def placeholders(
     Limits of zero, and a range from zero to zero, are what exporters write for a missing limit. Without a torque a
     joint gets a limit of acceleration, since its time would go to zero otherwise.
     """
-    given: defaultdict[str, dict[str, Any]] = defaultdict(dict)
+    limits: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     for name, limit in zip(names, stated, strict=True):
         if not (limit.effort and has_masses):
-            given["torque"][name] = None
-            given["acceleration"][name] = 1.0  # rad/s^2 or m/s^2: a careful machine
+            limits["torque"][name] = None
+            limits["acceleration"][name] = 1.0  # rad/s^2 or m/s^2: a careful machine
         if not limit.velocity:
-            given["velocity"][name] = None
+            limits["velocity"][name] = None
         is_empty = limit.lower is not None and limit.lower == limit.upper
         if limit.needs_range or is_empty:
-            given["position"][name] = (-1.5, 1.5)  # rad or m
-    return LimitSpec(**given)  # type: ignore[arg-type]
+            limits["position"][name] = (-1.5, 1.5)  # rad or m
+    return LimitSpec(**limits)  # type: ignore[arg-type]
 
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:

@@ -43,10 +43,10 @@ def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
             signature.bind(*args, **kwargs)
         except TypeError as error:
             allowed = ", ".join(
-                each.name
-                + ("=" if each.kind is each.KEYWORD_ONLY else "")
-                + (" (needed)" if each.default is each.empty else "")
-                for each in parameters.values()
+                parameter.name
+                + ("=" if parameter.kind is parameter.KEYWORD_ONLY else "")
+                + (" (needed)" if parameter.default is parameter.empty else "")
+                for parameter in parameters.values()
             )
             raise InputError(str(error), where=name, allowed=allowed) from None
         return function(*args, **kwargs)
@@ -55,8 +55,8 @@ def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def _wrong_type(value: object, where: str, allowed: str) -> InputError:
-    found = repr(value) if isinstance(value, str) else show_value(value)
-    return InputError("wrong type", where=where, found=found, allowed=allowed)
+    shown = repr(value) if isinstance(value, str) else show_value(value)
+    return InputError("wrong type", where=where, found=shown, allowed=allowed)
 
 
 def check_callable(value: object, where: str) -> None:
@@ -78,8 +78,11 @@ def check_executor(value: object) -> None:
     InputError
     """
     if not hasattr(value, "submit"):
-        allowed = "an executor, such as concurrent.futures.ProcessPoolExecutor()"
-        raise _wrong_type(value, "executor", allowed)
+        raise _wrong_type(
+            value,
+            "executor",
+            "an executor, such as concurrent.futures.ProcessPoolExecutor()",
+        )
 
 
 def check_list(value: object, where: str, of: str) -> None:
@@ -110,9 +113,12 @@ def check_array(
     InputError
     """
     if not isinstance(value, np.ndarray):
-        found = f"{type(value).__name__} {value!r:.60}"
-        allowed = f"a numpy array, {shape}"
-        raise InputError("wrong type", where=where, found=found, allowed=allowed)
+        raise InputError(
+            "wrong type",
+            where=where,
+            found=f"{type(value).__name__} {value!r:.60}",
+            allowed=f"a numpy array, {shape}",
+        )
     if value.dtype.kind not in "fiu":
         raise InputError(
             "the array does not hold real numbers",
@@ -161,10 +167,10 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
 
 def number(value: float, where: str, unit: str) -> float:
     """Return one number as a float; see `numbers`."""
-    found = numbers(value, where, unit)
-    if found.ndim:
+    array = numbers(value, where, unit)
+    if array.ndim:
         raise _wrong_type(value, where, f"a number, {unit}")
-    return float(found)
+    return float(array)
 
 
 def count(value: int, where: str) -> int:
@@ -184,7 +190,7 @@ def count(value: int, where: str) -> int:
 
 
 def check_most(
-    value: float, most: float, unit: str, problem: str, where: str, hint: str = ""
+    value: float, largest: float, unit: str, problem: str, where: str, hint: str = ""
 ) -> None:
     """Refuse a size or a count, in a unit, above what a plan has time and memory for.
 
@@ -192,7 +198,11 @@ def check_most(
     ------
     InputError
     """
-    if value > most:
-        found = f"{value:.4g} {unit}"
-        allowed = f"at most {most:g} {unit}"
-        raise InputError(problem, where=where, found=found, allowed=allowed, hint=hint)
+    if value > largest:
+        raise InputError(
+            problem,
+            where=where,
+            found=f"{value:.4g} {unit}",
+            allowed=f"at most {largest:g} {unit}",
+            hint=hint,
+        )

@@ -46,9 +46,9 @@ def freeze(owner: Any, *names: str) -> None:
         value = getattr(owner, name)
         if value is None:
             continue
-        own = np.array(value, dtype=float)
-        own.setflags(write=False)
-        object.__setattr__(owner, name, own)
+        copied = np.array(value, dtype=float)
+        copied.setflags(write=False)
+        object.__setattr__(owner, name, copied)
 
 
 def clear_rounding(values: np.ndarray) -> np.ndarray:
@@ -157,14 +157,14 @@ def extrapolate(
 
 
 def rates(
-    parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
+    evaluate: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
     """Time derivatives of functions of a motion, by central differences along it.
 
     Parameters
     ----------
-    parts : callable
-        ``parts(x, xdot, xddot, xdddot)`` returns arrays (2 K, ...) for arrays (2 K, c).
+    evaluate : callable
+        ``evaluate(x, xdot, xddot, xdddot)`` returns arrays (2 K, ...) for arrays (2 K, c).
     motion : sequence of (K, c) ndarray
         Value and three time derivatives at K moments.
 
@@ -174,14 +174,16 @@ def rates(
         Per second.
     """
     speeds = [
-        np.abs(part).max(axis=1, initial=0.0) ** (1.0 / order)
-        for order, part in enumerate(motion[1:], 1)
+        np.abs(array).max(axis=1, initial=0.0) ** (1.0 / order)
+        for order, array in enumerate(motion[1:], 1)
     ]
     # The error of central differences is of the order of the square of the step, in units of the coordinates.
     h = 3e-5 / np.maximum(np.max(speeds, axis=0), 1.0)
     step = np.concatenate([h, -h])[:, None]
-    both = [np.tile(part, (2, 1)) for part in motion]
-    sides = (np.split(part, 2) for part in parts(*extrapolate(both, step), both[3]))
+    both = [np.tile(array, (2, 1)) for array in motion]
+    sides = (
+        np.split(array, 2) for array in evaluate(*extrapolate(both, step), both[3])
+    )
     return [
         (ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1)))
         for ahead, behind in sides

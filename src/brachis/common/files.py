@@ -107,8 +107,8 @@ def temporary_in(folder: Path) -> Path:
     host = hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
     with suppress(OSError):
         for path in folder.glob(f".brachis-{host}-*.part"):
-            found = _TEMPORARY.fullmatch(path.name)
-            if found is None or _runs(int(found[1])):
+            match = _TEMPORARY.fullmatch(path.name)
+            if match is None or _runs(int(match[1])):
                 continue
             if path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path, ignore_errors=True)
@@ -248,9 +248,10 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            "the file cannot be written", where=str(path), found=found
+            "the file cannot be written",
+            where=str(path),
+            found=getattr(error, "strerror", None) or str(error),
         ) from error
 
 
@@ -280,10 +281,10 @@ def absolute_path(name: str, folder: Path) -> str:
 
 def locate_urdf(name: str, folder: Path) -> str:
     """Return the absolute path of a URDF: a file relative to `folder`; without such a file, an included robot's."""
-    own = absolute_path(name, folder)
+    local = absolute_path(name, folder)
     included = shipped_folder("robots") / name / "robot.urdf"
-    is_name = Path(name).name == name and not is_file(own)
-    return str(included) if is_name and is_file(included) else own
+    is_name = Path(name).name == name and not is_file(local)
+    return str(included) if is_name and is_file(included) else local
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
@@ -291,17 +292,17 @@ def mesh_file(name: str, folder: Path) -> Path | None:
 
     A package is looked for in the folders above the URDF, then where ROS and this Python installation have packages.
     """
-    scheme, given, within = name.partition("://")
-    within = within if given else name
+    scheme, separator, within = name.partition("://")
+    within = within if separator else name
     above = [folder, *folder.absolute().parents]
-    found = [place / within for place in above] + ros_files(within)
+    candidates = [place / within for place in above] + ros_files(within)
     for place in (*sys.path, sys.prefix):
-        found += [
+        candidates += [
             Path(place, share, within) for share in ("cmeel.prefix/share", "share")
         ]
     if scheme == "package":  # which may be in a folder of another name
-        found += [place / within.partition("/")[2] for place in above]
-    return next((path for path in found if is_file(path)), None)
+        candidates += [place / within.partition("/")[2] for place in above]
+    return next((path for path in candidates if is_file(path)), None)
 
 
 def ros_files(within: str) -> list[Path]:
@@ -388,14 +389,14 @@ def check_kind(
     InputError
         Of the class `error`.
     """
-    found = kind_of(path)
-    if found not in (None, expected):
+    kind = kind_of(path)
+    if kind not in (None, expected):
         raise error(
             "the file is of another kind",
             where=os.fspath(path),
-            found=found,
+            found=kind,
             allowed=expected,
-            hint=_ADVICE[found].format(path=os.fspath(path)),
+            hint=_ADVICE[kind].format(path=os.fspath(path)),
         )
 
 

@@ -20,7 +20,7 @@ class Summary:
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown, by name."""
-        names = [each.name for each in fields(self) if each.repr]  # type: ignore[arg-type]
+        names = [entry.name for entry in fields(self) if entry.repr]  # type: ignore[arg-type]
         return {name: getattr(self, name) for name in names}
 
     if not TYPE_CHECKING:
@@ -53,10 +53,10 @@ class Summary:
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
     def _entries(self) -> list[tuple[str, str]]:
-        given = list(self.summary().items())
-        entries = [(key, show_value(value)) for key, value in given[:LINES]]
-        if len(given) > LINES:
-            entries.append(("...", f"{len(given) - LINES} more"))
+        items = list(self.summary().items())
+        entries = [(key, show_value(value)) for key, value in items[:LINES]]
+        if len(items) > LINES:
+            entries.append(("...", f"{len(items) - LINES} more"))
         return entries
 
 
@@ -78,12 +78,12 @@ def show_value(value: Any) -> str:
         instead = text.partition("\n")[0][: room - len(ending)] + ending
     elif type(value) in {list, tuple}:  # not those with names
         count = len(value)
-        text = f"[{', '.join(show_value(each) for each in value[:items])}]"
+        text = f"[{', '.join(show_value(item) for item in value[:items])}]"
         instead = f"{count} items"
     elif isinstance(value, Mapping):
         count = len(value)
         pairs = list(value.items())[:items]
-        text = ", ".join(f"{key}: {show_value(each)}" for key, each in pairs)
+        text = ", ".join(f"{key}: {show_value(item)}" for key, item in pairs)
         instead = f"{count} entries"
     else:
         text = repr(value)

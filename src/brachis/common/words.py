@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
-def write_apart(value: float, *others: float, digits: int = 4) -> tuple[str, ...]:
+def write_apart(value: float, *references: float, digits: int = 4) -> tuple[str, ...]:
     """Write a number and others with as many significant digits as tell it from them, at least `digits`."""
     for count in range(digits, 18):
-        text, *texts = (f"{each:.{count}g}" for each in (value, *others))
+        text, *texts = (f"{number:.{count}g}" for number in (value, *references))
         if all(
-            text != other or value == each
-            for other, each in zip(texts, others, strict=True)
+            text != written or value == number
+            for written, number in zip(texts, references, strict=True)
         ):
             break
     return (text, *texts)
@@ -22,7 +22,7 @@ def write_count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def name_first(names: Sequence[str], separator: str, most: int = 3) -> str:
+def name_first(names: Sequence[str], separator: str, count: int = 3) -> str:
     """Join the first names, and say how many more there are."""
-    others = f" and {len(names) - most} more" if len(names) > most else ""
-    return separator.join(names[:most]) + others
+    ending = f" and {len(names) - count} more" if len(names) > count else ""
+    return separator.join(names[:count]) + ending

@@ -34,7 +34,7 @@ _SHARE_OF_SPEED = 0.1
 _SELF_MOTION_STEP = 1e-5
 """By how much a posture is changed for a derivative, m or rad."""
 
-Part = tuple[Phase, np.ndarray]
+PhasePoint = tuple[Phase, np.ndarray]
 """A phase and its variables."""
 
 
@@ -50,12 +50,12 @@ def task_savings(
         Of its program.
     answer : OptimalMotion
     """
-    parts = motion.program.split(motion.x)
+    phase_points = motion.program.split(motion.x)
     savings = [
         *_list_dwells(problem),
-        *_list_stops(problem, parts),
+        *_list_stops(problem, phase_points),
         *_list_ends(problem, answer),
-        *_list_rest(problem, parts),
+        *_list_rest(problem, phase_points),
         *_list_postures(problem, answer),
     ]
     costly = (saving for saving in savings if saving.saved > 0.0)
@@ -68,15 +68,17 @@ def _list_dwells(problem: Problem) -> Iterator[TaskSaving]:
         yield TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
 
 
-def _list_stops(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
+def _list_stops(
+    problem: Problem, phase_points: list[PhasePoint]
+) -> Iterator[TaskSaving]:
     """Bound what the motion would gain along the same joint path without each of its stops."""
     for number, leg in enumerate(problem.legs[:-1]):
         if not leg.stops:
             continue
-        sides = ((parts[number], -1), (parts[number + 1], 0))
+        sides = ((phase_points[number], -1), (phase_points[number + 1], 0))
         saved = 0.0
-        for part, end in sides:
-            course = lay_course(*part, _PLACES)
+        for (phase, x), end in sides:
+            course = lay_course(phase, x, _PLACES)
             saved += least_time(course) - least_time(course, end)
         words = "with a blend in place of" if _is_corner(problem, number) else "without"
         change = f"{words} the stop at s = {leg.end:.4g}"
@@ -98,23 +100,25 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
             continue
         length = path_speed(problem.task_map, problem.path, float(-end))
         mean = length / answer.program.end_time(answer.x)
-        more = _SHARE_OF_SPEED * (speed or mean)
-        changed = boundary.model_copy(update={key: speed + answer.step * more})
+        increase = _SHARE_OF_SPEED * (speed or mean)
+        changed = boundary.model_copy(update={key: speed + answer.step * increase})
         task = problem.task.model_copy(update={"boundary": changed})
         saved = -answer.change(replace(problem, task=task)) / answer.step
-        change = f"boundary.{key}: {speed + more:.2g} in place of {speed:.2g}"
+        change = f"boundary.{key}: {speed + increase:.2g} in place of {speed:.2g}"
         accuracy: Accuracy = "least" if problem.r and not speed else "estimate"
         yield TaskSaving(change, saved, accuracy)
 
 
-def _list_rest(problem: Problem, parts: list[Part]) -> Iterator[TaskSaving]:
+def _list_rest(
+    problem: Problem, phase_points: list[PhasePoint]
+) -> Iterator[TaskSaving]:
     """Estimate what the motion would gain if its accelerations could jump where it rests."""
     spline = problem.task.spline
     order = max((limit.order for limit in problem.limits), default=0)
     if spline.vanishing == 1 or order > 2:  # limits on jerk need a smooth acceleration
         return
     saved = 0.0
-    for phase, x in parts:
+    for phase, x in phase_points:
         for end, conditions in enumerate((phase.boundary.start, phase.boundary.end)):
             derivatives = conditions[0].derivatives
             if len(derivatives) > 1 and not derivatives.any():
@@ -145,22 +149,20 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
         shares = np.abs(direction) / widths
         if not shares.any():
             continue
-        most = int(np.argmax(shares))
-        length = _RANGE_SHARE / shares[most]
+        joint_index = int(np.argmax(shares))
+        length = _RANGE_SHARE / shares[joint_index]
         step = length * direction
         moved = posture + step
         inside = moved.clip(limits.position_lower, limits.position_upper)
         if (moved != inside).any():
             continue
         saved = float(length * (slopes @ slopes))
-        amount = f"{abs(step[most]):.3g} {robot.position_units[most]}"
-        if robot.position_units[most] == "rad":
-            amount += f" ({np.degrees(abs(step[most])):.3g} deg)"
-        way = "higher" if step[most] > 0.0 else "lower"
-        joint = robot.joint_names[most]
-        change = (
-            f"another {name} posture, {joint} {amount} {way} and the tool in its place,"
-        )
+        amount = f"{abs(step[joint_index]):.3g} {robot.position_units[joint_index]}"
+        if robot.position_units[joint_index] == "rad":
+            amount += f" ({np.degrees(abs(step[joint_index])):.3g} deg)"
+        side = "higher" if step[joint_index] > 0.0 else "lower"
+        joint = robot.joint_names[joint_index]
+        change = f"another {name} posture, {joint} {amount} {side} and the tool in its place,"
         yield TaskSaving(change, saved, "estimate")
 
 

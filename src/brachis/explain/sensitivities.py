@@ -27,7 +27,7 @@ from brachis.trajectory.sensitivities import (
     Sensitivity,
 )
 
-Figure = tuple[Label, str | None]
+LimitFigure = tuple[Label, str | None]
 """A figure that a user could change: what is limited, and the end of its range."""
 LimitBound = tuple[Limit, Bound]
 _RAISED = 1e-3
@@ -38,16 +38,16 @@ _LEAST_COST = 1e-9
 """s; a branch boundary that costs less is not listed."""
 
 
-def figures_of(program: Program) -> dict[Figure, list[LimitBound]]:
+def figures_of(program: Program) -> dict[LimitFigure, list[LimitBound]]:
     """List the figures of a program's limits; phases that keep a part of a limit each have an object of their own."""
-    figures: defaultdict[Figure, list[LimitBound]] = defaultdict(list)
+    figures: defaultdict[LimitFigure, list[LimitBound]] = defaultdict(list)
     for limit in program.limits:
         for bound in limit.bounds:
             figures[_figure(limit, bound)].append((limit, bound))
     return figures
 
 
-def _figure(limit: Limit, bound: Bound) -> Figure:
+def _figure(limit: Limit, bound: Bound) -> LimitFigure:
     """Name what a user would change to move a bound."""
     label = limit.labels[bound.column]
     if label.cause:
@@ -108,8 +108,8 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     Sensitivities
         Those of limits that a slower motion does not relieve are zero.
     """
-    changes: defaultdict[Figure, float] = defaultdict(float)
-    bounds: dict[Figure, Bound] = {}
+    changes: defaultdict[LimitFigure, float] = defaultdict(float)
+    bounds: dict[LimitFigure, Bound] = {}
     for phase, x in solved.program.split(solved.x):
         course = lay_course(phase, x, FINE_PLACES)
         before = least_time(course)

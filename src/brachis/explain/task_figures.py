@@ -111,7 +111,7 @@ class OptimalMotion:
     def change(self, changed: Problem) -> float:
         """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
         phases = []
-        parts = []
+        x_by_phase = []
         for number, (phase, x_of_phase) in enumerate(self.program.split(self.x)):
             path = changed.leg_paths[number]
             joint_map = phase.joint_map.along(path, phase.joint_map.start)
@@ -119,12 +119,12 @@ class OptimalMotion:
                 phase.boundary, boundary_of(changed, joint_map, number)
             )
             arguments = (joint_map, phase.limits, phase.grid, boundary)
-            other = Phase(*arguments, margin=None, pause=phase.pause)
-            phases.append(other)
-            parts.append(_carry_over(phase, x_of_phase, other))
+            shifted = Phase(*arguments, margin=None, pause=phase.pause)
+            phases.append(shifted)
+            x_by_phase.append(_carry_over(phase, x_of_phase, shifted))
         program = self.program.with_phases(phases)
         try:
-            after = self.value(program, np.concatenate(parts))
+            after = self.value(program, np.concatenate(x_by_phase))
         except UnreachableError:
             return 0.0
         change = after - self._unchanged
@@ -148,20 +148,20 @@ def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
     return replace(after, **sides)
 
 
-def _carry_over(phase: Phase, x: np.ndarray, other: Phase) -> np.ndarray:
+def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
     """Take a motion, (v,), over to a phase that passes the same leg at other path coordinates, or at another speed."""
     carried = x.copy()
-    if other.time_law is not None:
-        carried[0] = other.time_law.duration
+    if target.time_law is not None:
+        carried[0] = target.time_law.duration
         return carried
     of_s = phase.slices[0]
     begin = phase.boundary.start[0].value
-    ratio = other.boundary.ahead[0] / phase.boundary.ahead[0]
-    carried[of_s] = other.boundary.start[0].value + ratio * (x[of_s] - begin)
+    ratio = target.boundary.ahead[0] / phase.boundary.ahead[0]
+    carried[of_s] = target.boundary.start[0].value + ratio * (x[of_s] - begin)
     return carried
 
 
-Figure = tuple[Sensitivity, Callable[[float], Problem]]
+TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
 """A figure of a task, what it costs not known yet, and the problem with another value of it."""
 
 
@@ -178,38 +178,44 @@ def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
     return tuple(costs)
 
 
-def _speeds(problem: Problem) -> Iterator[Figure]:
+def _speeds(problem: Problem) -> Iterator[TaskFigure]:
     """List process speeds; parts of the path with the same speed have one figure."""
     limits = problem.task.tool_limits
 
     def change(before: float, after: float) -> Problem:
         """Pass the parts with one speed, m/s, at another one."""
-        parts = tuple(
-            part.model_copy(update={"speed": after}) if part.speed == before else part
-            for part in limits.process_speed
+        sections = tuple(
+            section.model_copy(update={"speed": after})
+            if section.speed == before
+            else section
+            for section in limits.process_speed
         )
-        changed = limits.model_copy(update={"process_speed": parts})
+        changed = limits.model_copy(update={"process_speed": sections})
         task = problem.task.model_copy(update={"tool_limits": changed})
         return _with_legs(replace(problem, task=task))
 
-    for speed in sorted({part.speed for part in limits.process_speed}):
-        parts = [part for part in limits.process_speed if part.speed == speed]
+    for speed in sorted({section.speed for section in limits.process_speed}):
+        sections = [
+            section for section in limits.process_speed if section.speed == speed
+        ]
         keys = dict.fromkeys(
-            PROCESS_SPEED_KEY if part.segment is None else f"path[{part.segment}].speed"
-            for part in parts
+            PROCESS_SPEED_KEY
+            if section.segment is None
+            else f"path[{section.segment}].speed"
+            for section in sections
         )
         label = label_of_speed(PROCESS_SPEED, speed, ", ".join(keys))
-        s = tuple(part.s for part in parts)
+        s = tuple(section.s for section in sections)
         yield Sensitivity(label, None, speed, speed, 0.0, s), partial(change, speed)
 
 
-def _blends(problem: Problem) -> Iterator[Figure]:
+def _blends(problem: Problem) -> Iterator[TaskFigure]:
     """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()
     places: dict[int | None, tuple[float, float]] = {}
-    for number, (before, piece) in enumerate(pairwise(problem.path.pieces), 1):
-        if piece.segment is None:
+    for number, (before, span) in enumerate(pairwise(problem.path.spans), 1):
+        if span.segment is None:
             places[before.segment] = (breaks[number], breaks[number + 1])
     groups: defaultdict[str | float | None, list[int]] = defaultdict(list)
     source = ""

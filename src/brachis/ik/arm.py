@@ -77,19 +77,19 @@ class RemainingJoints:
         NotApplicableError
             Another number of joints than `count` is left over.
         """
-        rest = complement(geometry.n, redundant)
-        if len(rest) != count:
+        non_redundant = complement(geometry.n, redundant)
+        if len(non_redundant) != count:
             raise NotApplicableError(
-                f"{write_count(len(rest), 'joint')} left to solve for, not {count}"
+                f"{write_count(len(non_redundant), 'joint')} left to solve for, not {count}"
             )
         q_r = np.random.default_rng(0).uniform(-np.pi, np.pi, (8, len(redundant)))
         screws = geometry.screws_with(redundant, q_r)
         return cls(
-            tuple(geometry.joint_names[i] for i in rest),
-            tuple(rest),
-            geometry.revolute[rest],
-            screws.axes[:, rest],
-            screws.points[:, rest],
+            tuple(geometry.joint_names[i] for i in non_redundant),
+            tuple(non_redundant),
+            geometry.revolute[non_redundant],
+            screws.axes[:, non_redundant],
+            screws.points[:, non_redundant],
         )
 
     @classmethod
@@ -124,9 +124,9 @@ class RemainingJoints:
         picked = screws.pick(self.joints, alternatives)
         return tuple(screw.inverse for screw in picked) if self.mirrored else picked
 
-    def are_parallel(self, first: int, *others: int) -> bool:
+    def are_parallel(self, first: int, *compared: int) -> bool:
         """Whether the directions of joints, of whatever kind, are always parallel."""
-        sines = cross(self.axes[:, [first]], self.axes[:, others])
+        sines = cross(self.axes[:, [first]], self.axes[:, compared])
         return bool(np.abs(sines).max() < tolerances.LENGTH)
 
     def are_perpendicular(self, i: int, j: int) -> bool:

@@ -166,8 +166,8 @@ class FactoredSolver(FormulaSolver):
                 self._sided.append(slot)
         self._choices = list(itertools.product(*self._signs))
         self.branches: tuple[str, ...] = tuple(
-            "_".join(filter(None, parts)) or "slides"
-            for parts in itertools.product(*labels)
+            "_".join(filter(None, sides)) or "slides"
+            for sides in itertools.product(*labels)
         )
 
     @abstractmethod
@@ -244,7 +244,7 @@ def fit(
     geometry: ChainGeometry,
     redundant: tuple[int, ...],
     joints: RemainingJoints,
-    *more: object,
+    *arguments: object,
 ) -> S:
     """Make a solver of joints in their order or, where it does not fit, in the reverse order.
 
@@ -268,7 +268,7 @@ def fit(
     reasons = []
     for order in (joints, joints.reverse()):
         try:
-            return solver(geometry, redundant, order, *more)
+            return solver(geometry, redundant, order, *arguments)
         except NotApplicableError as reason:
             reasons.append(str(reason))
     raise NotApplicableError("; ".join(dict.fromkeys(reasons)))

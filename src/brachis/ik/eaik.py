@@ -86,9 +86,9 @@ class EaikSolver(DeterminantSolver):
     def __init__(
         self, geometry: ChainGeometry, task_map: Pose, redundant: tuple[int, ...]
     ) -> None:
-        rest = complement(geometry.n, redundant)
-        first = rest[0]
-        last = rest[-1]
+        non_redundant = complement(geometry.n, redundant)
+        first = non_redundant[0]
+        last = non_redundant[-1]
         self._before = [i for i in redundant if i < first]
         self._behind = [i for i in redundant if i > last]
         self._held = [i for i in redundant if first < i < last]
@@ -116,46 +116,46 @@ class EaikSolver(DeterminantSolver):
             np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1)
         )
         inner = q_r[finite, self._inner]
-        wanted = self._targets_between(targets[finite], q_r[finite])
-        joints, samples, slack = self._ask(wanted, inner)
-        wanted = wanted[samples]
+        inner_targets = self._targets_between(targets[finite], q_r[finite])
+        joints, samples, slack = self._ask(inner_targets, inner)
+        inner_targets = inner_targets[samples]
         q = np.zeros((len(joints), self._chain.n))
         q[:, self._held] = inner[samples]
         q[:, self._joints] = joints
-        miss, determinants = self._judge(q, wanted)
+        miss, determinants = self._judge(q, inner_targets)
         near = np.flatnonzero((miss > 1e-13) & (miss < slack))
-        polished = self._newton.polish(wanted[near], q[near], self._redundant)
+        polished = self._newton.polish(inner_targets[near], q[near], self._redundant)
         converged = np.isfinite(polished[:, 0])
         moved = near[converged]
         q[moved] = polished[converged]
-        miss[moved], determinants[moved] = self._judge(q[moved], wanted[moved])
+        miss[moved], determinants[moved] = self._judge(q[moved], inner_targets[moved])
         right = np.flatnonzero((miss < 1e-9) & (determinants != 0.0))
         groups = 2 * finite[samples[right]] + (determinants[right] < 0.0)
         return _arrange(wrap(q[right][:, self._joints]), groups, len(q_r))
 
     def _targets_between(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; the tool's placement is G M."""
-        wanted = Poses.of_targets(targets)
+        poses = Poses.of_targets(targets)
         if self._before:
             undo = self._undo(self._before, q_r[:, : self._inner.start])
-            wanted = self._tool @ undo @ wanted
+            poses = self._tool @ undo @ poses
         if self._behind:
             undo = self._undo(self._behind, q_r[:, self._inner.stop :])
-            wanted = wanted @ undo @ self._tool
-        return wanted.targets()
+            poses = poses @ undo @ self._tool
+        return poses.targets()
 
     def _undo(self, joints: list[int], positions: np.ndarray) -> Poses:
         """Motions that undo the tool's placement with these joints alone at positions, (K, h)."""
         return Poses.of_tool(self._chain.screws_with(joints, positions)).inverse()
 
     def _judge(
-        self, q: np.ndarray, wanted: np.ndarray
+        self, q: np.ndarray, expected: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """By how much postures miss their targets, m or an element of a rotation, and det J_nr; both (N,)."""
         positions, rotations, twists = self._chain.tool(q, in_tool_axes=False)
         targets = np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
         columns = np.moveaxis(twists[:, :, self._joints], 0, 1)
-        return np.abs(wanted - targets).max(axis=1), np.linalg.det(columns)
+        return np.abs(expected - targets).max(axis=1), np.linalg.det(columns)
 
     def _ask(
         self, targets: np.ndarray, values: np.ndarray
@@ -182,12 +182,14 @@ class EaikSolver(DeterminantSolver):
         poses = np.tile(np.eye(4), (len(targets), 1, 1))
         poses[:, :3, :3] = targets[:, 3:].reshape(-1, 3, 3)
         poses[:, :3, 3] = targets[:, :3]
-        found = [
+        answers = [
             _calculate(robot, pose)
             for (robot, _), pose in zip(robots, poses, strict=True)
         ]
-        samples = np.repeat(np.arange(len(found)), [len(joints) for joints in found])
-        joints = np.concatenate([np.empty((0, 6)), *found])
+        samples = np.repeat(
+            np.arange(len(answers)), [len(joints) for joints in answers]
+        )
+        joints = np.concatenate([np.empty((0, 6)), *answers])
         slack = np.array([slack for _, slack in robots])[samples]
         finite = np.isfinite(joints).all(axis=1)
         return joints[finite], samples[finite], slack[finite]
@@ -224,11 +226,11 @@ class EaikSolver(DeterminantSolver):
         offsets = np.diff(
             np.concatenate([points, tool], axis=1), axis=1, prepend=0.0 * tool
         )
-        parts = (
-            np.moveaxis(part, 2, 0) for part in (axes, offsets, screws.tool_rotation)
+        arrays = (
+            np.moveaxis(array, 2, 0) for array in (axes, offsets, screws.tool_rotation)
         )
         robots: list[Any] = []
-        for h, p, rotation in zip(*parts, strict=True):
+        for h, p, rotation in zip(*arrays, strict=True):
             try:
                 robot = create(h, p, rotation, [], use_double_precision)
             except RuntimeError:  # axes that are almost parallel
@@ -355,13 +357,15 @@ def eaik(
     """Fit the family: a pose is prescribed, and six joints are left over, all revolute, which EAIK can solve."""
     if not isinstance(task_map, Pose):
         raise NotApplicableError("this family solves only poses")
-    rest = complement(geometry.n, redundant)
-    sliding = [geometry.joint_names[i] for i in rest if not geometry.revolute[i]]
+    non_redundant = complement(geometry.n, redundant)
+    sliding = [
+        geometry.joint_names[i] for i in non_redundant if not geometry.revolute[i]
+    ]
     if sliding:
         raise NotApplicableError(
             f"EAIK needs six revolute joints besides the redundant ones; prismatic: {', '.join(sliding)}"
         )
-    largest_size(geometry.random_screws.determinant(rest), geometry, redundant)
+    largest_size(geometry.random_screws.determinant(non_redundant), geometry, redundant)
     if not is_installed():
         raise NotApplicableError(NOT_INSTALLED)
     return EaikSolver(geometry, task_map, redundant)

@@ -161,8 +161,8 @@ class ParallelAxesSolver(FactoredSolver):
         end = place + rotate(n, theta, d.point - arm.centre)
         around = move_within_plane(b, c, d.point, end, self._elbow)
         outer, elbow = (np.flip(answers, axis=self._elbow) for answers in around)
-        rest = theta - outer - sign(dot(n, c.axis)) * elbow
-        last = sign(dot(n, d.axis)) * rest
+        remaining = theta - outer - sign(dot(n, c.axis)) * elbow
+        last = sign(dot(n, d.axis)) * remaining
         values |= zip(self._parallel, (outer, elbow, last), strict=True)
         return arm, [values[i] for i in range(6)]
 

@@ -83,8 +83,8 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         # How the slides move the tool along the normal.
         self._lifts = np.where(revolute, 0.0, geometry.axes @ self._normal)
         self._lifting = lifting
-        rest = complement(geometry.n, redundant)
-        self._planar = [i for i in rest if i not in lifting]
+        non_redundant = complement(geometry.n, redundant)
+        self._planar = [i for i in non_redundant if i not in lifting]
         kinds = "".join("R" if revolute[i] else "P" for i in self._planar)
         self._angle = None
         if isinstance(task_map, RowsAndAngle):
@@ -163,8 +163,8 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             second = replace(last, axis=rotate(normal, angle, last.axis))
         pair = move_within_plane(first, second, start, end, 0)
         values = list(pair if anchor else pair[::-1])
-        others = [joint for joint in joints if joint is not joints[anchor]]
-        for joint, value in zip(others, values, strict=True):
+        movers = [joint for joint in joints if joint is not joints[anchor]]
+        for joint, value in zip(movers, values, strict=True):
             if joint.revolute:
                 angle = angle - value
         values.insert(anchor, angle)
@@ -223,12 +223,12 @@ def planar(
         raise NotApplicableError("this family does not solve orientations")
     normal = _plane_normal(geometry)
     rows = np.eye(3)[list(task_map.axes)]
-    rest = complement(geometry.n, redundant)
+    non_redundant = complement(geometry.n, redundant)
     slides_up = ~geometry.revolute & (
         np.abs(geometry.axes @ normal) > 1.0 - tolerances.ANGLE
     )
     is_height = slides_up.any() & (np.abs(rows @ normal) > 1.0 - tolerances.ANGLE)
-    lifting = [i for i in rest if slides_up[i] and is_height.any()]
+    lifting = [i for i in non_redundant if slides_up[i] and is_height.any()]
     if len(lifting) != is_height.sum():
         row = task_map.rows[int(np.argmax(is_height))]
         raise NotApplicableError(
@@ -251,7 +251,7 @@ def planar(
             )
         if len(rows) != 2:
             raise NotApplicableError("an angle needs both rows of the plane")
-        if not geometry.revolute[rest].any():
+        if not geometry.revolute[non_redundant].any():
             raise NotApplicableError("no revolute joint is left to set the angle")
     return PlanarSolver(geometry, task_map, redundant, basis, lifting)
 
@@ -285,11 +285,11 @@ class PrismaticSolver(DeterminantSolver, FormulaSolver):
             replaced = np.array(directions, dtype=gap.dtype)
             replaced[:, joint] = gap
             slides.append(determinants(replaced) / size)
-        one = np.stack(slides, axis=1)[:, None, None]
+        solution = np.stack(slides, axis=1)[:, None, None]
         if len(self.branches) == 1:
-            return one
+            return solution
         levels = size[:, None] * np.array([1.0, -1.0])
-        return nan_where_negative(levels[:, :, None, None], one)
+        return nan_where_negative(levels[:, :, None, None], solution)
 
     def margins(self, q: np.ndarray) -> np.ndarray:
         """Return the determinant of D; no margin where D is constant."""

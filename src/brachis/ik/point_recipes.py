@@ -149,10 +149,10 @@ def move_within_plane(
         outer = orbit.distance(second.point, dot(away, away), slot)
         return outer, angle_about(second.axis, away, orbit.at(outer) - second.point)
     normal = cross(first.axis, second.axis)
-    way = end - start
+    displacement = end - start
     size = dot(normal, normal)
-    outer = dot(cross(way, second.axis), normal) / size
-    return outer, dot(cross(first.axis, way), normal) / size
+    outer = dot(cross(displacement, second.axis), normal) / size
+    return outer, dot(cross(first.axis, displacement), normal) / size
 
 
 def _across(arm: Arm, joint: int, plane: tuple[int, int]) -> np.ndarray:
@@ -181,8 +181,8 @@ def _along(arm: Arm, joint: int, axis: int) -> np.ndarray:
 
 def _approach(arm: Arm, joint: int, sign: float) -> np.ndarray:
     """Velocity that a joint gives the centre towards, or away from, where two others meet, times its distance."""
-    way = sign * (arm.meeting - arm.centre)
-    return dot(way, arm.screws[joint].velocity(arm.centre))
+    direction = sign * (arm.meeting - arm.centre)
+    return dot(direction, arm.screws[joint].velocity(arm.centre))
 
 
 def _in_front(arm: Arm) -> np.ndarray:

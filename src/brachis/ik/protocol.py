@@ -117,11 +117,11 @@ class FormulaMargins(IKSolver):
         return {}
 
     def _formula(
-        self, key: object, make: Callable[..., Formula], *given: Any
+        self, key: object, make: Callable[..., Formula], *arguments: Any
     ) -> Formula:
         """Return the formula of a key; it is made if it has not been."""
         if key not in self._formulas:
-            self._formulas[key] = make(*given)
+            self._formulas[key] = make(*arguments)
         return self._formulas[key]
 
     def _values(self, n: int) -> Formula:
@@ -132,10 +132,10 @@ class FormulaMargins(IKSolver):
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
         """Return margins and slopes with the branch's signs; None where a subclass computes one of them itself."""
-        own = type(self)
-        if own.branch_margins is not FormulaMargins.branch_margins:
+        solver_type = type(self)
+        if solver_type.branch_margins is not FormulaMargins.branch_margins:
             return None
-        if own.margin_gradient is not FormulaMargins.margin_gradient:
+        if solver_type.margin_gradient is not FormulaMargins.margin_gradient:
             return None
         values = self._values(n)
         signs = np.broadcast_to(self.margin_signs(branch), values.shape)

@@ -110,8 +110,7 @@ def check_families(families: Sequence[Family]) -> None:
             continue
         problem = _refuse_name(family.name, taken)
         if problem:
-            found = repr(family.name)
-            raise InputError(problem, where=f"{where}.name", found=found)
+            raise InputError(problem, where=f"{where}.name", found=repr(family.name))
         taken.add(family.name)
 
 
@@ -139,7 +138,7 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
         if not isinstance(family, Family):
             reason = f"the plug-in's entry point must be a Family, not {type(family).__name__}"
         else:
-            problem = _refuse_name(family.name, {own.name for own in BUILTIN})
+            problem = _refuse_name(family.name, {builtin.name for builtin in BUILTIN})
             if problem is None:
                 return family
             reason = problem
@@ -190,9 +189,9 @@ def find(
         redundant_joints=names,
         reasons=tried.reasons,
         available=[
-            other.redundant_joints
-            for other in find_all(robot, task_map, families=families)
-            if other.solver is not None
+            choice.redundant_joints
+            for choice in find_all(robot, task_map, families=families)
+            if choice.solver is not None
         ],
     )
 
@@ -238,8 +237,8 @@ def find_all(
         return []
     matcher = _Matcher(robot, task_map, families)
     always = tuple(joint.name for joint in robot.tool_joints if joint.is_ranged)
-    others = [name for name in robot.joint_names if name not in always]
-    choices = itertools.combinations(others, r - len(always))
+    free_names = [name for name in robot.joint_names if name not in always]
+    choices = itertools.combinations(free_names, r - len(always))
     return [matcher.match((*names, *always)) for names in choices]
 
 
@@ -276,30 +275,32 @@ class _Matcher:
         """All that the answer depends on, apart from the families."""
         geometry = self._geometry
         task_map = self._task_map
-        parts = (
+        content = (
             *(geometry.joint_names, geometry.revolute, geometry.axes, geometry.points),
             *(geometry.tool_position, geometry.tool_rotation),
             *ranges_to_check(self._robot),
             type(task_map),
-            *(getattr(task_map, own.name) for own in fields(task_map)[1:]),
+            *(getattr(task_map, entry.name) for entry in fields(task_map)[1:]),
         )
-        return pickle.dumps(parts)
+        return pickle.dumps(content)
 
     def match(self, names: tuple[str, ...]) -> TriedDecomposition:
         """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
         redundant = tuple(sorted(self._robot.joint_names.index(name) for name in names))
         key = (redundant, self._content, *map(id, self._families))
         if key in _KNOWN:
-            _, found = _KNOWN[key]
+            _, tried = _KNOWN[key]
         else:
-            found = self._find(redundant)
+            tried = self._find(redundant)
             if len(_KNOWN) >= _MOST_KNOWN:
                 _KNOWN.clear()
-            reasons = found.reasons.values()
+            reasons = tried.reasons.values()
             # Not where a library is missing, or code of another package failed: that may change.
-            if not any(own.startswith((NOT_INSTALLED, _FAILED)) for own in reasons):
-                _KNOWN[key] = (self._families, found)
-        return replace(found, reasons=dict(found.reasons))
+            if not any(
+                reason.startswith((NOT_INSTALLED, _FAILED)) for reason in reasons
+            ):
+                _KNOWN[key] = (self._families, tried)
+        return replace(tried, reasons=dict(tried.reasons))
 
     def _find(self, redundant: tuple[int, ...]) -> TriedDecomposition:
         """Try the families on the robot, then on the ideal arm."""

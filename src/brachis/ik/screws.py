@@ -92,9 +92,11 @@ class Circle:
             dot(direction, self.arm), dot(direction, self.across), level, slot
         )
 
-    def distance(self, other: np.ndarray, squared: np.ndarray, slot: int) -> np.ndarray:
+    def distance(
+        self, position: np.ndarray, squared: np.ndarray, slot: int
+    ) -> np.ndarray:
         """Angles at a distance from another position: approaching it at the first, leaving it at the second."""
-        away = other - self.middle
+        away = position - self.middle
         level = 0.5 * (dot(away, away) + dot(self.arm, self.arm) - squared)
         return cosine_roots(dot(away, self.arm), dot(away, self.across), level, slot)
 
@@ -121,9 +123,11 @@ class Line:
         """Return the slide at which ``direction . position = level``; it is the only one, so `slot` is not used."""
         return (level - dot(direction, self.start)) / dot(direction, self.axis)
 
-    def distance(self, other: np.ndarray, squared: np.ndarray, slot: int) -> np.ndarray:
+    def distance(
+        self, position: np.ndarray, squared: np.ndarray, slot: int
+    ) -> np.ndarray:
         """Slides at a distance from another position: approaching it at the first, leaving it at the second."""
-        away = other - self.start
+        away = position - self.start
         nearest = dot(self.axis, away)
         root = formula.sqrt(nearest * nearest - dot(away, away) + squared)
         return np.concatenate([nearest - root, nearest + root], axis=slot)
@@ -213,10 +217,10 @@ class Poses:
         """Move points, (3, ...), as these poses move the origin's frame."""
         return apply(self.rotation, point) + self.position
 
-    def __matmul__(self, other: Poses) -> Poses:
+    def __matmul__(self, moved: Poses) -> Poses:
         """Move other poses as these ones move the origin; N or 1 of each."""
-        rotation = np.einsum("ij...,jk...->ik...", self.rotation, other.rotation)
-        return Poses(self.move(other.position), rotation)
+        rotation = np.einsum("ij...,jk...->ik...", self.rotation, moved.rotation)
+        return Poses(self.move(moved.position), rotation)
 
     def inverse(self) -> Poses:
         """Return the motions that undo these."""
@@ -240,9 +244,9 @@ class ChainGeometry(Chain):
     @classmethod
     def of(cls, robot: Robot) -> ChainGeometry:
         """Take the screws of a robot's chain."""
-        own = robot.chain
-        parts = {each.name: getattr(own, each.name) for each in fields(own)}
-        return cls(**parts, joint_names=robot.joint_names)
+        chain = robot.chain
+        arrays = {entry.name: getattr(chain, entry.name) for entry in fields(chain)}
+        return cls(**arrays, joint_names=robot.joint_names)
 
     @cached_property
     def _generators(self) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -127,11 +127,13 @@ class _Chain:
         self, axis: np.ndarray, point: np.ndarray, *, revolute: bool
     ) -> np.ndarray:
         """Direction of the next joint; turns the rest of the chain about its axis' point that is nearest."""
-        given = self.rotation @ axis
-        ideal = _nearest_ideal(given, self._fixed, self._tolerance)
-        pivot = self._nearest(given, self.carry(point))[1] if revolute else self._point
-        turn = _least_rotation(given, ideal)
-        self.turned = max(self.turned, float(np.linalg.norm(ideal - given)))
+        direction = self.rotation @ axis
+        ideal = _nearest_ideal(direction, self._fixed, self._tolerance)
+        pivot = (
+            self._nearest(direction, self.carry(point))[1] if revolute else self._point
+        )
+        turn = _least_rotation(direction, ideal)
+        self.turned = max(self.turned, float(np.linalg.norm(ideal - direction)))
         self.rotation = turn @ self.rotation
         self.offset = turn @ (self.offset - pivot) + pivot
         self._fixed = [ideal] if revolute else [*self._fixed, ideal]
@@ -182,15 +184,15 @@ def _nearest_ideal(
     axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
     """Direction exactly parallel to one of some others, else perpendicular to one or two of them, if it almost is."""
-    for other in fixed:
-        if np.linalg.norm(np.cross(axis, other)) < tolerance:
-            return other * np.sign(axis @ other)
-    across = [other for other in fixed if abs(axis @ other) < tolerance]
+    for fixed_axis in fixed:
+        if np.linalg.norm(np.cross(axis, fixed_axis)) < tolerance:
+            return fixed_axis * np.sign(axis @ fixed_axis)
+    across = [fixed_axis for fixed_axis in fixed if abs(axis @ fixed_axis) < tolerance]
     if not across:
         return axis
     ideal = axis - across[0] * (axis @ across[0])
-    for other in across[1:]:
-        normal = np.cross(across[0], other)
+    for fixed_axis in across[1:]:
+        normal = np.cross(across[0], fixed_axis)
         if np.linalg.norm(normal) > _SKEW:
             ideal = normal * np.sign(axis @ normal)
             break

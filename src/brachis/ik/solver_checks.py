@@ -76,24 +76,26 @@ def check_answers(
             f"two of its branches have the same label: {', '.join(solver.branches)}"
         )
     q = _postures_inside(robot, solver)
-    rest = complement(robot.n, redundant)
+    non_redundant = complement(robot.n, redundant)
     targets = task_map.of_placements(*robot.tool_placements(q))
     answers = _compute_answers(solver, targets, q[:, list(redundant)])
-    expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
+    expected = (len(q), len(solver.branches), solver.alternatives, len(non_redundant))
     if answers.shape != expected:
         raise NotApplicableError(
             f"its answers have the shape {answers.shape}, not {expected}"
         )
-    turning = robot.revolute[rest]
-    own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
-    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < 1e-6):
+    turning = robot.revolute[non_redundant]
+    off = np.abs(difference(answers, q[:, None, None, non_redundant], turning)).max(
+        axis=3
+    )
+    if not np.all(np.nanmin(np.where(np.isnan(off), np.inf, off), axis=(1, 2)) < 1e-6):
         raise NotApplicableError(
             "its answers do not contain all postures that reach the target"
         )
     exists = np.isfinite(answers).all(axis=3)
     sample = np.nonzero(exists)[0]
     reached = q[sample]
-    reached[:, rest] = answers[exists]
+    reached[:, non_redundant] = answers[exists]
     placed = task_map.of_placements(*robot.tool_placements(reached))
     miss = np.abs(task_map.difference(placed, targets[sample])).max()
     if not miss < 1e-8:
@@ -135,9 +137,9 @@ def _check_slopes(solver: IKSolver, q: np.ndarray) -> None:
             - _compute_margins(solver, inside - move, branch)
             for move in step * np.eye(n)
         ]
-        found = np.stack(rises, axis=2) / (2.0 * step)
-        largest = np.abs(found).max(axis=(1, 2), initial=0.0)
-        miss = np.abs(slopes - found).max(axis=(1, 2), initial=0.0)
+        differences = np.stack(rises, axis=2) / (2.0 * step)
+        largest = np.abs(differences).max(axis=(1, 2), initial=0.0)
+        miss = np.abs(slopes - differences).max(axis=(1, 2), initial=0.0)
         is_wrong = ~(miss <= 1e-3 * largest + 1e-6)
         if 2 * is_wrong.sum() > len(inside):
             raise NotApplicableError(

@@ -60,12 +60,12 @@ def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.n
 
 
 def meeting_point(
-    axis: np.ndarray, point: np.ndarray, other: np.ndarray, through: np.ndarray
+    axis: np.ndarray, point: np.ndarray, second_axis: np.ndarray, through: np.ndarray
 ) -> np.ndarray:
     """Position on the line through `point` along `axis` that is nearest to a second line, (3, ...)."""
-    normal = cross(axis, other)
+    normal = cross(axis, second_axis)
     return point + axis * (
-        dot(cross(through - point, other), normal) / dot(normal, normal)
+        dot(cross(through - point, second_axis), normal) / dot(normal, normal)
     )
 
 
@@ -99,8 +99,8 @@ def determinants(matrices: np.ndarray) -> np.ndarray:
                     continue
                 term = entry * minor
                 is_odd = (columns >> j).bit_count() % 2
-                own = columns | 1 << j
+                selected = columns | 1 << j
                 signed = -term if is_odd else term
-                larger[own] = larger.get(own, 0.0) + signed
+                larger[selected] = larger.get(selected, 0.0) + signed
         minors = larger
     return minors[2 ** len(matrices) - 1]

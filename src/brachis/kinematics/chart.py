@@ -197,8 +197,8 @@ class ChartMap(PathMap):
     def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
         """Return targets, rows, and the reference, from which Newton's method sets out."""
         s = y[:, 0]
-        found = {"targets": sample.target, "reference": self._reference_at(s)}
-        return found | self.rows.kernel_inputs(s)
+        inputs = {"targets": sample.target, "reference": self._reference_at(s)}
+        return inputs | self.rows.kernel_inputs(s)
 
     def start_margins(self) -> np.ndarray:
         """Margin of the reference at its beginning."""
@@ -243,9 +243,9 @@ def chart_around(
     UnreachableError
         The null space turns faster than rows can follow, as it does beside singularities of the arm.
     """
-    kept = _growing(s)
-    s = s[kept]
-    reference = reference[kept]
+    growing = _growing(s)
+    s = s[growing]
+    reference = reference[growing]
     if rows is not None:
         return ChartMap(task_map, path, rows, s, reference)
     newton = Newton(task_map)
@@ -292,14 +292,17 @@ def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
 
 def moving_most(null: np.ndarray) -> np.ndarray:
     """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
-    left = null.copy()
+    residual = null.copy()
     chosen = []
     for _ in range(null.shape[2]):
-        joint = np.argmax(np.linalg.norm(left, axis=2), axis=1)
+        joint = np.argmax(np.linalg.norm(residual, axis=2), axis=1)
         chosen.append(joint)
-        row = left[np.arange(len(left)), joint]
+        row = residual[np.arange(len(residual)), joint]
         unit = row / np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-300)
-        left = left - np.einsum("knr,kr->kn", left, unit)[:, :, None] * unit[:, None]
+        residual = (
+            residual
+            - np.einsum("knr,kr->kn", residual, unit)[:, :, None] * unit[:, None]
+        )
     return np.sort(
         np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1
     )
@@ -309,6 +312,6 @@ def _continue_bases(null: np.ndarray) -> np.ndarray:
     """Turn each basis, (S, n, r), within its null space to be nearest to the one before."""
     turned = null.copy()
     for k in range(1, len(null)):
-        left, _, right = np.linalg.svd(null[k].T @ turned[k - 1])
-        turned[k] = null[k] @ left @ right
+        u, _, vt = np.linalg.svd(null[k].T @ turned[k - 1])
+        turned[k] = null[k] @ u @ vt
     return turned

@@ -89,9 +89,9 @@ class ClosedFormMap(PathMap):
 
     def along(self, path: Path, start: np.ndarray) -> Self:
         """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
-        part = super().along(path, start)
-        part.branch_of = replace(self.branch_of, start=start)
-        return part
+        submap = super().along(path, start)
+        submap.branch_of = replace(self.branch_of, start=start)
+        return submap
 
     def branch_margins(self, q: np.ndarray) -> np.ndarray:
         """Margins of the branch, (K, b), in postures (K, n)."""
@@ -128,10 +128,10 @@ class ClosedFormMap(PathMap):
         if self.branch_of.answers_of is None:
             targets = motion.given["targets"]
             q_r = motion.given["y"][:, 1:]
-            found = self.solver.solve_branch(targets, q_r, self.branch)
-            if np.shape(found) != motion.answers.shape:
+            answers = self.solver.solve_branch(targets, q_r, self.branch)
+            if np.shape(answers) != motion.answers.shape:
                 raise ValueError(
-                    f"{type(self.solver).__name__}.solve_branch returned the shape {np.shape(found)}; "
+                    f"{type(self.solver).__name__}.solve_branch returned the shape {np.shape(answers)}; "
                     f"needed: {motion.answers.shape}"
                 )
-            motion.answers[:] = found
+            motion.answers[:] = answers

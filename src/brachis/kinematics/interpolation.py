@@ -44,23 +44,25 @@ class Nodes:
     qddot_before: np.ndarray
 
 
-def join_nodes(parts: Sequence[Nodes]) -> Nodes:
+def join_nodes(nodes_by_phase: Sequence[Nodes]) -> Nodes:
     """Put nodes of one phase after the other together; where they meet, those of the later one count."""
-    begins = np.cumsum([0.0, *(part.times[-1] for part in parts[:-1])])
-    times = [begin + part.times for begin, part in zip(begins, parts, strict=True)]
-    later = [part.qddot_before[1:] for part in parts]
+    begins = np.cumsum([0.0, *(nodes.times[-1] for nodes in nodes_by_phase[:-1])])
+    times = [
+        begin + nodes.times for begin, nodes in zip(begins, nodes_by_phase, strict=True)
+    ]
+    later = [nodes.qddot_before[1:] for nodes in nodes_by_phase]
     return Nodes(
         _join(times),
-        _join([part.q for part in parts]),
-        _join([part.qdot for part in parts]),
-        _join([part.qddot for part in parts]),
-        np.concatenate([parts[0].qddot_before[:1], *later]),
+        _join([nodes.q for nodes in nodes_by_phase]),
+        _join([nodes.qdot for nodes in nodes_by_phase]),
+        _join([nodes.qddot for nodes in nodes_by_phase]),
+        np.concatenate([nodes_by_phase[0].qddot_before[:1], *later]),
     )
 
 
-def _join(parts: Sequence[np.ndarray]) -> np.ndarray:
+def _join(arrays: Sequence[np.ndarray]) -> np.ndarray:
     """Put arrays together, each without its last row but the last one."""
-    return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
+    return np.concatenate([*(array[:-1] for array in arrays[:-1]), arrays[-1]])
 
 
 def interpolate(
@@ -130,14 +132,14 @@ def _sum_positions(
     jerk = joint_map.state(*curves(spread(times, 2))).qdddot[1::2]
     v = state.qdot
     change = before[1:] - state.qddot[:-1]
-    way = (
+    travel = (
         0.5 * h * (v[:-1] + v[1:])
         - h**2 / 12.0 * change
         + h**3 / 30.0 * (change / h - jerk)
     )
     share = h**3 / np.sum(h**3)
-    off = state.q[-1] - state.q[0] - way.sum(axis=0)
-    q = np.cumsum(np.concatenate([state.q[:1], way + off * share]), axis=0)
+    off = state.q[-1] - state.q[0] - travel.sum(axis=0)
+    q = np.cumsum(np.concatenate([state.q[:1], travel + off * share]), axis=0)
     return np.where(np.abs(q - state.q).max(axis=0) <= _POSITION_TOLERANCE, q, state.q)
 
 
@@ -165,7 +167,7 @@ def _measure_gaps(
     largest = 1.0 + np.abs(state.qddot).max()
     # Of each order the gap, its noise, and the tolerance.
     # Positions near a branch boundary have a noise of 1e-12 rad or m at most.
-    found = [
+    measures = [
         (np.abs(position), 1e-12 + 0.0 * h, _POSITION_TOLERANCE),
         (np.abs(acceleration), 6e-12 / h**2, 1e-6 * largest),
     ]
@@ -175,7 +177,7 @@ def _measure_gaps(
         jerk -= (36.0 * v[:-1] + 24.0 * v[1:]) / h**2 + state.qdddot[:-1:2]
         rounding = 60.0 * np.finfo(float).eps * (1.0 + np.abs(q).max()) / h**3
         largest = 1.0 + np.abs(state.qdddot).max()
-        found.append((np.abs(jerk) - rounding, 60e-12 / h**3, 1e-5 * largest))
-    gaps = [gap.max(axis=1) / tolerance for gap, _, tolerance in found]
-    noises = [noise[:, 0] / tolerance for _, noise, tolerance in found]
+        measures.append((np.abs(jerk) - rounding, 60e-12 / h**3, 1e-5 * largest))
+    gaps = [gap.max(axis=1) / tolerance for gap, _, tolerance in measures]
+    noises = [noise[:, 0] / tolerance for _, noise, tolerance in measures]
     return np.array(gaps), np.array(noises)

@@ -194,10 +194,10 @@ class JointMap(ABC):
 
     def along(self, path: Path, start: np.ndarray) -> Self:
         """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
-        part = copy.copy(self)
-        part.path = path
-        part.start = start
-        return part
+        submap = copy.copy(self)
+        submap.path = path
+        submap.start = start
+        return submap
 
     def start_margins(self) -> np.ndarray:
         """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""
@@ -253,20 +253,20 @@ class JointSpaceMap(JointMap):
         """Return the path's target."""
         return self.path.sample(y[:, 0]).target
 
-    def state(self, *curves: np.ndarray, **_others: object) -> JointSpaceState:
+    def state(self, *curves: np.ndarray, **_options: object) -> JointSpaceState:
         """Return the motion along the path; in which turns joints are, it says itself."""
         y, ydot, yddot, ydddot = curves
         path = self.path.sample(y[:, 0])
         qdot = path.xi * ydot
         qddot = path.xi * yddot + path.xi_ds * ydot**2
         gradient = path.xi[:, :, None]
-        found = (path.target, qdot, qddot, gradient)
-        return JointSpaceState(self, y, ydot, yddot, ydddot, *found, path)
+        motion = (path.target, qdot, qddot, gradient)
+        return JointSpaceState(self, y, ydot, yddot, ydddot, *motion, path)
 
     def derivatives(self, state: JointSpaceState) -> JointDerivatives:
         """Return the exact derivatives; see the formulas above."""
         path = state.path
         qdot_y = path.xi_ds * state.ydot
         qddot_y = path.xi_dds * state.ydot**2 + path.xi_ds * state.yddot
-        parts = (qdot_y, qddot_y, 2.0 * qdot_y)
-        return JointDerivatives(*(part[:, :, None] for part in parts))
+        slopes = (qdot_y, qddot_y, 2.0 * qdot_y)
+        return JointDerivatives(*(slope[:, :, None] for slope in slopes))

@@ -130,21 +130,21 @@ class PathMap(JointMap):
             NaN where the curves cannot be met.
         """
         sample = self.path.sample(y[:, 0])
-        given = {"y": y}
+        inputs = {"y": y}
         if near is not None:
-            given["near"] = near
-        return self._prepare(given, sample).find_postures().copy()
+            inputs["near"] = near
+        return self._prepare(inputs, sample).find_postures().copy()
 
     def _prepare(
         self,
-        given: dict[str, np.ndarray],
+        inputs: dict[str, np.ndarray],
         sample: PathSample,
     ) -> PathMotion:
         """Prepare a motion with what is given of curves, times and postures nearby."""
         motion = PathMotion.prepare(
             self.robot.chain,
             self.task_map.prescribed,
-            given | self.kernel_inputs(given["y"], sample),
+            inputs | self.kernel_inputs(inputs["y"], sample),
             branch=self.branch_of,
             side=self.side,
         )
@@ -153,9 +153,9 @@ class PathMap(JointMap):
 
     def along(self, path: Path, start: np.ndarray) -> Self:
         """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
-        part = super().along(path, start)
-        part.sample_at = LastCall(path.sample)
-        return part
+        submap = super().along(path, start)
+        submap.sample_at = LastCall(path.sample)
+        return submap
 
     def state(
         self,
@@ -169,7 +169,7 @@ class PathMap(JointMap):
         """
         y, ydot, yddot, ydddot = curves
         sample = self.sample_at(y[:, 0])
-        given = {
+        inputs = {
             "y": y,
             "ydot": ydot,
             "yddot": yddot,
@@ -179,15 +179,15 @@ class PathMap(JointMap):
         }
         branch = self.branch_of
         if near is not None:
-            given["near"] = near
+            inputs["near"] = near
         elif t is not None and branch is not None and branch.counts_turns:
-            given["t"] = t
-        motion = self._prepare(given, sample)
+            inputs["t"] = t
+        motion = self._prepare(inputs, sample)
         fault = motion.evaluate()
         if fault is not None:
             raise UnreachableError(self.faults[fault])
-        found = (motion.q, motion.qdot, motion.qddot, motion.gradient)
-        return PathState(self, y, ydot, yddot, ydddot, *found, motion)
+        joint_motion = (motion.q, motion.qdot, motion.qddot, motion.gradient)
+        return PathState(self, y, ydot, yddot, ydddot, *joint_motion, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

@@ -122,7 +122,7 @@ is. It may raise TypeError or ValueError if not. The labels and the arrays of th
 def build_user_limits(
     models: Mapping[str, LimitModel],
     robot: Robot,
-    others: Sequence[Limit],
+    existing: Sequence[Limit],
     kinds: Collection[str],
 ) -> list[Limit]:
     """Bind a user's limits to a robot, and check them.
@@ -132,7 +132,7 @@ def build_user_limits(
     models : mapping of str to LimitModel
         By where they stand, for messages.
     robot : Robot
-    others : sequence of Limit
+    existing : sequence of Limit
         Those that exist already: labels are unique.
     kinds : collection of str
         Those of the built-in limits.
@@ -144,7 +144,7 @@ def build_user_limits(
         or a label is taken; its values or partials have the wrong shape, are not finite or contradict each other.
     """
     limits: list[Limit] = []
-    labels = {str(label) for other in others for label in other.labels}
+    labels = {str(label) for known in existing for label in known.labels}
     names = {kind.replace("_", " ") for kind in kinds}
     for where, model in models.items():
         limit = bind_model(where, model, robot)
@@ -158,8 +158,11 @@ def build_user_limits(
             )
         for label in limit.labels:
             if str(label) in labels:
-                problem = "this label exists already; its subject and kind together must be unique"
-                raise InputError(problem, where=f"{where}.labels", found=str(label))
+                raise InputError(
+                    "this label exists already; its subject and kind together must be unique",
+                    where=f"{where}.labels",
+                    found=str(label),
+                )
         _check_functions(limit, robot)
         if has_check(model):
             moments = sample_moments(robot)
@@ -167,7 +170,11 @@ def build_user_limits(
             motion = (moments.q, moments.qdot, moments.qddot, tau)
             few = 1 + len(limit.labels) % 2  # moments, not as many as values
             check_ratios(
-                where, model, robot, [own[:few] for own in motion], len(limit.labels)
+                where,
+                model,
+                robot,
+                [states[:few] for states in motion],
+                len(limit.labels),
             )
         labels |= {str(label) for label in limit.labels}
         limits.append(limit)
@@ -176,11 +183,14 @@ def build_user_limits(
 
 def _check_members(limit: Limit) -> None:
     """Refuse a limit that lacks a member, or has one that is not allowed."""
-    parts = ("kind", "labels", "lower", "upper")
-    missing = [name for name in parts if not hasattr(limit, name)]
+    required = ("kind", "labels", "lower", "upper")
+    missing = [name for name in required if not hasattr(limit, name)]
     if missing:
-        problem = "the limit lacks required attributes"
-        raise InputError(problem, where=limit.origin, found=f"no {', '.join(missing)}")
+        raise InputError(
+            "the limit lacks required attributes",
+            where=limit.origin,
+            found=f"no {', '.join(missing)}",
+        )
     labels = limit.labels
     here = f"{limit.origin}.labels"
     if not (isinstance(labels, tuple | list) and all(map(_is_label, labels))):
@@ -239,23 +249,31 @@ def _check_functions(limit: Limit, robot: Robot) -> None:
             found=f"{values[moment, column]} for {limit.labels[column]!s} at {posture}",
             allowed="finite numbers in most postures within the joints' ranges, at moderate speeds",
         )
-    known = Moments(*(getattr(moments, own.name)[is_known] for own in fields(moments)))
+    known = Moments(
+        *(getattr(moments, entry.name)[is_known] for entry in fields(moments))
+    )
     partials = limit.partials(known)
     here = f"{limit.origin}.partials"
     if not isinstance(partials, Partials):
-        problem = "the return value is not a brachis.limits.Partials"
-        raise InputError(problem, where=here, found=partials)
-    given = {name: part for name, part in vars(partials).items() if part is not None}
-    if not given.keys() - {"s"}:
-        allowed = "at least one of q, qdot, qddot, qdddot"
         raise InputError(
-            "all partial derivatives are None", where=here, allowed=allowed
+            "the return value is not a brachis.limits.Partials",
+            where=here,
+            found=partials,
+        )
+    arrays = {
+        name: array for name, array in vars(partials).items() if array is not None
+    }
+    if not arrays.keys() - {"s"}:
+        raise InputError(
+            "all partial derivatives are None",
+            where=here,
+            allowed="at least one of q, qdot, qddot, qdddot",
         )
     count, n = known.q.shape
-    for name, part in given.items():
+    for name, array in arrays.items():
         shape = (count, c) if name == "s" else (count, c, n)
-        check_array(part, shape, f"{here}.{name}", remark=f" for {count} moments")
-        check_finite(part, f"{here}.{name}")
+        check_array(array, shape, f"{here}.{name}", remark=f" for {count} moments")
+        check_finite(array, f"{here}.{name}")
     check_partials(limit, known, robot)
 
 
@@ -308,8 +326,8 @@ def _differentiate(
     steps = _STEP * np.array([1.0, -1.0, 2.0, -2.0])
     shifts = np.multiply.outer(steps, np.diag(reach)).reshape(-1, len(reach))
     states = {
-        own.name: np.concatenate([getattr(moments, own.name)] * len(shifts))
-        for own in fields(moments)
+        entry.name: np.concatenate([getattr(moments, entry.name)] * len(shifts))
+        for entry in fields(moments)
     }
     changed = states[name]
     states[name] = changed + np.repeat(shifts, count, axis=0).reshape(changed.shape)
@@ -321,8 +339,8 @@ def _differentiate(
         f"{limit.origin}.values",
         remark=f" for {total} moments",
     )
-    parts = values.reshape(len(steps), len(reach), count, -1)
-    ahead, behind, far_ahead, far_behind = np.moveaxis(parts, 1, -1)
+    by_step = values.reshape(len(steps), len(reach), count, -1)
+    ahead, behind, far_ahead, far_behind = np.moveaxis(by_step, 1, -1)
     return (ahead - behind) / (2.0 * _STEP), (far_ahead - far_behind) / (4.0 * _STEP)
 
 
@@ -347,19 +365,19 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
     rounding = _ROUNDING * np.abs(limit.values(moments)).max(axis=0)
     names = ("q", "qdot", "qddot", "qdddot", "s")
     for name, reach in zip(names, [*_reaches(robot), np.ones(1)], strict=True):
-        found, coarse = _differentiate(limit, moments, name, reach)
+        fine, coarse = _differentiate(limit, moments, name, reach)
         partial = getattr(partials, name)
-        stated = np.zeros_like(found)
+        stated = np.zeros_like(fine)
         if partial is not None:
-            stated = partial.reshape(found.shape) * reach
-        size = np.abs(found)
+            stated = partial.reshape(fine.shape) * reach
+        size = np.abs(fine)
         small = rounding[:, None] + 0.5 * _PRECISION * size.max(axis=0)
         small = small + _PRECISION * np.abs(stated).max(axis=2, keepdims=True)
         is_steep = np.maximum(np.abs(stated), size) > small
         if name == "qdddot" and limit.order < 3:
             _check_order(limit, is_steep.any(axis=2))
-        off = np.abs(stated - found)
-        allowed = small + _PRECISION * size + _MARGIN * np.abs(found - coarse)
+        off = np.abs(stated - fine)
+        allowed = small + _PRECISION * size + _MARGIN * np.abs(fine - coarse)
         is_wrong = off > allowed
         times = is_wrong.sum(axis=0)
         is_refused = (times > 1) & (2 * times > is_steep.sum(axis=0))
@@ -368,7 +386,7 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
         joint, column = np.argwhere(is_refused.T)[0]
         worst = np.argmax(np.where(is_wrong, off, -1.0)[:, column, joint])
         by = "" if name == "s" else f" by {name} of joint {robot.joint_names[joint]!r}"
-        numbers = np.array([stated, found])[:, worst, column, joint] / reach[joint]
+        numbers = np.array([stated, fine])[:, worst, column, joint] / reach[joint]
         posture = write_posture(moments, worst)
         raise InputError(
             f"this partial derivative of {limit.labels[column]!s}{by} contradicts the values",

@@ -70,10 +70,10 @@ class Clearance(Limit):
         q = q[np.isfinite(q).all(axis=1)]
         within = self._clearance + _NEARBY * _FAR
         close = self._scene.find_close(self._chain.place(q), within)
-        kept = np.unique(close.pair)
-        if not len(kept):
+        pairs = np.unique(close.pair)
+        if not len(pairs):
             return None
-        return Clearance(self._chain, self._scene.with_pairs(kept), self._clearance)
+        return Clearance(self._chain, self._scene.with_pairs(pairs), self._clearance)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
         """Tell in which postures, (K, n), no pair is too close, (K,)."""
@@ -89,8 +89,8 @@ class Clearance(Limit):
         moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
         count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
         number = np.repeat(np.arange(len(count)), count)
-        part = (count_each(count) + 1) / (count[number] + 1)
-        q = first[number] + part[:, None] * (last - first)[number]
+        fraction = (count_each(count) + 1) / (count[number] + 1)
+        q = first[number] + fraction[:, None] * (last - first)[number]
         holds = self.holds_at_rest(q, slack)
         free = np.ones(len(first), dtype=bool)
         free[number[~holds]] = False
@@ -103,9 +103,9 @@ class Clearance(Limit):
         """Distances, (K, P), in units of `UNIT`."""
         close = self._close_pairs(motion.q)
         shape = (len(motion.q), len(self.labels))
-        found = np.full(shape, (self._clearance + _FAR) / UNIT)
-        found[close.posture, close.pair] = close.distance / UNIT
-        return found
+        distances = np.full(shape, (self._clearance + _FAR) / UNIT)
+        distances[close.posture, close.pair] = close.distance / UNIT
+        return distances
 
     def partials(self, motion: JointStates) -> Partials:
         """Slopes of the distances by q, (K, P, n); 0 for pairs that are far apart."""

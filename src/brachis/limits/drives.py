@@ -35,7 +35,7 @@ from brachis.common.labels import Label
 from brachis.limits.joint import power_partials, powers
 from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot
-from brachis.robot.limits import Curve
+from brachis.robot.limits import TorqueSpeedCurve
 from brachis.task import LIMIT_KINDS, Task
 
 
@@ -66,7 +66,7 @@ class TotalPowerLimit(Limit):
 
     def partials(self, motion: JointStates) -> Partials:
         return power_partials(self._robot, motion).map(
-            lambda part: part.sum(axis=1, keepdims=True) / self._figure
+            lambda slopes: slopes.sum(axis=1, keepdims=True) / self._figure
         )
 
 
@@ -85,7 +85,7 @@ class RoundedCurve:
 
     Attributes
     ----------
-    at_rest : float
+    stall_torque : float
         Value at velocity 0, were the corner there not rounded.
     corners : (k,) ndarray
         Speeds of the corners, rad/s or m/s.
@@ -95,13 +95,13 @@ class RoundedCurve:
         Changes of slope.
     """
 
-    at_rest: float
+    stall_torque: float
     corners: np.ndarray
     widths: np.ndarray
     bends: np.ndarray
 
     @classmethod
-    def below(cls, curve: Curve) -> RoundedCurve | None:
+    def below(cls, curve: TorqueSpeedCurve) -> RoundedCurve | None:
         """Round a curve; None for a curve that does not fall.
 
         Its last slope goes on until no torque is left. A level beginning is left out, and the piece that follows it
@@ -109,8 +109,8 @@ class RoundedCurve:
         """
         speed, torque = np.array(curve).T
         slope = np.diff(torque) / np.diff(speed)
-        is_left = torque[-1] > 1e-9 * torque[0]
-        if slope[-1] < 0.0 and is_left:
+        has_torque = torque[-1] > 1e-9 * torque[0]
+        if slope[-1] < 0.0 and has_torque:
             speed = np.append(speed, speed[-1] - torque[-1] / slope[-1])
             torque = np.append(torque, 0.0)
             slope = np.append(slope, slope[-1])
@@ -126,8 +126,8 @@ class RoundedCurve:
         torque = torque - slope * moved
         slope = np.append(np.diff(torque) / np.diff(speed), 0.0)[first:]
         corners = np.append(0.0, speed[first + 1 :])
-        at_rest = torque[first] - slope[0] * speed[first]
-        return cls(at_rest, corners, widths[first:], np.diff(slope, prepend=0.0))
+        stall_torque = torque[first] - slope[0] * speed[first]
+        return cls(stall_torque, corners, widths[first:], np.diff(slope, prepend=0.0))
 
     def _distances(self, velocity: np.ndarray) -> np.ndarray:
         """How far velocities (K,), and their negatives, are behind the corners, (2, K, k)."""
@@ -139,7 +139,7 @@ class RoundedCurve:
         y = np.clip(x / self.widths, -1.0, 1.0)
         rounded = self.widths * (3.0 + y * (8.0 + y * (6.0 - y * y))) / 16.0
         ramp = rounded + np.maximum(x - self.widths, 0.0)
-        return self.at_rest + (ramp @ self.bends).sum(axis=0)
+        return self.stall_torque + (ramp @ self.bends).sum(axis=0)
 
     def slopes(self, velocity: np.ndarray) -> np.ndarray:
         """Differentiate `values` by the velocities, (K,)."""
@@ -166,8 +166,10 @@ class TorqueSpeedLimit(Limit):
         self._curves = tuple(curves.values())
         self._joints = np.repeat(list(curves), 2)
         self._signs = np.tile([1.0, -1.0], len(curves))
-        at_rest = [robot.limits.torque_speed[joint][0][1] for joint in self._joints]
-        self._at_rest = np.array(at_rest)
+        stall_torques = [
+            robot.limits.torque_speed[joint][0][1] for joint in self._joints
+        ]
+        self._stall_torques = np.array(stall_torques)
         row = LIMIT_KINDS["torque"]
         labels = []
         for joint in curves:
@@ -186,12 +188,12 @@ class TorqueSpeedLimit(Limit):
                 for sign in ("positive", "negative")
             ]
         self.labels = tuple(labels)
-        self.lower = np.full(len(at_rest), -np.inf)
-        self.upper = np.zeros(len(at_rest))
+        self.lower = np.full(len(stall_torques), -np.inf)
+        self.upper = np.zeros(len(stall_torques))
         # The whole curve rises with the torque at rest.
         self.bounds = tuple(
             Bound(column, level, level, 1.0 / level, "upper")
-            for column, level in enumerate(at_rest)
+            for column, level in enumerate(stall_torques)
         )
 
     def _by_curve(
@@ -209,18 +211,18 @@ class TorqueSpeedLimit(Limit):
         tau = motion.torque(self._robot)[:, self._joints]
         allowed = self._by_curve(RoundedCurve.values, motion)
         excess = self._signs * tau - allowed
-        return excess / self._at_rest
+        return excess / self._stall_torques
 
     def partials(self, motion: JointStates) -> Partials:
         """Slopes of the values by q, qdot and qddot, (K, c, n) each."""
-        scale = (self._signs / self._at_rest)[:, None]
+        scale = (self._signs / self._stall_torques)[:, None]
         by_q, by_qdot, by_qddot = (
-            part[:, self._joints] * scale
-            for part in motion.torque_derivatives(self._robot)
+            derivatives[:, self._joints] * scale
+            for derivatives in motion.torque_derivatives(self._robot)
         )
         every = np.arange(len(self._joints))
         slopes = self._by_curve(RoundedCurve.slopes, motion)
-        by_qdot[:, every, self._joints] -= slopes / self._at_rest
+        by_qdot[:, every, self._joints] -= slopes / self._stall_torques
         return Partials(by_q, by_qdot, by_qddot)
 
 

@@ -319,7 +319,7 @@ class RmsTorqueLimit(_TorqueLimit):
 
     def partials(self, motion: JointStates) -> Partials:
         factors = 2.0 * super().values(motion)[:, :, None]
-        return super().partials(motion).map(lambda part: factors * part)
+        return super().partials(motion).map(lambda slopes: factors * slopes)
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """Measure the root mean square itself."""
@@ -358,14 +358,16 @@ def reciprocals_near(
 
     They follow from the joints' own limits; 0 for a joint without a limit.
     """
-    found = np.zeros((2, robot.n))
+    reciprocals = np.zeros((2, robot.n))
     for limit in limits:
         if not isinstance(limit, HasLatticeWeights):
             continue
         subjects = [label.subject for label in limit.labels]
-        own = np.equal.outer(subjects, robot.joint_names)
-        for weights, rows in zip(found, limit.lattice_weights(q[None]), strict=True):
+        is_of_joint = np.equal.outer(subjects, robot.joint_names)
+        for weights, rows in zip(
+            reciprocals, limit.lattice_weights(q[None]), strict=True
+        ):
             if rows is not None:
-                largest = np.abs(np.where(own, rows[0], 0.0)).max(axis=0)
+                largest = np.abs(np.where(is_of_joint, rows[0], 0.0)).max(axis=0)
                 np.maximum(weights, largest, out=weights)
-    return found[0], found[1]
+    return reciprocals[0], reciprocals[1]

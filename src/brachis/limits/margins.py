@@ -50,13 +50,13 @@ class SingularityLimit(Limit):
     def partials(self, motion: JointStates) -> Partials:
         """Slopes of the least singular value, over its smallest figure, by q, (K, 1, n)."""
         twists = self._task_map.twists(motion.q)
-        left, sizes, right = np.linalg.svd(self._arm_jacobian(twists))
+        u, sizes, vt = np.linalg.svd(self._arm_jacobian(twists))
         last = sizes.shape[1] - 1
         moving = np.zeros_like(motion.q)
-        moving[:, : self._count] = right[:, last]
+        moving[:, : self._count] = vt[:, last]
         still = np.zeros_like(moving)
         slopes = self._task_map.derivatives(twists, moving, still).velocity_q
-        by_q = np.einsum("ki,kij->kj", left[:, :, last], slopes)
+        by_q = np.einsum("ki,kij->kj", u[:, :, last], slopes)
         return Partials(q=by_q[:, None] / self._figure)
 
 
@@ -97,8 +97,7 @@ class JointEndLimit(Limit):
         """Tell in which postures, (K, n), it holds in the turn that is nearest to the middle of the range, (K,)."""
         middle = self._begin + 0.5 * self._width
         turned = q.copy()
-        own = in_turn_of(q[:, self._joints], middle, self._revolute)
-        turned[:, self._joints] = own
+        turned[:, self._joints] = in_turn_of(q[:, self._joints], middle, self._revolute)
         return super().holds_at_rest(turned, slack)
 
     def values(self, motion: JointStates) -> np.ndarray:

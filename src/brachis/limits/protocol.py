@@ -158,13 +158,13 @@ class Partials:
     @property
     def size(self) -> int:
         """Number of values, c."""
-        parts = (*self.by_joints, self.s)
-        return next(part.shape[1] for part in parts if part is not None)
+        arrays = (*self.by_joints, self.s)
+        return next(array.shape[1] for array in arrays if array is not None)
 
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
         """Return the partials by q and its derivatives, changed."""
-        parts = (None if part is None else change(part) for part in self.by_joints)
-        return Partials(*parts)
+        changed = (None if array is None else change(array) for array in self.by_joints)
+        return Partials(*changed)
 
 
 class HasLatticeWeights(ABC):
@@ -285,9 +285,9 @@ def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
 class Limit(Description, ABC):
     """c values of the joint motion at every moment, or their means over time, held between bounds."""
 
-    def __init_subclass__(cls, **given: Any) -> None:
+    def __init_subclass__(cls, **keywords: Any) -> None:
         """Let the methods of plug-ins name the plug-in where they fail."""
-        super().__init_subclass__(**given)
+        super().__init_subclass__(**keywords)
         for name in ("values", "partials"):
             if name in vars(cls):
                 setattr(cls, name, _name_failures_of(vars(cls)[name]))
@@ -321,14 +321,14 @@ class Limit(Description, ABC):
 
     def relax(self, bound: Bound, amount: float) -> Self:
         """Return the limit with one figure relaxed by `amount`, in its unit."""
-        other = copy.copy(self)
+        relaxed = copy.copy(self)
         step = np.zeros(len(self.lower))
         step[bound.column] = bound.per_unit * amount
         if bound.side != "upper":
-            other.lower = self.lower - step
+            relaxed.lower = self.lower - step
         if bound.side != "lower":
-            other.upper = self.upper + step
-        return other
+            relaxed.upper = self.upper + step
+        return relaxed
 
     def keep_inside(self, ends: np.ndarray) -> Self:
         """Return the limit with bounds that are narrower by its inset, as far as postures, (K, n), leave room."""
@@ -336,10 +336,10 @@ class Limit(Description, ABC):
         beyond = self.violation(self.values(Moments.at_rest(ends)))
         room = -beyond.max(axis=0, initial=-np.inf)
         by = np.clip(room, 0.0, self.inset) / self.violation_scale
-        other = copy.copy(self)
-        other.lower = self.lower + by
-        other.upper = self.upper - by
-        return other
+        narrowed = copy.copy(self)
+        narrowed.lower = self.lower + by
+        narrowed.upper = self.upper - by
+        return narrowed
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """How far values, (K, c), are beyond their bounds; negative inside. See the module."""

@@ -8,7 +8,7 @@ With J the Jacobian of a velocity of the tool, v = J(q) qdot and its direction e
 and likewise for the size of the acceleration a = J qddot + Jdot qdot. A vector of zero size gets the direction zero: it
 is far from its limit.
 
-The largest speed of the tool frame's origin may depend on the path coordinate: piecewise linear (`SpeedTable`).
+The largest speed of the tool frame's origin may depend on the path coordinate: piecewise linear (`SpeedProfile`).
 
 Tolerances that are more than ranges of the tool's virtual joints are a cone, a sphere, and a box in the world's axes.
 With the angles a (side) and b (lead) the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
@@ -33,8 +33,7 @@ from brachis.limits.protocol import (
 )
 from brachis.robot import Robot
 from brachis.robot.task_map import Pose
-from brachis.task import SpeedTable as SpeedTableModel
-from brachis.task import Task
+from brachis.task import SpeedTable, Task
 
 PROCESS_SPEED = "process speed"
 """Name of what gives the tool's speed, from which the largest speed next to it follows."""
@@ -62,7 +61,7 @@ class ToolRatios(Limit):
         )
 
 
-class SpeedTable:
+class SpeedProfile:
     """Largest sizes of a motion at path coordinates: piecewise linear, with steps made into ramps on their faster side.
 
     Parameters
@@ -85,27 +84,27 @@ class SpeedTable:
     """
 
     def __init__(
-        self, s: Sequence[float], speed: Sequence[float], *, whole: bool = True
+        self, s: Sequence[float], speed: Sequence[float], *, covers_path: bool = True
     ) -> None:
-        given = np.array(s, dtype=float)
-        places = given.copy()
+        stated = np.array(s, dtype=float)
+        places = stated.copy()
         speeds = np.array(speed, dtype=float)
         ramp = 5e-3  # length in s: Newton's steps need a slope
-        for first in np.flatnonzero(np.diff(given) == 0.0).tolist():
+        for first in np.flatnonzero(np.diff(stated) == 0.0).tolist():
             # The side with the higher speed moves away from the step, on the line to the next place.
             rises = speeds[first + 1] > speeds[first]
             moved = first + 1 if rises else first
             onwards = 1 if rises else -1
             beyond = moved + onwards
             length = ramp
-            if 0 <= beyond < len(given):
-                gap = abs(given[beyond] - given[moved])
+            if 0 <= beyond < len(stated):
+                gap = abs(stated[beyond] - stated[moved])
                 length = min(ramp, 0.4 * gap)
                 speeds[moved] += length / gap * (speed[beyond] - speed[moved])
             places[moved] += onwards * length
         self.largest = float(speeds.max())
-        self._whole = whole
-        if not whole:  # beyond its ends the speed goes on rising within a ramp
+        self._covers_path = covers_path
+        if not covers_path:  # beyond its ends the speed goes on rising within a ramp
             places = np.concatenate([[places[0] - ramp], places, [places[-1] + ramp]])
             speeds = np.concatenate([20.0 * speeds[:1], speeds, 20.0 * speeds[-1:]])
         slopes = np.concatenate([[np.nan], np.diff(speeds) / np.diff(places), [np.nan]])
@@ -119,11 +118,11 @@ class SpeedTable:
             return np.full(len(s), self.speeds[0]), np.zeros(len(s))
         slopes = np.diff(self.speeds) / np.diff(self.places)
         slopes = np.concatenate([[0.0], slopes, [0.0]])
-        piece = np.searchsorted(self.places, s, side="right")
+        index = np.searchsorted(self.places, s, side="right")
         beyond = (s < self.places[0]) | (s > self.places[-1])
-        is_free = np.isnan(s) | (beyond & (not self._whole))
+        is_free = np.isnan(s) | (beyond & (not self._covers_path))
         speeds = np.interp(s, self.places, self.speeds)
-        return np.where(is_free, np.inf, speeds), slopes[piece]
+        return np.where(is_free, np.inf, speeds), slopes[index]
 
 
 class ToolMotionLimit(ToolRatios):
@@ -146,7 +145,7 @@ class ToolMotionLimit(ToolRatios):
         self,
         robot: Robot,
         quantity: str,
-        tables: Sequence[SpeedTable],
+        tables: Sequence[SpeedProfile],
         labels: Sequence[Label],
     ) -> None:
         # The largest figure of a table stands for all of them.
@@ -166,7 +165,7 @@ class ToolMotionLimit(ToolRatios):
     def _states(self, motion: JointStates) -> list[np.ndarray]:
         """Return q, qdot and qddot of the real joints, (K, n) each."""
         states = (motion.q, motion.qdot, motion.qddot)
-        return [self._robot.of_real_joints(own) for own in states]
+        return [self._robot.of_real_joints(state) for state in states]
 
     def values(self, motion: JointStates) -> np.ndarray:
         chain = self._robot.chain
@@ -179,8 +178,8 @@ class ToolMotionLimit(ToolRatios):
         sizes, slopes = chain.tool_size_slopes(self._quantity, *self._states(motion))
         largest, slope = self.largest_at(motion.s)
         q, qdot, qddot = (
-            self._robot.of_real_joints(part)[:, None] / largest[:, :, None]
-            for part in slopes
+            self._robot.of_real_joints(derivatives)[:, None] / largest[:, :, None]
+            for derivatives in slopes
         )
         s = -sizes[:, None] * slope / largest**2
         if self._quantity == "acceleration":
@@ -201,16 +200,16 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     labels = []
     if speed is not None:
         tables.append(
-            SpeedTable(speed.s, speed.speed)
-            if isinstance(speed, SpeedTableModel)
-            else SpeedTable([0.0], [speed])
+            SpeedProfile(speed.s, speed.speed)
+            if isinstance(speed, SpeedTable)
+            else SpeedProfile([0.0], [speed])
         )
         labels.append(_label("speed", "m/s"))
-    leads = [lead for part in limits.process_speed for lead in part.leads]
+    leads = [lead for section in limits.process_speed for lead in section.leads]
     beside = (
         "before or behind a part with a process speed, the tool is at its largest speed"
     )
-    for quantity, key, cause, parts, text in (
+    for quantity, key, cause, tables_of_speed, text in (
         ("feed rate", "feed", "feed rate", limits.feed, ""),
         (
             "speed next to a process speed",
@@ -220,9 +219,9 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
             beside,
         ),
     ):
-        for part in parts:
-            tables.append(SpeedTable(part.s, part.speed, whole=False))
-            s = f"s = {part.s[0]:.4g} to {part.s[-1]:.4g}"
+        for table in tables_of_speed:
+            tables.append(SpeedProfile(table.s, table.speed, covers_path=False))
+            s = f"s = {table.s[0]:.4g} to {table.s[-1]:.4g}"
             active = text and f"at {s}, {text}"
             labels.append(
                 Label(
@@ -244,15 +243,17 @@ def build_constant(
     figure = getattr(task.tool_limits, quantity.replace(" ", "_"))
     if figure is None:
         return None
-    table = SpeedTable([0.0], [figure])
+    table = SpeedProfile([0.0], [figure])
     return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
 
 
-def _joints_of(robot: Robot, *ways: str) -> list[int]:
+def _joints_of(robot: Robot, *directions: str) -> list[int]:
     """Return the virtual joints of the tool that move it in some ways, as far as there are such joints."""
-    names = [joint.way for joint in robot.tool_joints]
+    names = [joint.direction for joint in robot.tool_joints]
     first = len(robot.urdf_joints)
-    return [first + names.index(way) for way in ways if way in names]
+    return [
+        first + names.index(direction) for direction in directions if direction in names
+    ]
 
 
 class _Size(ToolRatios):
@@ -266,14 +267,14 @@ class _Size(ToolRatios):
     """
 
     at_rest = "posture"
-    ways: tuple[str, ...]
+    directions: tuple[str, ...]
     """In which the virtual joints move the tool on which it depends."""
     label: Label
 
     def __init__(self, robot: Robot, figure: float) -> None:
         super().__init__([self.label], [figure])
         self._n = robot.n
-        self._joints = _joints_of(robot, *self.ways)
+        self._joints = _joints_of(robot, *self.directions)
         self._largest = np.radians(figure) if self.label.unit == "deg" else figure
         self.inset = compute_inset(self._largest)
 
@@ -291,7 +292,7 @@ class TiltLimit(_Size):
     """Angle between the tool's z axis and that of the path over the largest one."""
 
     kind = "tool_tilt"
-    ways = ("side", "lead")
+    directions = ("side", "lead")
     label = Label("tool", "tilt", "deg", "tolerances.orientation.tilt")
 
     def values(self, motion: JointStates) -> np.ndarray:
@@ -311,7 +312,7 @@ class DistanceLimit(_Size):
     """Distance of the tool from the path over the largest one."""
 
     kind = "tool_distance"
-    ways = ("x", "y", "z")
+    directions = ("x", "y", "z")
     label = Label("tool", "distance from the path", "m", "tolerances.position.sphere")
 
     def values(self, motion: JointStates) -> np.ndarray:
@@ -385,7 +386,7 @@ def build_tool_distance(robot: Robot, task: Task) -> DistanceLimit | None:
 
 def build_tool_range(robot: Robot, task: Task) -> RangeLimit | None:
     """Build the limit of a task whose tool may be within a box in the world's axes."""
-    given = task.tolerances.position
-    if given.axes == "tool" or given.x is None:
+    tolerance = task.tolerances.position
+    if tolerance.axes == "tool" or tolerance.x is None:
         return None
-    return RangeLimit(robot, np.array([given.x, given.y, given.z]))
+    return RangeLimit(robot, np.array([tolerance.x, tolerance.y, tolerance.z]))

@@ -81,19 +81,19 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     middle = degree - 1
     interval = lengths[..., middle : middle + 1]
     offset = fraction[..., None] * interval
-    # left[m]: from the m-th knot before the point to the point; right[m]: from it to the m-th knot behind.
+    # from_knots[m]: from the m-th knot before the point to the point; to_knots[m]: from it to the m-th knot behind.
     before = lengths[..., :middle][..., ::-1]
     behind = lengths[..., middle + 1 :]
-    left = np.cumsum(np.concatenate([offset, before], axis=-1), axis=-1)
-    right = np.cumsum(np.concatenate([interval - offset, behind], axis=-1), axis=-1)
+    from_knots = np.cumsum(np.concatenate([offset, before], axis=-1), axis=-1)
+    to_knots = np.cumsum(np.concatenate([interval - offset, behind], axis=-1), axis=-1)
     value = [np.ones_like(offset)]
     for p in range(1, degree + 1):
-        value.append(_raise_degree(value[-1], left, right, p))
+        value.append(_raise_degree(value[-1], from_knots, to_knots, p))
     orders = [value[degree]]
     for order in range(1, ORDERS):
         values = value[degree - order] if order <= degree else np.zeros_like(value[0])
         for p in range(max(degree - order, 0) + 1, degree + 1):
-            values = _slope(values, left, right, p)
+            values = _slope(values, from_knots, to_knots, p)
         orders.append(values)
     return np.array(orders)
 
@@ -116,20 +116,20 @@ def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
 
 
 def _raise_degree(
-    value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int
+    value: np.ndarray, from_knots: np.ndarray, to_knots: np.ndarray, p: int
 ) -> np.ndarray:
     """Basis functions of degree p from those of degree p - 1."""
-    before = left[..., :p][..., ::-1]
-    behind = right[..., :p]
+    before = from_knots[..., :p][..., ::-1]
+    behind = to_knots[..., :p]
     share = value / (before + behind)
     return _add_neighbours(before * share, behind * share)
 
 
 def _slope(
-    lower: np.ndarray, left: np.ndarray, right: np.ndarray, p: int
+    lower: np.ndarray, from_knots: np.ndarray, to_knots: np.ndarray, p: int
 ) -> np.ndarray:
     """Differentiate functions of degree p, given `lower`, the same functions of degree p - 1."""
-    share = p * lower / (left[..., :p][..., ::-1] + right[..., :p])
+    share = p * lower / (from_knots[..., :p][..., ::-1] + to_knots[..., :p])
     return _add_neighbours(share, -share)
 
 

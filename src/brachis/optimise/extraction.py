@@ -121,10 +121,10 @@ def _join(program: Program, x: np.ndarray) -> list[Motion]:
 def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
     """Return a motion that begins with the curves and derivatives that a link takes from `last`, (4, c)."""
     orders = np.array(motion.at(np.zeros(1)))[:, 0]
-    given = phase.boundary.start[-1].derivatives
-    fixed_orders = len(given)
+    fixed_derivatives = phase.boundary.start[-1].derivatives
+    fixed_orders = len(fixed_derivatives)
     # Exactly: over an interval of microseconds their rounding is an acceleration that rest does not allow.
-    orders[1 : 1 + fixed_orders, list(link.curves)] = given[:, None]
+    orders[1 : 1 + fixed_orders, list(link.curves)] = fixed_derivatives[:, None]
     joined = np.ix_(link.orders, link.curves)
     orders[joined] = last[joined]
     count = 1 + max(fixed_orders, *link.orders)

@@ -98,10 +98,10 @@ class LaidSplines:
     ) -> Iterator[tuple[slice, JointState]]:
         """Yield the joint motion at times, (K,), s, part by part; raises UnreachableError as `JointMap.state` does."""
         for begin in range(0, len(t), _AT_ONCE):
-            part = slice(begin, begin + _AT_ONCE)
-            station = np.searchsorted(self.times[1:-1], t[part])
+            rows = slice(begin, begin + _AT_ONCE)
+            station = np.searchsorted(self.times[1:-1], t[rows])
             near = self.timing.path.q[station]
-            yield part, joint_map.state(*self.motion.at(t[part]), near=near)
+            yield rows, joint_map.state(*self.motion.at(t[rows]), near=near)
 
 
 @dataclass(frozen=True)
@@ -374,13 +374,13 @@ class _Violations:
     def find_excess(self, least: float) -> Iterator[tuple[Limit, np.ndarray]]:
         """Yield by how much limits should be narrowed, (N, c): violations, and small ones times `least` or more."""
         is_rare = np.mean(self.worst > _ENOUGH) < _RARE
-        most = _MOST_MORE if is_rare else _MORE
+        largest = _MOST_MORE if is_rare else _MORE
         for limit, known in self.by_limit.items():
             factor = np.full_like(known, least)
             if limit in self._earlier:
                 before, narrowed = self._earlier[limit]
                 gain = (before - known).clip(min=np.finfo(float).tiny)
-                factor = (narrowed / gain).clip(least, most)
+                factor = (narrowed / gain).clip(least, largest)
             factor[known > _SMALL] = 1.0
             excess = np.where(known > _UNCHANGED, factor * known, 0.0)
             self._earlier[limit] = (known.copy(), excess)
@@ -388,10 +388,10 @@ class _Violations:
 
     def _raise(self, laid: LaidSplines, t: np.ndarray, interval: np.ndarray) -> None:
         """Raise what is known of intervals, (K,), ascending, to what is found at times in them, (K,), s."""
-        for part, state in laid.states(self._phase.joint_map, t):
+        for rows, state in laid.states(self._phase.joint_map, t):
             for limit, violations in self.by_limit.items():
                 values = limit.violation(limit.values(state))
-                _raise_to(violations, interval[part], values)
+                _raise_to(violations, interval[rows], values)
 
     def _find_changes(self, timing: Timing) -> np.ndarray:
         """Tell next to which intervals, (N,), a timing is not as it was when they were looked at."""

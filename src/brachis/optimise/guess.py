@@ -42,18 +42,18 @@ def starting_point(
     (v,) ndarray or None
         None where the fit is out of reach at a collocation point.
     """
-    parts = []
+    x_by_phase = []
     for phase, joint_path, duration in zip(
         program.phases, joint_paths, durations, strict=True
     ):
         for fit in (_smooth, _follow):
             with contextlib.suppress(UnreachableError):
                 x = fit(phase, joint_path, duration)
-                parts.append(_scale_time(phase, x, (0, 0)))
+                x_by_phase.append(_scale_time(phase, x, (0, 0)))
                 break
         else:
             return None
-    return np.concatenate(parts)
+    return np.concatenate(x_by_phase)
 
 
 def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
@@ -122,14 +122,14 @@ def fit_curves(
     (v,) ndarray
     """
     basis = basis_matrix(phase.knots, phase.degree, t_norm)
-    parts = [np.array([duration])]
+    variables = [np.array([duration])]
     spline_targets = targets[:, phase.boundary.law_curves :]
     for spline, values in zip(phase.splines, spline_targets.T, strict=True):
         missing = values - basis @ spline.fixed_points(duration)
         free = basis @ spline.free_matrix.dense()
-        parts.append(np.linalg.lstsq(free, missing, rcond=None)[0])
-    parts.append(phase.grid.lengths_of(phase.knots))
-    return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
+        variables.append(np.linalg.lstsq(free, missing, rcond=None)[0])
+    variables.append(phase.grid.lengths_of(phase.knots))
+    return np.clip(np.concatenate(variables), phase.x_lower, phase.x_upper)
 
 
 def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:

@@ -384,8 +384,10 @@ class SolverSession:
             return self._accept(solve(program, x))
         is_answer = self._goes_on(program, x)
         # Without them a joint that no near row holds runs wild: its jerk came to 500 times its limit.
-        kept = program.third_order_rows if isinstance(program, Program) else ()
-        report = solve_near_rows(program, x, solve, is_answer=is_answer, kept=kept)
+        kept_rows = program.third_order_rows if isinstance(program, Program) else ()
+        report = solve_near_rows(
+            program, x, solve, is_answer=is_answer, kept_rows=kept_rows
+        )
         return self._accept(report)
 
     def _goes_on(self, program: Program | PathProgram, x: np.ndarray) -> bool:

@@ -7,7 +7,7 @@ the control points and have no rows. Where the knots are free, the interval leng
 
 Rows: for each limit that holds at every instant, in the order of the list, its c values at collocation point 0, then at
 point 1, and so on; along a path then differences of successive control points of s, which are >= 0 so that ds/dt >= 0
-holds at all times (see `Progress`); where the knots are free, last the sum of h, which is 1. All rows are
+holds at all times (see `ProgressRows`); where the knots are free, last the sum of h, which is 1. All rows are
 dimensionless. Means over time are rows of the program.
 
 Entries of the Jacobian: of all limits that hold at every point, those by T, by the variables of each curve and by h,
@@ -40,7 +40,7 @@ SHORTEST_TIME = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
+class ProgressRows:
     """Differences of successive control points of s, those that bounds on single variables do not take care of.
 
     Attributes
@@ -55,12 +55,12 @@ class Progress:
     matrix: FreeMatrix
 
     @classmethod
-    def none(cls) -> Progress:
+    def none(cls) -> ProgressRows:
         """Make no rows."""
         return cls(np.empty((1, 0)), FreeMatrix.of(np.empty((0, 1))))
 
     @classmethod
-    def of(cls, spline: BoundarySpline) -> Progress:
+    def of(cls, spline: BoundarySpline) -> ProgressRows:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
         terms = np.diff(spline.fixed_terms, axis=1)
         row, variable, weight = _differences(spline.free_matrix)
@@ -130,7 +130,7 @@ class VariableLayout:
         Of all curves, by all variables; see `stack_splines`.
     fixed_terms : (1 + p, c (N + d)) ndarray
         Fixed terms of all control points, by powers of the duration.
-    progress : Progress
+    progress : ProgressRows
         Differences of control points of s; empty without a path.
     x_lower, x_upper : (v,) ndarray
     """
@@ -151,13 +151,13 @@ class VariableLayout:
         self.x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
         self.x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
         self.x_lower[0] = SHORTEST_TIME
-        self.progress = Progress.none()
+        self.progress = ProgressRows.none()
         time_law = boundary.time_law
         if time_law is not None:
             self.x_lower[0] = time_law.duration
             self.x_upper[0] = time_law.duration
         elif has_path:
-            self.progress = Progress.of(splines[0])
+            self.progress = ProgressRows.of(splines[0])
             constant, *by_powers = splines[0].fixed_terms
             if not np.any(by_powers):
                 # Free control points have zeros there.
@@ -180,8 +180,8 @@ class VariableLayout:
     @cached_property
     def point(self) -> np.ndarray:
         """Points, (z,), at which variables matter: T, those of each curve, then h."""
-        own = np.arange(len(self._grid.t_norm))
-        return np.concatenate([own, self.sparsity.point, self._grid.point])
+        curve_points = np.arange(len(self._grid.t_norm))
+        return np.concatenate([curve_points, self.sparsity.point, self._grid.point])
 
     @cached_property
     def variable(self) -> np.ndarray:

@@ -18,7 +18,7 @@ from brachis.optimise.phase import Phase
 _NEARLY_ZERO = 1e-12
 """Values below this count as not curved: their slopes are nearly zero too, and the quotient is rounding."""
 
-Parts = Sequence[tuple[Phase, np.ndarray]]
+PhasePoints = Sequence[tuple[Phase, np.ndarray]]
 """Phases, each with its variables."""
 
 
@@ -48,48 +48,48 @@ class Means:
         """Count the values, m."""
         return len(self.lower)
 
-    def values(self, parts: Parts) -> np.ndarray:
+    def values(self, phase_points: PhasePoints) -> np.ndarray:
         """Means over all phases, (m,); raises UnreachableError as `Phase.evaluate` does."""
         if not self.limits:
             return np.empty(0)
         sums = []
-        for phase, x in parts:
+        for phase, x in phase_points:
             sums.append(x[0] * _means_of(phase, x))
             if phase.pause:
                 sums.append(phase.pause * self._values_at_rest(phase, x))
-        return sum(sums) / _end_time(parts)
+        return sum(sums) / _end_time(phase_points)
 
-    def slopes(self, parts: Parts) -> np.ndarray:
+    def slopes(self, phase_points: PhasePoints) -> np.ndarray:
         """Slopes of the values by all variables, (m, v)."""
         if not self.limits:
-            return np.empty((0, sum(len(x) for _, x in parts)))
-        total = self.values(parts)
+            return np.empty((0, sum(len(x) for _, x in phase_points)))
+        total = self.values(phase_points)
         columns = []
-        for phase, x in parts:
+        for phase, x in phase_points:
             slopes = x[0] * _mean_slopes_of(phase, x)
             slopes[:, 0] += _means_of(phase, x) - total
             if phase.pause:
                 slopes += phase.pause * self._slopes_at_rest(phase, x)
             columns.append(slopes)
-        return np.hstack(columns) / _end_time(parts)
+        return np.hstack(columns) / _end_time(phase_points)
 
-    def curvature(self, parts: Parts, weights: np.ndarray) -> np.ndarray:
+    def curvature(self, phase_points: PhasePoints, weights: np.ndarray) -> np.ndarray:
         """Gauss-Newton part, (v, v), of the Hessian of weights . values, weights (m,).
 
         Pauses are left out, and so is how the shares of the phases depend on their durations.
         """
-        ends = np.cumsum([0, *(len(x) for _, x in parts)])
+        ends = np.cumsum([0, *(len(x) for _, x in phase_points)])
         total = np.zeros((ends[-1], ends[-1]))
-        for (phase, x), first in zip(parts, ends, strict=False):
+        for (phase, x), first in zip(phase_points, ends, strict=False):
             block = slice(first, first + len(x))
-            share = x[0] / _end_time(parts)
+            share = x[0] / _end_time(phase_points)
             total[block, block] = share * _curvature_of(phase, x, weights)
         return total
 
-    def violation(self, parts: Parts) -> float:
+    def violation(self, phase_points: PhasePoints) -> float:
         """How far the limits are violated; -inf without any."""
         ends = np.cumsum([len(limit.lower) for limit in self.limits])
-        values = np.split(self.values(parts), ends[:-1])
+        values = np.split(self.values(phase_points), ends[:-1])
         pairs = zip(self.limits, values, strict=False)
         violations = [limit.violation(means[None]).max() for limit, means in pairs]
         return float(max(violations, default=-np.inf))
@@ -110,9 +110,9 @@ class Means:
         return phase.sum_up(phase.slopes_by_variables(by_y, x))
 
 
-def _end_time(parts: Parts) -> float:
+def _end_time(phase_points: PhasePoints) -> float:
     """Time of all phases and pauses, s."""
-    return float(sum(x[0] + phase.pause for phase, x in parts))
+    return float(sum(x[0] + phase.pause for phase, x in phase_points))
 
 
 def _means_of(phase: Phase, x: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ def solve_near_rows(
     solve: Callable[[NonlinearProgram, np.ndarray], SolverReport],
     *,
     is_answer: bool = False,
-    kept: Sequence[int] = (),
+    kept_rows: Sequence[int] = (),
 ) -> SolverReport:
     """Solve a program from a point, with the rows near their bounds where that is enough.
 
@@ -130,7 +130,7 @@ def solve_near_rows(
     is_answer : bool, optional
         Whether the point is the answer of a solve over other knots or points. If too few rows are near, whole values
         are then left out.
-    kept : sequence of int, optional
+    kept_rows : sequence of int, optional
         Numbers of rows that are kept whatever their distance.
 
     Returns
@@ -150,7 +150,7 @@ def solve_near_rows(
         if report and report.status.usable and report.violation <= FEASIBLE:
             return report
         return solve(program, x)
-    numbers = np.union1d(numbers, np.asarray(kept, dtype=int))
+    numbers = np.union1d(numbers, np.asarray(kept_rows, dtype=int))
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
         report = solve(NearRows(program, numbers), x)

@@ -199,10 +199,10 @@ def _divide_switches(phase_timing: PhaseTiming) -> np.ndarray | None:
     fastest = np.maximum(timing.rate[1:], timing.rate[:-1])
     lost = change * np.diff(timing.times) ** 2 / (8.0 * fastest * timing.t_end)
     allowed = _LOSS_OF_SWITCHES / len(lost)
-    parts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * allowed))).clip(1, _MOST_PARTS)
-    if lost.sum() <= allowed or parts.max() == 1:
+    counts = np.ceil(np.sqrt(lost / (_SHARE_OF_STEP * allowed))).clip(1, _MOST_PARTS)
+    if lost.sum() <= allowed or counts.max() == 1:
         return None
-    return spread(phase_timing.course.places, parts.astype(int))
+    return spread(phase_timing.course.places, counts.astype(int))
 
 
 def _lay_finely(

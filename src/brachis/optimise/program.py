@@ -23,7 +23,7 @@ from brachis.kinematics import JointState
 from brachis.limits import Bound, Limit, Role
 from brachis.optimise.backends import Curvature
 from brachis.optimise.evaluator import Evaluation
-from brachis.optimise.means import Means, Parts
+from brachis.optimise.means import Means, PhasePoints
 from brachis.optimise.motion import Motion
 from brachis.optimise.objective import EndTime, Objective
 from brachis.optimise.phase import Phase
@@ -60,12 +60,12 @@ class Link:
         interval = x[0] * (1.0 - phase.breaks[-2])
         return interval ** np.array(self.orders)[:, None]
 
-    def rows(self, parts: Parts) -> np.ndarray:
-        """Values of the rows, by order and curve; `parts` are all phases, with their variables."""
+    def rows(self, phase_points: PhasePoints) -> np.ndarray:
+        """Values of the rows, by order and curve; `phase_points` are all phases, with their variables."""
         chosen = np.ix_(self.orders, self.curves)
-        last = _curves_at(*parts[self.before], -1)[chosen]
-        first = _curves_at(*parts[self.after], 0)[chosen]
-        return (self._scales(*parts[self.before]) * (last - first)).ravel()
+        last = _curves_at(*phase_points[self.before], -1)[chosen]
+        first = _curves_at(*phase_points[self.after], 0)[chosen]
+        return (self._scales(*phase_points[self.before]) * (last - first)).ravel()
 
     def pattern(
         self, phases: Sequence[Phase], first: Sequence[int]
@@ -85,17 +85,19 @@ class Link:
         rows = np.repeat(np.arange(self.size), len(columns))
         return rows, np.tile(columns, self.size)
 
-    def jacobian(self, parts: Parts) -> np.ndarray:
+    def jacobian(self, phase_points: PhasePoints) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
         chosen = np.ix_(self.orders, self.curves)
-        phase, x = parts[self.before]
-        after, x_after = parts[self.after]
+        phase, x = phase_points[self.before]
+        after, x_after = phase_points[self.after]
         scales = self._scales(phase, x)
         last = scales[:, :, None] * phase.end_slopes(x, -1)[chosen]
         first = -scales[:, :, None] * after.end_slopes(x_after, 0)[chosen]
         # The scales grow with the duration.
-        growth = orders[:, None] / x[0] * self.rows(parts).reshape(len(orders), -1)
+        growth = (
+            orders[:, None] / x[0] * self.rows(phase_points).reshape(len(orders), -1)
+        )
         last[:, :, phase.end_pattern(-1) == 0] += growth[:, :, None]
         return np.concatenate([last, first], axis=2).ravel()
 
@@ -341,18 +343,18 @@ class Program(PhaseSequence[Phase], Summary):
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError as `states` does."""
-        parts = self.split(x)
-        rows = [phase.rows(x_of_phase) for phase, x_of_phase in parts]
-        rows.append(self.means.values(parts))
-        rows += [link.rows(parts) for link in self.links]
+        phase_points = self.split(x)
+        rows = [phase.rows(x_of_phase) for phase, x_of_phase in phase_points]
+        rows.append(self.means.values(phase_points))
+        rows += [link.rows(phase_points) for link in self.links]
         return np.concatenate(rows)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `states` does."""
-        parts = self.split(x)
-        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in parts]
-        entries.append(self.means.slopes(parts).ravel())
-        entries += [link.jacobian(parts) for link in self.links]
+        phase_points = self.split(x)
+        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in phase_points]
+        entries.append(self.means.slopes(phase_points).ravel())
+        entries += [link.jacobian(phase_points) for link in self.links]
         return np.concatenate(entries)
 
     def curvature(self, x: np.ndarray) -> Curvature | None:

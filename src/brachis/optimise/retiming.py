@@ -182,7 +182,7 @@ def begin_with_timing(
     """
     total = least_time(timings)
     phases = []
-    parts = []
+    x_by_phase = []
     parts_before = program.split(program.x_lower if x is None else x)
     for (phase, x_of_phase), phase_timing in zip(parts_before, timings, strict=True):
         if phase_timing is None or phase_timing.timing is None:
@@ -192,10 +192,10 @@ def begin_with_timing(
             share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
             begun = begin(phase, phase_timing, phase_timing.timing, lost, share, points)
         phases.append(begun[0])
-        parts.append(begun[1])
+        x_by_phase.append(begun[1])
     first = program.with_phases(phases)
     try:
-        return first, shortest_time(first, np.concatenate(parts))
+        return first, shortest_time(first, np.concatenate(x_by_phase))
     except UnreachableError:
         return None
 
@@ -399,12 +399,12 @@ def lay_splines(
         if followed is None:
             return None
         followed_phases.append(followed)
-    phases, parts, violations = zip(*followed_phases, strict=True)
+    phases, x_by_phase, violations = zip(*followed_phases, strict=True)
     finer = program.with_phases(phases)
     seconds = time.perf_counter() - began
     report = _report(
         finer,
-        np.concatenate(parts),
+        np.concatenate(x_by_phase),
         SolveStatus.FOLLOWED,
         max(violations),
         seconds,

@@ -35,7 +35,7 @@ from brachis.path.orientation import orientation_along, turn_of
 from brachis.path.pose import OrientedPath, PosePath, pose_curve, rotations
 from brachis.path.protocol import Array, Curve, MappedCurve
 from brachis.path.rotations import rotation_of
-from brachis.path.sequence import Path, PathFrame, Piece
+from brachis.path.sequence import CurveSpan, Path, PathFrame
 from brachis.path.splines import (
     bspline_curve,
     pose_bspline,
@@ -160,17 +160,17 @@ class JointCoordinates(RowCoordinates):
         names = getattr(segment.shape, "joints", None)
         if names is None:
             return super().curve(segment, index, start)
-        own = joints_of(self.rows)
+        joints = joints_of(self.rows)
         where = f"path[{index}].{segment.kind}.joints"
-        check_names("joint", names, own, where)
-        if sorted(names) != sorted(own):
+        check_names("joint", names, joints, where)
+        if sorted(names) != sorted(joints):
             raise PathError(
                 "the joints are not each named once",
                 found=list(names),
-                allowed=", ".join(own),
+                allowed=", ".join(joints),
                 where=where,
             )
-        order = [own.index(name) for name in names]
+        order = [joints.index(name) for name in names]
         permuted = RowCoordinates(tuple(self.rows[column] for column in order))
         columns = np.argsort(order)
         curve = permuted.curve(segment, index, start[order])
@@ -276,8 +276,8 @@ def build_path(
         path_type = PosePath if rows == POSE_ROWS else OrientedPath
         coordinates = PoseCoordinates(position_rows(rows))
         # The nearest rotation: the polar decomposition without its stretch.
-        left, _, right = np.linalg.svd(rotations(point))
-        point[-9:] = (left @ right).ravel()
+        u, _, vt = np.linalg.svd(rotations(point))
+        point[-9:] = (u @ vt).ravel()
     if frame is not None:
         point = frame.to_frame(point)
     curves: list[Curve] = []
@@ -291,10 +291,10 @@ def build_path(
         curve = coordinates.curve(segments[i], i, point)
         point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
         curves.append(curve)
-    pieces = _join(curves, segments, coordinates)
+    spans = _join(curves, segments, coordinates)
     positions = len(position_rows(coordinates.rows))
     stopping = [i for i, segment in enumerate(segments) if segment.stop]
-    return path_type.of(pieces, positions, frame, stopping)
+    return path_type.of(spans, positions, frame, stopping)
 
 
 def _line_to(
@@ -318,7 +318,7 @@ def _join(
     curves: Sequence[Curve],
     segments: Sequence[Segment],
     coordinates: RowCoordinates,
-) -> tuple[Piece, ...]:
+) -> tuple[CurveSpan, ...]:
     """Return the parts of the segments' curves, each of which starts where its predecessor ends, with rounded corners.
 
     Raises
@@ -328,12 +328,12 @@ def _join(
         a blend does not fit.
     """
     corners = []
-    pieces = []
+    spans = []
     taken = 0.0
     for join in find_joins(curves, coordinates.rows):
         i = join.index
         size = segments[i].blend or 0.0
-        pieces.append(Piece(join.first, taken, join.first.length - size, i))
+        spans.append(CurveSpan(join.first, taken, join.first.length - size, i))
         taken = size
         if segments[i].stop:
             continue
@@ -341,11 +341,11 @@ def _join(
             corners.append(coordinates.corner(join))
         else:
             rounded = coordinates.blend(join, size)
-            pieces.append(Piece(rounded, 0.0, rounded.length))
-    pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
+            spans.append(CurveSpan(rounded, 0.0, rounded.length))
+    spans.append(CurveSpan(curves[-1], taken, curves[-1].length, len(curves) - 1))
     refuse_corners(corners)
     # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
-    return tuple(piece for piece in pieces if piece.length > 1e-11 * piece.curve.length)
+    return tuple(span for span in spans if span.length > 1e-11 * span.curve.length)
 
 
 def path_of(task_map: TaskMap, task: Task) -> Path:
@@ -370,11 +370,11 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     frame = None
     if task.path_frame is not None:
         frame = PathFrame.of(place_frame(task.frames, task.path_frame), task_map.rows)
-    given = None
+    point = None
     if task.path_start is not None:
-        given = task_map.read(task.path_start, "path_start")
+        point = task_map.read(task.path_start, "path_start")
         if frame is not None:
-            given = frame.to_world(given)
+            point = frame.to_world(point)
     postures = {
         name: task_map.value(task_map.robot.posture(joints, f"postures.{name}"))
         for name, joints in task.postures.items()
@@ -382,11 +382,11 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     given_joints = task.joints_at("start")
     if given_joints is not None:
         start = task_map.robot.posture(*given_joints)
-        if given is not None:
-            check_on_path(task_map, start, given, "start", given_joints[1])
-        given = task_map.value(start)
-    assert given is not None
-    return build_path(task.path, given, task_map.rows, frame, postures)
+        if point is not None:
+            check_on_path(task_map, start, point, "start", given_joints[1])
+        point = task_map.value(start)
+    assert point is not None
+    return build_path(task.path, point, task_map.rows, frame, postures)
 
 
 def check_on_path(
@@ -404,11 +404,11 @@ def check_on_path(
     largest = tolerances.WRITTEN
     if miss[worst] > largest:
         unit = task_map.units[worst]
-        found, allowed = write_apart(miss[worst], largest, digits=3)
+        distance, allowed = write_apart(miss[worst], largest, digits=3)
         raise StartError(
             f"the {name} posture is off the path",
             where=where,
-            found=f"{found} {unit} off in {task_map.rows[worst]}",
+            found=f"{distance} {unit} off in {task_map.rows[worst]}",
             allowed=f"at most {allowed} {unit}",
             hint=_place_hint(task_map, place, target)
             or _posture_hint(task_map.robot, posture)
@@ -433,6 +433,8 @@ def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str
         away = distances_from_base(robot, task_map.axes, target[:axes])
         hint = hint or distance_hint(float(away), reach(robot))
     if len(target) == axes + 9:
-        turned, wanted = (one[axes:].reshape(3, 3) for one in (place, target))
-        hint = hint or turn_hint(turned, wanted)
+        turned, target_rotation = (
+            coordinates[axes:].reshape(3, 3) for coordinates in (place, target)
+        )
+        hint = hint or turn_hint(turned, target_rotation)
     return hint

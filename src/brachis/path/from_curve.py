@@ -59,8 +59,8 @@ def bspline_segment(
     from scipy.interpolate import BSpline, PPoly
 
     if isinstance(curve, BSpline):
-        own = curve.t[curve.k : len(curve.t) - curve.k]
-        spline = _of_pieces(curve, own, curve.k, interval)
+        breaks = curve.t[curve.k : len(curve.t) - curve.k]
+        spline = _of_pieces(curve, breaks, curve.k, interval)
     elif isinstance(curve, PPoly):
         spline = _of_pieces(curve, curve.x, len(curve.c) - 1, interval)
     elif interval is None:
@@ -126,7 +126,9 @@ def _of_function(
 
     def values(u: Array) -> Array:
         """Return the function's values, (K, m), after a check."""
-        points = np.array([np.asarray(curve(float(each)), dtype=float) for each in u])
+        points = np.array(
+            [np.asarray(curve(float(number)), dtype=float) for number in u]
+        )
         if points.ndim != 2 or not np.isfinite(points).all():
             raise InputError(
                 "the function's values are not points of a path",
@@ -189,22 +191,22 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     """
     tables: list[Array] = []
     goes_on = False  # whether the last table holds up to the end of its segment
-    for (begin, end), piece in zip(pairwise(path.breaks), path.pieces, strict=True):
-        if piece.segment is None:
+    for (begin, end), span in zip(pairwise(path.breaks), path.spans, strict=True):
+        if span.segment is None:
             continue
-        segment = segments[piece.segment]
+        segment = segments[span.segment]
         speeds = getattr(segment.shape, "speeds", ())
         if getattr(segment, "speed", None):  # a process speed
             speeds = ()
         for sigma, speed in map(np.transpose, speeds):
-            at = np.unique(np.clip(sigma, piece.first, piece.last))
+            at = np.unique(np.clip(sigma, span.first, span.last))
             if len(at) > 1:
-                s = np.interp(at, [piece.first, piece.last], [begin, end])
+                s = np.interp(at, [span.first, span.last], [begin, end])
                 table = np.stack([s, np.interp(at, sigma, speed)])
-                if goes_on and tables and sigma[0] <= piece.first:
+                if goes_on and tables and sigma[0] <= span.first:
                     table = np.concatenate([tables.pop(), table], axis=1)
                 tables.append(table)
-            goes_on = bool(sigma[-1] >= piece.last)
+            goes_on = bool(sigma[-1] >= span.last)
         goes_on &= bool(speeds)
     return tuple(
         SpeedTable(s=tuple(s), speed=tuple(speed))

@@ -111,7 +111,7 @@ class Join:
         )
 
 
-class Corner(NamedTuple):
+class Kink(NamedTuple):
     """A join where curves do not continue each other; what jumps, in words; what to try."""
 
     join: Join
@@ -128,10 +128,10 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
     ]
 
 
-def row_corner(join: Join) -> Corner | None:
+def row_corner(join: Join) -> Kink | None:
     """Return what jumps from one curve of rows to the next, or None where three derivatives continue."""
-    found = _mismatch(join, *join.sides())
-    return Corner(join, found, f"Set {join.rounding}") if found else None
+    jump = _mismatch(join, *join.sides())
+    return Kink(join, jump, f"Set {join.rounding}") if jump else None
 
 
 def _mismatch(join: Join, before: Array, after: Array) -> str | None:
@@ -147,7 +147,9 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
         return None
     if jumps[1] > tolerances.WRITTEN:
         corner = angle_between(before[1], after[1])
-        speed, new_speed = (np.linalg.norm(one[1]) for one in (before, after))
+        speed, new_speed = (
+            np.linalg.norm(derivatives[1]) for derivatives in (before, after)
+        )
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
         if corner > 0.01 * abs(new_speed - speed):
             moved = np.linalg.norm((after - before)[1, : join.positions])
@@ -159,37 +161,37 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
     return f"a jump of {np.linalg.norm(after[3] - before[3]):.4g} 1/m^2 in the third derivative"
 
 
-def refuse_corners(corners: Sequence[Corner | None]) -> None:
+def refuse_corners(corners: Sequence[Kink | None]) -> None:
     """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
     refused = [corner for corner in corners if corner is not None]
     if not refused:
         return
-    join, found, advice = refused[0]
-    others = ", ".join(f"path[{other.index}]" for other, *_ in refused[1:])
+    join, jump, advice = refused[0]
+    further_keys = ", ".join(f"path[{later.index}]" for later, *_ in refused[1:])
     raise PathError(
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
-        found=found,
+        found=jump,
         allowed="segments that continue each other",
         where=join.where,
-        hint=advice + (f"; likewise {others}" if others else ""),
+        hint=advice + (f"; likewise {further_keys}" if further_keys else ""),
     )
 
 
-def angle_between(one: Array, other: Array) -> float:
+def angle_between(first: Array, second: Array) -> float:
     """Return the angle between two vectors, accurate for small ones as well."""
-    a = one * np.linalg.norm(other)
-    b = other * np.linalg.norm(one)
+    a = first * np.linalg.norm(second)
+    b = second * np.linalg.norm(first)
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
 
 
-def pose_corner(join: Join) -> Corner | None:
+def pose_corner(join: Join) -> Kink | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
     on_the_spot = [
         stands_still(curve, join.positions) for curve in (join.first, join.second)
     ]
     if on_the_spot[0] != on_the_spot[1]:
-        return Corner(
+        return Kink(
             join,
             "a stop: the position moves on one side, and the tool turns on the spot on the other",
             f"Turn the tool along a segment, by its orientation, or set {join.stopping}",
@@ -197,12 +199,12 @@ def pose_corner(join: Join) -> Corner | None:
     before, after = join.sides()
     jump = _mismatch(join, before[:, : join.positions], after[:, : join.positions])
     if jump:
-        return Corner(join, jump, f"Set {join.rounding}")
+        return Kink(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
     jump = _turning_mismatch(join, before, after, unit)
     otherwise = join.stopping if on_the_spot[0] else join.rounding
     advice = f"Set profile: smooth where the tool turns, or {otherwise}"
-    return Corner(join, jump, advice) if jump else None
+    return Kink(join, jump, advice) if jump else None
 
 
 def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str | None:
@@ -216,7 +218,7 @@ def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str
     unit : str
         Unit of sigma.
     """
-    old, new = (angular_rates(one) for one in (before, after))
+    old, new = (angular_rates(derivatives) for derivatives in (before, after))
     jumps = np.linalg.norm(new - old, axis=1)
     allowed = tolerances.WRITTEN * max(float(np.linalg.norm(old[0])), 1.0)
     large = np.flatnonzero(jumps * join.shorter ** np.arange(3.0) > allowed)
@@ -279,11 +281,11 @@ def _check_neighbours(join: Join, size: float) -> None:
     ------
     PathError
     """
-    found = f"{size:g} {join.unit}"
+    stated_size = f"{size:g} {join.unit}"
     if any(stands_still(curve, join.positions) for curve in (join.first, join.second)):
         raise join.wrong_blend(
             "a blend needs motion of the position on both sides, and on one the tool turns on the spot",
-            found,
+            stated_size,
             "no blend here",
             "Turn the tool along a line, or stop there, with stop: true instead of the blend",
         )
@@ -291,7 +293,7 @@ def _check_neighbours(join: Join, size: float) -> None:
     if size > longest:
         raise join.wrong_blend(
             "the blend is longer than half of a neighbouring segment",
-            found,
+            stated_size,
             # Rounded down, to micrometres, so that the blend that the message names is accepted.
             f"at most {floor(longest * 1e6) / 1e6:.10g} {join.unit}",
             position_hint(size, 0.0, longest, join.unit),
@@ -310,7 +312,8 @@ def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
     rows = join.positions
     corners = [start[0, :rows], join.point[:rows], end[0, :rows]]
     before, chord, after = (
-        float(np.linalg.norm(one - other)) for one, other in combinations(corners, 2)
+        float(np.linalg.norm(begin - finish))
+        for begin, finish in combinations(corners, 2)
     )
     curve = septic(start, end, (chord + (before + after)) / 2)
     velocity = curve.derivatives(np.linspace(0.0, curve.length, 201), 1)[1]

@@ -57,25 +57,25 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
     PathError
         A process speed does not fit the task space; or the tool stands still where it is to have one.
     """
-    parts = task.tool_limits.process_speed
-    if parts:
+    sections = task.tool_limits.process_speed
+    if sections:
         _check_task_space(task_map)
-    for number, part in enumerate(parts):
-        _check_motion(task_map, path, part, number)
+    for number, section in enumerate(sections):
+        _check_motion(task_map, path, section, number)
     waits = [segment.dwell for segment in task.path if segment.stop]
     dwells = dict(zip(path.stops.tolist(), waits, strict=True))
-    ends = sorted({0.0, 1.0, *dwells, *(s for part in parts for s in part.s)})
-    speeds = {part.s: part.speed for part in parts}
+    ends = sorted({0.0, 1.0, *dwells, *(s for section in sections for s in section.s)})
+    speeds = {section.s: section.speed for section in sections}
     return tuple(
         Leg(begin, end, speeds.get((begin, end)), end in dwells, dwells.get(end, 0.0))
         for begin, end in pairwise(ends)
     )
 
 
-def key_of_speed(part: ProcessSpeed, number: int, below: str) -> str:
+def key_of_speed(section: ProcessSpeed, number: int, below: str) -> str:
     """Name the key of a process speed for messages: that of its segment, or one `below` its number in the list."""
-    if part.segment is not None:
-        return f"path[{part.segment}].speed"
+    if section.segment is not None:
+        return f"path[{section.segment}].speed"
     return f"{_KEY}[{number}]{below}"
 
 
@@ -93,26 +93,26 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
         Parts overlap, or a speed is above the tool's largest one.
     """
     limits = task.tool_limits
-    parts = [part for part in limits.process_speed if part.segment is None]
-    parts += _parts_of_segments(task, path)
-    if not parts:
+    sections = [section for section in limits.process_speed if section.segment is None]
+    sections += _parts_of_segments(task, path)
+    if not sections:
         return task
     after = dict.fromkeys(path.stops.tolist(), 0.0)
     if not task.boundary.periodic:
         after[0.0] = _speed_at_end(task, task_map, path, 0)
         after[1.0] = _speed_at_end(task, task_map, path, 1)
-    before = {part.s[1]: part.speed for part in parts} | after
+    before = {section.s[1]: section.speed for section in sections} | after
     if task.boundary.periodic and 1.0 in before:
         before[0.0] = before[1.0]
     held = []
-    for part in parts:
-        speed = part.speed
-        first, last = (_snap(s, path.stops) for s in part.s)
+    for section in sections:
+        speed = section.speed
+        first, last = (_snap(s, path.stops) for s in section.s)
         for ends in pairwise(cut(path.stops, first, last).tolist()):
             between = path.between(*ends)
             leads = [
-                _lead(speed, others.get(s, speed)) / _tool_slope(task_map, between, s)
-                for s, others in zip(ends, (before, after), strict=True)
+                _lead(speed, speeds.get(s, speed)) / _tool_slope(task_map, between, s)
+                for s, speeds in zip(ends, (before, after), strict=True)
             ]
             # The planner knows whether less is enough.
             share = min(
@@ -125,8 +125,8 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
                     ends[0] if before.get(ends[0], 0.0) <= speed else s[0],
                     ends[1] if after.get(ends[1], 0.0) <= speed else s[1],
                 )
-            held.append(part.model_copy(update=changes))
-    held.sort(key=lambda part: part.s)
+            held.append(section.model_copy(update=changes))
+    held.sort(key=lambda section: section.s)
     changed = limits.model_copy(update={"process_speed": tuple(held)})
     checked = validate(ToolLimits, changed, "tool_limits")
     return task.model_copy(update={"tool_limits": checked})
@@ -135,20 +135,20 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
 def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
     """List the parts of the path whose segments have a speed; a blend has that of both sides."""
     speeds = [getattr(segment, "speed", None) for segment in task.path]
-    parts: list[ProcessSpeed] = []
+    sections: list[ProcessSpeed] = []
     after = 0
     bounds = pairwise(path.breaks.tolist())
-    for (begin, end), piece in zip(bounds, path.pieces, strict=True):
-        segment = after if piece.segment is None else piece.segment
-        after = segment + (piece.segment is None)
+    for (begin, end), span in zip(bounds, path.spans, strict=True):
+        segment = after if span.segment is None else span.segment
+        after = segment + (span.segment is None)
         speed = speeds[segment]
         if speed is None or speed != speeds[after]:
             continue
         first = begin
-        if parts and (parts[-1].s[1], parts[-1].speed) == (begin, speed):
-            first = parts.pop().s[0]
-        parts.append(ProcessSpeed(speed=speed, s=(first, end), segment=segment))
-    return parts
+        if sections and (sections[-1].s[1], sections[-1].speed) == (begin, speed):
+            first = sections.pop().s[0]
+        sections.append(ProcessSpeed(speed=speed, s=(first, end), segment=segment))
+    return sections
 
 
 def _snap(s: float, stops: Array) -> float:
@@ -157,11 +157,11 @@ def _snap(s: float, stops: Array) -> float:
     return float(near[0]) if len(near) else s
 
 
-def _lead(speed: float, other: float) -> float:
+def _lead(speed: float, next_speed: float) -> float:
     """Length in which the tool gets from one speed to another one, m."""
-    if abs(speed - other) <= tolerances.WRITTEN * speed:
+    if abs(speed - next_speed) <= tolerances.WRITTEN * speed:
         return 0.0
-    return _LEAD * max(speed, other)
+    return _LEAD * max(speed, next_speed)
 
 
 def _tool_slope(task_map: TaskMap, path: Path, s: float) -> float:
@@ -196,18 +196,18 @@ def _check_task_space(task_map: TaskMap) -> None:
 
 
 def _check_motion(
-    task_map: TaskMap, path: Path, part: ProcessSpeed, number: int
+    task_map: TaskMap, path: Path, section: ProcessSpeed, number: int
 ) -> None:
     """Refuse a part in which the tool stands still."""
-    s = np.linspace(*part.s, 401)
-    velocity = tool_derivatives(task_map, path.between(*part.s), s)[0]
+    s = np.linspace(*section.s, 401)
+    velocity = tool_derivatives(task_map, path.between(*section.s), s)[0]
     speeds = np.linalg.norm(velocity, axis=1)
     worst = np.argmin(speeds)
     if speeds[worst] <= tolerances.LENGTH:
         raise PathError(
             "the tool has a process speed where its position stands still",
             s_interval=(float(s[worst]), float(s[worst])),
-            where=key_of_speed(part, number, ".s"),
+            where=key_of_speed(section, number, ".s"),
             found=f"no motion of the position at s = {s[worst]:.4g}",
             allowed="a part of the path along which the position moves",
         )

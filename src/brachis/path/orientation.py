@@ -174,10 +174,10 @@ def orientation_along(
         return partial(_stay, start)
     if isinstance(mode, Rotate | TurnTo):
         return turn_of(mode, start, key).over(curve.length)
-    given = mode.tangent.up if isinstance(mode, AlongTangent) else None
+    stated_up = mode.tangent.up if isinstance(mode, AlongTangent) else None
     up = np.array([0.0, 0.0, 1.0])
-    if given is not None:
-        up = np.array(given) / np.linalg.norm(given)
+    if stated_up is not None:
+        up = np.array(stated_up) / np.linalg.norm(stated_up)
     elif isinstance(curve, ArcCurve):
         up = curve.normal
     sigma, speed = smallest(

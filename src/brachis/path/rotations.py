@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 
 def _leibniz(
-    multiply: Callable[[Array, Array], Array], one: Array, other: Array, k: int
+    multiply: Callable[[Array, Array], Array], first: Array, second: Array, k: int
 ) -> Any:
     """Return the k-th derivative of a product from those of both factors, by Leibniz' rule."""
-    return sum(comb(k, i) * multiply(one[i], other[k - i]) for i in range(k + 1))
+    return sum(comb(k, i) * multiply(first[i], second[k - i]) for i in range(k + 1))
 
 
-def product(one: Array, other: Array, how: str) -> Array:
+def product(first: Array, second: Array, how: str) -> Array:
     """Return the derivatives of a product, as many as both factors have.
 
     Parameters
@@ -40,9 +40,9 @@ def product(one: Array, other: Array, how: str) -> Array:
     how : str
         The product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
     """
-    orders = range(min(len(one), len(other)))
+    orders = range(min(len(first), len(second)))
     multiply = partial(np.einsum, how)
-    return np.stack([_leibniz(multiply, one, other, k) for k in orders])
+    return np.stack([_leibniz(multiply, first, second, k) for k in orders])
 
 
 def unit(vector: Array) -> Array:
@@ -54,10 +54,10 @@ def unit(vector: Array) -> Array:
     inverse = np.zeros_like(squared)
     inverse[0] = 1.0 / np.sqrt(squared[0])
     for k in range(len(vector) - 1):
-        right = _leibniz(np.multiply, squared[1:], inverse, k) / -2.0
+        right_side = _leibniz(np.multiply, squared[1:], inverse, k) / -2.0
         # Of n y', what is known: the last derivative of y is zero as yet.
-        left = _leibniz(np.multiply, squared, inverse[1:], k)
-        inverse[k + 1] = (right - left) / squared[0]
+        known = _leibniz(np.multiply, squared, inverse[1:], k)
+        inverse[k + 1] = (right_side - known) / squared[0]
     return product(vector, inverse, "...i,...->...i")
 
 
@@ -105,10 +105,10 @@ def rotation_of(matrix: Array) -> Rotation:
     return Rotation.from_matrix(matrix)
 
 
-def quaternion_product(one: Array, other: Array) -> Array:
+def quaternion_product(first: Array, second: Array) -> Array:
     """Return the products, (..., 4), of quaternions (w, x, y, z)."""
-    w = one[..., :1]
-    v = one[..., 1:]
-    scalar = w * other[..., :1] - np.sum(v * other[..., 1:], axis=-1, keepdims=True)
-    vector = w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])
+    w = first[..., :1]
+    v = first[..., 1:]
+    scalar = w * second[..., :1] - np.sum(v * second[..., 1:], axis=-1, keepdims=True)
+    vector = w * second[..., 1:] + second[..., :1] * v + np.cross(v, second[..., 1:])
     return np.concatenate([scalar, vector], axis=-1)

@@ -100,7 +100,7 @@ def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class CurveSpan:
     """The part of a curve between sigma = `first` and sigma = `last`; of which segment, or None for a blend."""
 
     curve: Curve
@@ -120,10 +120,10 @@ class Path:
 
     Attributes
     ----------
-    pieces : tuple of Piece
+    spans : tuple of CurveSpan
         Parts of the segments' curves, and blends.
     breaks : (b + 1,) ndarray
-        Values of s where pieces join, from 0 to 1; of a part of a path, from its begin to its end. The path is C3
+        Values of s where spans join, from 0 to 1; of a part of a path, from its begin to its end. The path is C3
         there, but for its stops.
     total : float
         Range of the summed parameter of the whole path, sigma per unit s.
@@ -135,7 +135,7 @@ class Path:
         Values of s at which the tool stops, so that there may be a corner.
     """
 
-    pieces: tuple[Piece, ...]
+    spans: tuple[CurveSpan, ...]
     breaks: Array
     total: float
     positions: int
@@ -145,23 +145,21 @@ class Path:
     @classmethod
     def of(
         cls,
-        pieces: tuple[Piece, ...],
+        spans: tuple[CurveSpan, ...],
         positions: int,
         frame: PathFrame | None,
         stopping: Sequence[int] = (),
     ) -> Self:
-        """Put pieces together whose first `positions` rows are those of the position.
+        """Put spans together whose first `positions` rows are those of the position.
 
         The tool stops at the ends of the segments with the indices `stopping`.
         """
-        ends = sum_up([piece.length for piece in pieces])
+        ends = sum_up([span.length for span in spans])
         total = float(ends[-1])
         breaks = ends / total
-        last = {
-            piece.segment: end for piece, end in zip(pieces, breaks[1:], strict=True)
-        }
+        last = {span.segment: end for span, end in zip(spans, breaks[1:], strict=True)}
         stops = np.array([last[segment] for segment in stopping], dtype=float)
-        return cls(pieces, breaks, total, positions, frame, stops)
+        return cls(spans, breaks, total, positions, frame, stops)
 
     @cached_property
     def length(self) -> float:
@@ -173,20 +171,20 @@ class Path:
     @property
     def knots(self) -> Array:
         """Values of s between which the path is analytic, from its begin to its end; the breaks are among them."""
-        found = [self.breaks]
-        for (begin, end), piece in zip(pairwise(self.breaks), self.pieces, strict=True):
-            knots = begin + (piece.curve.knots - piece.first) / self.total
+        inner_knots = [self.breaks]
+        for (begin, end), span in zip(pairwise(self.breaks), self.spans, strict=True):
+            knots = begin + (span.curve.knots - span.first) / self.total
             # Ends of a piece may be knots of its curve, but for rounding.
             is_inner = (knots > begin + tolerances.PATH) & (
                 knots < end - tolerances.PATH
             )
-            found.append(knots[is_inner])
-        return np.unique(np.concatenate(found))
+            inner_knots.append(knots[is_inner])
+        return np.unique(np.concatenate(inner_knots))
 
     def between(self, begin: float, end: float) -> Self:
         """Return the part of the path from s = `begin` to `end`, in the same s.
 
-        Only the pieces in between are sampled, so that at a corner it is certain which side is meant. Beyond its ends
+        Only the spans in between are sampled, so that at a corner it is certain which side is meant. Beyond its ends
         it continues as its first or last piece.
         """
         inner = self.breaks[1:-1]
@@ -194,14 +192,14 @@ class Path:
         inside = inner[is_after & (inner < end - tolerances.PATH)]
         first = len(inner) - np.count_nonzero(is_after)
         last = first + len(inside)
-        pieces = list(self.pieces[first : last + 1])
+        spans = list(self.spans[first : last + 1])
         before = (begin - self.breaks[first]) * self.total
         after = (end - self.breaks[last + 1]) * self.total
-        pieces[0] = replace(pieces[0], first=pieces[0].first + before)
-        pieces[-1] = replace(pieces[-1], last=pieces[-1].last + after)
+        spans[0] = replace(spans[0], first=spans[0].first + before)
+        spans[-1] = replace(spans[-1], last=spans[-1].last + after)
         breaks = np.concatenate([[begin], inside, [end]])
         stops = self.stops[(self.stops > begin) & (self.stops < end)]
-        return replace(self, pieces=tuple(pieces), breaks=breaks, stops=stops)
+        return replace(self, spans=tuple(spans), breaks=breaks, stops=stops)
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).
@@ -214,27 +212,27 @@ class Path:
     def derivatives(self, s: Sequence[float] | Array, order: int = 3) -> Array:
         """Return the coordinates in the world and their derivatives by s, shape (order + 1, K, m)."""
         values = np.array(s, dtype=float, ndmin=1)
-        if len(self.pieces) == 1:
-            result = self._on_piece(0, values, order)
+        if len(self.spans) == 1:
+            result = self._on_span(0, values, order)
         else:
             which = np.searchsorted(self.breaks[1:-1], values, side="right")
             runs = np.flatnonzero(np.diff(which)) + 1
-            parts = [
-                self._on_piece(which[begin], values[begin:end], order)
+            by_span = [
+                self._on_span(which[begin], values[begin:end], order)
                 for begin, end in pairwise([0, *runs.tolist(), values.size])
             ]
-            result = np.concatenate(parts, axis=1)
+            result = np.concatenate(by_span, axis=1)
         result *= self.total ** np.arange(order + 1)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
             result[0] += self.frame.origin
         return result
 
-    def _on_piece(self, i: int, s: Array, order: int) -> Array:
+    def _on_span(self, i: int, s: Array, order: int) -> Array:
         """Return coordinates and their derivatives by sigma, (order + 1, K, m), on the curve of one piece."""
-        piece = self.pieces[i]
-        sigma = piece.first + (s - self.breaks[i]) * self.total
-        return piece.curve.derivatives(sigma, order)
+        span = self.spans[i]
+        sigma = span.first + (s - self.breaks[i]) * self.total
+        return span.curve.derivatives(sigma, order)
 
 
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:

@@ -74,9 +74,9 @@ def pose_spline(
     points = _waypoints_of(shape, context)
     turned = _rotations(shape, context, rotation)
     if _repeats_start(np.hypot(steps_of(points), _angles(turned))):
-        kept = np.delete(np.arange(len(points)), 1)
-        points = points[kept]
-        turned = turned[kept]
+        distinct = np.delete(np.arange(len(points)), 1)
+        points = points[distinct]
+        turned = turned[distinct]
     angles = _angles(turned)
     for i in np.flatnonzero(angles > np.pi - AMBIGUOUS):
         raise half_turn(
@@ -113,7 +113,7 @@ def _rotations(
 ) -> Rotation:
     """Return the n rotations at the start and the waypoints."""
     start = rotation_of(matrix)
-    given = [attitude.rotation for attitude in shape.orientations or ()]
+    waypoints = [attitude.rotation for attitude in shape.orientations or ()]
     expected = start
     if shape.starts_oriented is not None:
         expected = shape.starts_oriented.rotation
@@ -127,8 +127,8 @@ def _rotations(
             )
     if shape.relative:
         change = start if shape.starts_oriented is None else start * expected.inv()
-        given = [change * one for one in given]
-    return start.concatenate([start, *given])
+        waypoints = [change * waypoint for waypoint in waypoints]
+    return start.concatenate([start, *waypoints])
 
 
 def _waypoints_of(shape: SplineThrough, context: SegmentContext) -> Array:
@@ -176,9 +176,12 @@ def _check_start(key: str, off: Array, context: SegmentContext) -> None:
     for away, of, looks in ((moved, unit, hint), (turned, "rad", None)):
         distance = np.linalg.norm(away)
         if distance > START_TOLERANCE:
-            here = place(context.rows, context.start)
-            found = f"{here}, {distance:.4g} {of} off"
-            raise _starts_elsewhere(context, key, found, looks)
+            raise _starts_elsewhere(
+                context,
+                key,
+                f"{place(context.rows, context.start)}, {distance:.4g} {of} off",
+                looks,
+            )
 
 
 def _starts_elsewhere(
@@ -219,7 +222,9 @@ def _chord_knots(
     if np.all(chords < tolerances.LENGTH):
         chords = otherwise
     if np.all(chords < tolerances.LENGTH):
-        raise context.zero_length(".through", [list(each) for each in shape.through])
+        raise context.zero_length(
+            ".through", [list(waypoint) for waypoint in shape.through]
+        )
     repeats = is_repeated(chords)
     if repeats.any():
         i = int(np.argmax(repeats))

@@ -91,10 +91,10 @@ def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
     if not is_near.any():
         return limit
     wider = copy.copy(limit)
-    least = np.minimum(limit.lower, values.min(axis=0))
-    most = np.maximum(limit.upper, values.max(axis=0))
-    wider.lower = np.where(is_near, least, limit.lower)
-    wider.upper = np.where(is_near, most, limit.upper)
+    lowest = np.minimum(limit.lower, values.min(axis=0))
+    highest = np.maximum(limit.upper, values.max(axis=0))
+    wider.lower = np.where(is_near, lowest, limit.lower)
+    wider.upper = np.where(is_near, highest, limit.upper)
     return wider
 
 
@@ -115,7 +115,7 @@ def _check_range(
     unit = robot.position_units[i]
     value = float(postures[k, i])
     ends = (float(lower[i]), float(upper[i]))
-    found, first, last = write_apart(value, *ends, digits=6)
+    position, first, last = write_apart(value, *ends, digits=6)
     error: type[InputError] = StartError
     place = ""
     advice = "Change the posture, or the range with"
@@ -127,7 +127,7 @@ def _check_range(
     raise error(
         f"joint {name!r} is out of its range",
         where=where,
-        found=f"{found} {unit}{place}",
+        found=f"{position} {unit}{place}",
         allowed=f"{first} {unit} to {last} {unit}",
         hint=hint or f"{advice} robot.limits.position.{name}",
     )
@@ -158,25 +158,25 @@ def _check_at_rest(
             continue
         worst = int(np.argmax(beyond))
         label = limit.labels[worst]
-        found, allowed = in_figures(limit, worst, float(values[worst]))
+        reached, allowed = in_figures(limit, worst, float(values[worst]))
         remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
-        subjects = [one.subject for one in weak if one is not label]
-        others = name_first(subjects, ", ")
-        more = ""
-        if others:
+        subjects = [weaker.subject for weaker in weak if weaker is not label]
+        further_subjects = name_first(subjects, ", ")
+        likewise = ""
+        if further_subjects:
             # No number for one of several joints is enough.
-            more = f"; likewise {others}"
+            likewise = f"; likewise {further_subjects}"
             remedies = [remedy for remedy in remedies if remedy.key != label.key]
         hint = "Choose another posture"
-        keys = dict.fromkeys(one.key for one in weak if one.key)
-        if keys and label.key not in {one.key for one in remedies}:
+        keys = dict.fromkeys(weaker.key for weaker in weak if weaker.key)
+        if keys and label.key not in {remedy.key for remedy in remedies}:
             hint += f", or change {', '.join(keys)}"
         if limit.role is Role.SCENE:
             hint = _MOVE_BODIES
         raise StartError(
             f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
             where=where,
-            found=f"{found}{label.after} at rest{more}",
+            found=f"{reached}{label.after} at rest{likewise}",
             allowed=f"{allowed}{label.after}",
             hint=hint,
         ).with_remedies(*remedies)
@@ -214,17 +214,17 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
     """
     for limit in limits:
         jumping = {2: "velocity", 3: "acceleration"}[limit.order]
-        asked = f"the {limit.name} limit needs a continuous {jumping}"
+        requirement = f"the {limit.name} limit needs a continuous {jumping}"
         if spline.degree < limit.order:
             raise InputError(
-                asked,
+                requirement,
                 where="spline.degree",
                 found=f"{spline.degree}, with which it jumps at knots",
                 allowed=f">= {limit.order}",
             )
         if spline.vanishing + 1 < limit.order:
             raise InputError(
-                asked,
+                requirement,
                 where="spline.rest",
                 found=f"{spline.rest}, with which it jumps at the ends",
                 allowed="full or jerk",
@@ -235,20 +235,22 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     """Write a value and its bounds in the unit of the value's label, which is left out."""
     bounds = [bound for bound in limit.bounds if bound.column == column]
     if not bounds:
-        found, low, high = write_apart(value, limit.lower[column], limit.upper[column])
-        return found, f"{low} to {high}"
+        written, low, high = write_apart(
+            value, limit.lower[column], limit.upper[column]
+        )
+        return written, f"{low} to {high}"
     first = bounds[0]
     if first.side is None:  # the value is a ratio to one figure
-        found, allowed = write_apart(abs(value) * first.figure, first.figure)
-        return found, allowed
+        written, allowed = write_apart(abs(value) * first.figure, first.figure)
+        return written, allowed
     level = limit.lower[column] if first.side == "lower" else limit.upper[column]
     reached = first.figure + (value - level) / first.per_unit
-    found, *figures = write_apart(reached, *(bound.figure for bound in bounds))
+    written, *figures = write_apart(reached, *(bound.figure for bound in bounds))
     ends = {bound.side: figure for bound, figure in zip(bounds, figures, strict=True)}
     if len(ends) == 2:
-        return found, f"{ends['lower']} to {ends['upper']}"
+        return written, f"{ends['lower']} to {ends['upper']}"
     word = "at least" if first.side == "lower" else "at most"
-    return found, f"{word} {figures[0]}"
+    return written, f"{word} {figures[0]}"
 
 
 def check_regular(
@@ -301,21 +303,21 @@ def check_independent(task_map: TaskMap) -> None:
     together = ", ".join(rows[row] for row in dependent)
     problem = f"no joint changes {together} of the tool"
     left_out = fixed
-    found = f"[{', '.join(rows)}]"
+    stated = f"[{', '.join(rows)}]"
     if not fixed:
         robot = task_map.robot
         sizes = np.abs(jacobians[:, list(dependent)]).max(axis=(0, 1))
         joints = [robot.joint_names[i] for i in np.flatnonzero(sizes > _REGULAR)]
         problem = f"{together} of the tool depend on each other and cannot be prescribed together"
         left_out = [dependent[-1]]
-        found += f", where {together} are moved by {', '.join(joints)}"
-    others = [name for row, name in enumerate(rows) if row not in left_out]
-    is_usual = bool(others) and not {*others} & {*TURN_ROWS}
+        stated += f", where {together} are moved by {', '.join(joints)}"
+    remaining = [name for row, name in enumerate(rows) if row not in left_out]
+    is_usual = bool(remaining) and not {*remaining} & {*TURN_ROWS}
     raise InputError(
         problem,
         where="task_space",
-        found=found,
-        allowed=f"[{', '.join(others)}]" if is_usual else None,
+        found=stated,
+        allowed=f"[{', '.join(remaining)}]" if is_usual else None,
         hint=None if is_usual else _TURNS_ALONE,
     )
 
@@ -336,10 +338,10 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, key: str) ->
     robot = task_map.robot
     solver = match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
-    rest = complement(robot.n, redundant)
+    non_redundant = complement(robot.n, redundant)
     target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
-    gap = difference(answers, posture[rest], robot.revolute[rest])
+    gap = difference(answers, posture[non_redundant], robot.revolute[non_redundant])
     gaps = np.nan_to_num(np.abs(gap).max(axis=2), nan=np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]

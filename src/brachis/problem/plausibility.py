@@ -141,8 +141,8 @@ def _bodies(task: Task) -> Iterator[Issue]:
         yield from _figure("scene", largest, where=f"scene: {body.name}")
     settings = task.collisions
     yield from _figure("collisions", settings.clearance, where="collisions.clearance")
-    for link, more in settings.padding.items():
-        yield from _figure("collisions", more, where=f"collisions.padding.{link}")
+    for link, padding in settings.padding.items():
+        yield from _figure("collisions", padding, where=f"collisions.padding.{link}")
 
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
@@ -175,8 +175,8 @@ def of_postures(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]
         value = float(values[np.argmax(np.abs(values))])
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
         # Neither the path nor an option is a key of a posture.
-        more = f"; in a task file: !degrees {value:.6g}" if "." in key else ""
-        yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, more)
+        advice = f"; in a task file: !degrees {value:.6g}" if "." in key else ""
+        yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, advice)
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
@@ -196,12 +196,12 @@ def _tool(task: Task) -> Iterator[Issue]:
     speed = limits.speed
     values = {
         "speed": speed.speed if isinstance(speed, SpeedTable) else [speed],
-        "process_speed": [part.speed for part in limits.process_speed],
+        "process_speed": [section.speed for section in limits.process_speed],
         "acceleration": [limits.acceleration],
         "angular_speed": [limits.angular_speed],
     }
-    for key, given in values.items():
-        yield from _figure(f"tool_limits.{key}", _largest(given))
+    for key, figures in values.items():
+        yield from _figure(f"tool_limits.{key}", _largest(figures))
     meant = "degrees per second" if task.task_space == "joints" else "mm/s"
     message = f"the speed looks like {meant}"
     for key in ("start_speed", "end_speed"):
@@ -214,7 +214,9 @@ def _tool(task: Task) -> Iterator[Issue]:
 
 def _largest(values: Iterable[float | None]) -> float:
     """Return the largest value; those from 1e5 on are written for "no limit"."""
-    return max((one for one in values if one is not None and one < 1e5), default=0.0)
+    return max(
+        (value for value in values if value is not None and value < 1e5), default=0.0
+    )
 
 
 def _angles(task: Task) -> Iterator[Issue]:
@@ -282,9 +284,9 @@ def _friction(robot: Robot) -> Iterator[Issue]:
         fastest = robot.limits.velocity[i]
         torque = robot.limits.torque[i]
         position_unit = robot.position_units[i]
-        is_kept = damping == robot.friction.viscous[i]
+        is_unchanged = damping == robot.friction.viscous[i]
         is_slow = np.isfinite(torque) and fastest <= FASTEST[position_unit]
-        if is_kept and is_slow and damping * fastest > torque:
+        if is_unchanged and is_slow and damping * fastest > torque:
             unit = UNITS["viscous"][position_unit]
             usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
             where = f"robot.friction.viscous.{robot.joint_names[i]}"
@@ -365,12 +367,12 @@ def check_within_reach(problem: Problem) -> None:
     if not furthest > far * (1.0 + 1e-3):
         return
     beyond = s[away > far]
-    found, most = write_apart(furthest, far)
+    distance, largest = write_apart(furthest, far)
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",
         s_interval=(float(beyond[0]), float(beyond[-1])),
-        found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
-        allowed=f"at most {most} m, which is all links and slides in one line",
+        found=f"{distance} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
+        allowed=f"at most {largest} m, which is all links and slides in one line",
         hint=distance_hint(furthest, far)
         or "Shorten or move the path, or the robot's mounting",
     )
@@ -417,17 +419,17 @@ def _stated(robot: Robot, usual: UsualLimit, joint: int) -> float | None:
 def _largest_usual(robot: Robot, usual: UsualLimit, joint: int) -> float:
     """Return the largest usual limit of a joint."""
     unit = robot.position_units[joint]
-    most = [usual.largest[unit]]
+    candidates = [usual.largest[unit]]
     # What holds the arm's own weight at full reach, Nm.
     holding = pin.computeTotalMass(robot.model) * 9.81 * sum(link_lengths(robot))
     if usual.compares_weight and unit == "rad" and holding > 0.0:
         # Arms hold a tenth to five times their own weight at full reach.
-        most.append(50.0 * holding)
+        candidates.append(50.0 * holding)
     stated = _stated(robot, usual, joint)
     # URDFs state 1 for a limit that nobody knows.
     if stated and stated != 1.0:
-        most.append(max(usual.urdf_factor * stated, usual.urdf_least))
-    return float(min(most))
+        candidates.append(max(usual.urdf_factor * stated, usual.urdf_least))
+    return float(min(candidates))
 
 
 def _ranges(robot: Robot) -> Iterator[Issue]:
@@ -475,10 +477,10 @@ def _curves(robot: Robot) -> Iterator[Issue]:
             continue
         unit = robot.position_units[i]
         last_speed = curve[-1][0]
-        at_rest = curve[0][1] / scale
+        stall_torque = curve[0][1] / scale
         for title, value, kind, usual, aside in (
             ("last speed", last_speed, "velocity", usual_speed, behind_gear),
-            ("torque", at_rest, "torque", usual_torque, ""),
+            ("torque", stall_torque, "torque", usual_torque, ""),
         ):
             yield from issue_above(
                 f"robot.limits.torque_speed.{robot.joint_names[i]}",

@@ -196,8 +196,8 @@ def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     miss = task_map.difference(place, task_map.values(posture[None]))
     if task_map.robot.n < task_map.m or np.abs(miss).max() < 1e-12:
         return posture
-    (found,) = Newton(task_map).nearest(place, posture[None])
-    return found if np.isfinite(found).all() else posture
+    (nearest,) = Newton(task_map).nearest(place, posture[None])
+    return nearest if np.isfinite(nearest).all() else posture
 
 
 @dataclass(frozen=True, repr=False)
@@ -227,10 +227,10 @@ class Decomposition(Summary):
     @property
     def clearance(self) -> float:
         """Least branch margin of the start posture, of the end posture where the start is free; zero without both."""
-        given = self.problem.end if self.problem.start is None else self.problem.start
-        if given is None:
+        posture = self.problem.end if self.problem.start is None else self.problem.start
+        if posture is None:
             return 0.0
-        margins = self.match.solver.branch_margins(given[None], self.branches[0])
+        margins = self.match.solver.branch_margins(posture[None], self.branches[0])
         return float(margins.min(initial=np.inf))
 
     def joint_map(self, start: np.ndarray, branch: int) -> ClosedFormMap:
@@ -302,17 +302,17 @@ def decompositions_of(
     if isinstance(task_map, JointSpace):
         return []
     if task.redundant_joints != "auto":
-        wanted = _with_tool_joints(task_map, task.redundant_joints)
+        names = _with_tool_joints(task_map, task.redundant_joints)
         return [
-            _decomposition(problem, ik.find(robot, task_map, wanted, families=families))
+            _decomposition(problem, ik.find(robot, task_map, names, families=families))
         ]
-    found = ik.find_all(robot, task_map, families=families)
-    matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
-    asked = task.branch != "auto" or task.search.guesses != "lattice"
+    tried = ik.find_all(robot, task_map, families=families)
+    matches = [candidate for candidate in tried if isinstance(candidate, ik.Match)]
+    is_bound = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and robot.n >= task_map.m:
         check_independent(task_map)
-    if not matches and (asked or robot.n < task_map.m):
-        if len(found) <= 1:
+    if not matches and (is_bound or robot.n < task_map.m):
+        if len(tried) <= 1:
             # Nothing to choose: the reasons of the only choice, or the wrong number of joints.
             ik.find(robot, task_map, (), families=families)
         raise DecompositionError(
@@ -320,7 +320,7 @@ def decompositions_of(
             redundant_joints=(),
             reasons={
                 ", ".join(c.redundant_joints): "; ".join(c.reasons.values())
-                for c in found
+                for c in tried
             },
         )
     allowed: list[Decomposition] = []
@@ -330,7 +330,7 @@ def decompositions_of(
             allowed.append(_decomposition(problem, match))
         except (StartError, UnknownNameError) as error:
             refusals.append(error)
-    if refusals and not allowed and (asked or robot.n == task_map.m):
+    if refusals and not allowed and (is_bound or robot.n == task_map.m):
         raise refusals[0]
     if not allowed:
         check_regular(task, task_map, problem.given_postures)
@@ -350,19 +350,21 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     task_map = problem.task_map
     names = problem.robot.joint_names
     redundant = tuple(names.index(name) for name in match.redundant_joints)
-    wanted = problem.task.branch
+    stated_branch = problem.task.branch
     labels = match.solver.branches
-    if wanted != "auto":
-        check_names("branch", [wanted], labels, "branch")
-    branches = tuple(i for i, label in enumerate(labels) if wanted in ("auto", label))
+    if stated_branch != "auto":
+        check_names("branch", [stated_branch], labels, "branch")
+    branches = tuple(
+        i for i, label in enumerate(labels) if stated_branch in ("auto", label)
+    )
     for name, posture in problem.given_postures.items():
         key = problem.task.posture_key(name)
         branch = branch_of(task_map, match, posture, key)
         if branch not in branches:
-            other = "start posture" if wanted == "auto" else "task's branch"
-            leave_out = "end" if wanted == "auto" else "branch"
+            origin = "start posture" if stated_branch == "auto" else "task's branch"
+            leave_out = "end" if stated_branch == "auto" else "branch"
             raise StartError(
-                f"the {name} posture is on another branch than the {other}",
+                f"the {name} posture is on another branch than the {origin}",
                 where=key,
                 found=labels[branch],
                 allowed=labels[branches[0]],

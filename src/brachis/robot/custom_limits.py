@@ -87,7 +87,7 @@ def _make_plugins(task: Task) -> dict[str, LimitModel]:
 
 
 @contextmanager
-def name_failures(where: str, part: str) -> Iterator[None]:
+def name_failures(where: str, method: str) -> Iterator[None]:
     """Say of an exception in the code of a plug-in which part of which limit failed.
 
     An exception in the code of the user's own program, under ``own_limits``, passes as it is.
@@ -103,8 +103,10 @@ def name_failures(where: str, part: str) -> Iterator[None]:
     except Exception as error:
         if not where.startswith(f"{_SECTION}."):
             raise
-        problem = f"the plug-in's {part} failed: {type(error).__name__}: {error}"
-        raise InputError(problem, where=where) from error
+        raise InputError(
+            f"the plug-in's {method} failed: {type(error).__name__}: {error}",
+            where=where,
+        ) from error
 
 
 def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
@@ -119,9 +121,11 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
         with name_failures(where, "bind"):
             limit = model.bind(robot)
     except (TypeError, ValueError) as error:
-        problem = f"the limit cannot be built for this robot: {error}"
-        found = type(model).__name__
-        raise InputError(problem, where=where, found=found) from error
+        raise InputError(
+            f"the limit cannot be built for this robot: {error}",
+            where=where,
+            found=type(model).__name__,
+        ) from error
     if isinstance(limit, type) or not hasattr(limit, "origin"):
         raise InputError(
             "bind did not return a brachis.limits.Limit",
@@ -165,15 +169,16 @@ def check_ratios(
         What the method returns is not finite, or has another shape.
     """
     with name_failures(where, "check"):
-        found = model.check(robot, *motion)
+        ratios = model.check(robot, *motion)
     here = f"{where}.check"
-    if isinstance(found, list):
+    if isinstance(ratios, list):
         try:
-            found = np.array(found)
+            ratios = np.array(ratios)
         except ValueError as error:
-            problem = f"the array has the wrong shape: {error}"
-            raise InputError(problem, where=here) from error
+            raise InputError(
+                f"the array has the wrong shape: {error}", where=here
+            ) from error
     moments = len(motion[0])
-    check_array(found, (moments, size), here, remark=f" for {moments} moments")
-    check_finite(found, here)
-    return np.abs(found)
+    check_array(ratios, (moments, size), here, remark=f" for {moments} moments")
+    check_finite(ratios, here)
+    return np.abs(ratios)

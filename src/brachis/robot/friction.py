@@ -71,17 +71,17 @@ class Friction(Summary):
         terms = {}
         for key, field in FrictionSettings.model_fields.items():
             where = f"robot.friction.{key}"
-            given = per_joint_values(
+            stated = per_joint_values(
                 where, getattr(settings, key), names, field.default
             )
             terms[key] = np.array(
                 [
                     urdf[key][i] if entry == FROM_URDF else entry or 0.0
-                    for i, entry in enumerate(given)
+                    for i, entry in enumerate(stated)
                 ],
                 dtype=float,
             )
-            for name, entry, value in zip(names, given, terms[key], strict=True):
+            for name, entry, value in zip(names, stated, terms[key], strict=True):
                 if not 0.0 <= value <= LARGEST:
                     origin = " in the URDF" if entry == FROM_URDF else ""
                     raise InputError(

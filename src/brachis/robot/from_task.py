@@ -80,9 +80,9 @@ _FRAMES = ("tool_frame", "base_frame", "locked_joints")
 """Settings that decide which joints the chain has."""
 _PER_JOINT: dict[str, object] = {
     **{
-        f"robot.limits.{each.name}": each.default
-        for each in fields(LimitSpec)
-        if each.name in LIMIT_KINDS
+        f"robot.limits.{entry.name}": entry.default
+        for entry in fields(LimitSpec)
+        if entry.name in LIMIT_KINDS
     },
     **{
         f"robot.friction.{kind}": field.default
@@ -114,11 +114,11 @@ def robot_for(
     """
     if not isinstance(robot, Robot):
         return robot_from_settings(settings, urdf=robot)
-    given = _current_settings(robot)
-    wanted = given if settings == given else _combine(robot, given, settings)
-    if wanted == given:
-        return robot if given is robot.settings else replace(robot, settings=given)
-    same = robot_from_settings(given, urdf_text=robot.urdf)
+    current = _current_settings(robot)
+    combined = current if settings == current else _combine(robot, current, settings)
+    if combined == current:
+        return robot if current is robot.settings else replace(robot, settings=current)
+    same = robot_from_settings(current, urdf_text=robot.urdf)
     if robot.tool_joints:
         same = with_tool_joints(same, robot.tool_joints)
     if same.model != robot.model:
@@ -128,7 +128,7 @@ def robot_for(
             found="a model that was changed",
             hint="Remove the robot section of the task, or give the robot by its URDF",
         )
-    return robot_from_settings(wanted, urdf_text=robot.urdf)
+    return robot_from_settings(combined, urdf_text=robot.urdf)
 
 
 def _current_settings(robot: Robot) -> RobotSettings:
@@ -178,17 +178,20 @@ def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
     return FrictionSettings.model_validate(dict(zip(keys, columns, strict=True)))
 
 
-def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotSettings:
+def _combine(
+    robot: Robot, robot_settings: RobotSettings, task_settings: RobotSettings
+) -> RobotSettings:
     """Merge the settings of the robot and of the task; the URDF is the robot's.
 
     In the task a key that is written counts as set, in the robot a value that differs from the default.
     """
-    own = given.model_dump(exclude_defaults=True)
-    written = asked.model_dump(exclude_unset=True, exclude={"urdf"})
-    own_frames, asked_frames = (
-        {key: part[key] for key in _FRAMES if key in part} for part in (own, written)
+    robot_keys = robot_settings.model_dump(exclude_defaults=True)
+    written = task_settings.model_dump(exclude_unset=True, exclude={"urdf"})
+    robot_frames, task_frames = (
+        {key: keys[key] for key in _FRAMES if key in keys}
+        for keys in (robot_keys, written)
     )
-    frames = _merge("robot", own_frames, asked_frames, ())
+    frames = _merge("robot", robot_frames, task_frames, ())
     chain = read_chain(
         robot.urdf,
         robot.source,
@@ -197,13 +200,13 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
         tuple(frames.get("locked_joints", {}).items()),
     )
     if "limits" in written:
-        moving = without_joints(asked.limits, chain.locked)
+        moving = without_joints(task_settings.limits, chain.locked)
         scale = written["limits"]["scale"]
         written["limits"] = without_defaults(moving) | {"scale": scale}
-    return check_robot_settings(_merge("robot", own, written, chain.joint_names))
+    return check_robot_settings(_merge("robot", robot_keys, written, chain.joint_names))
 
 
-def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
+def _merge(key: str, robot_value: Any, task_value: Any, names: Sequence[str]) -> Any:
     """Merge two values: both sides may set different keys or joints, or set the same ones to the same value.
 
     Raises
@@ -211,24 +214,27 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     TaskError
         The two sides differ.
     """
-    if asked == given:
-        return given
-    own, other = given, asked
+    if task_value == robot_value:
+        return robot_value
+    robot_entries, task_entries = robot_value, task_value
     if key in _PER_JOINT:
         absent = _PER_JOINT[key]
-        own, other = (map_by_joint(key, side, names, absent) for side in (own, other))
-    if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
+        robot_entries, task_entries = (
+            map_by_joint(key, side, names, absent)
+            for side in (robot_entries, task_entries)
+        )
+    if not (isinstance(robot_entries, Mapping) and isinstance(task_entries, Mapping)):
         raise TaskError(
             "the task and the robot given with it contradict each other",
             where=key,
-            found=f"{asked} in the task, {given} in the robot",
+            found=f"{task_value} in the task, {robot_value} in the robot",
             allowed="the same in both, or set in one of them",
         )
-    merged = dict(own) | {
-        name: _merge(f"{key}.{name}", own.get(name, value), value, names)
-        for name, value in other.items()
+    merged = dict(robot_entries) | {
+        name: _merge(f"{key}.{name}", robot_entries.get(name, value), value, names)
+        for name, value in task_entries.items()
     }
-    return given if merged == own else merged
+    return robot_value if merged == robot_entries else merged
 
 
 def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
@@ -303,20 +309,22 @@ def _without_limit(robot: Robot, kind: str, motion: np.ndarray | None = None) ->
     is_free = ~np.isfinite(ends).all(axis=0)
     if not is_free.any():
         return ""
-    free = [name for name, own in zip(names, is_free, strict=True) if own]
+    free = [
+        name for name, is_unlimited in zip(names, is_free, strict=True) if is_unlimited
+    ]
     of_some = "" if is_free.all() else f" for {', '.join(free)}"
     text = f"none{of_some} (robot.limits.{kind})"
     if motion is None:
         return text
     largest = np.abs(motion[:, : len(names)]).max(axis=0)
     units = np.array(robot.position_units[: len(names)])
-    found = []
+    figures = []
     for unit, shown in UNITS[kind].items():
         joints = np.flatnonzero(is_free & (units == unit))
         if len(joints):
             joint = joints[np.argmax(largest[joints])]
-            found.append(f"{largest[joint]:.4g} {shown}, of {names[joint]}")
-    return f"{text}; the largest is {', and '.join(found)}"
+            figures.append(f"{largest[joint]:.4g} {shown}, of {names[joint]}")
+    return f"{text}; the largest is {', and '.join(figures)}"
 
 
 def _by_joint(robot: Robot, kind: str) -> str:

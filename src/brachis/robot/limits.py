@@ -17,7 +17,7 @@ from brachis.task import FROM_URDF, LIMIT_KINDS, LimitSpec, check_robot_settings
 from brachis.task.fields import LARGEST, LEAST
 from brachis.task.limit_models import map_by_joint, per_joint_values
 
-Curve = tuple[tuple[float, float], ...]
+TorqueSpeedCurve = tuple[tuple[float, float], ...]
 """Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
 
 FARTHEST = 1e6
@@ -65,7 +65,7 @@ class Limits(_JointArrays, Summary):  # type: ignore[misc]
     """
 
     total_power: float
-    torque_speed: tuple[Curve, ...]
+    torque_speed: tuple[TorqueSpeedCurve, ...]
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
@@ -141,21 +141,22 @@ def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
         A limit has a wrong form or length, or names a joint that is not of the chain.
     """
     by_joint: dict[str, Any] = {}
-    for each in fields(spec):
-        kind = each.name
+    for entry in fields(spec):
+        kind = entry.name
         value = getattr(spec, kind)
         is_list = kind in LIMIT_KINDS and isinstance(value, tuple)
         if is_list or isinstance(value, Mapping):
-            given = _leave_open(value) if kind in LIMIT_KINDS else value
-            stated = map_by_joint(f"robot.limits.{kind}", given, names, FROM_URDF)
-            by_joint[kind] = stated or each.default
+            if kind in LIMIT_KINDS:
+                value = _leave_open(value)
+            stated = map_by_joint(f"robot.limits.{kind}", value, names, FROM_URDF)
+            by_joint[kind] = stated or entry.default
     return check_robot_settings({"limits": replace(spec, **by_joint)}).limits
 
 
 def _leave_open(value: Any) -> Any:
     """Return limits with None for infinite figures."""
     if isinstance(value, Mapping):
-        return {key: _leave_open(own) for key, own in value.items()}
+        return {key: _leave_open(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
         return tuple(map(_leave_open, value))
     return None if isinstance(value, float) and np.isinf(value) else value
@@ -207,8 +208,8 @@ def resolve_limits(
         for name, points in zip(names, listed, strict=True)
     )
     # A torque that falls with speed is at its largest at rest, which is a plain limit.
-    at_rest = np.array([curve[0][1] if curve else np.inf for curve in curves])
-    pairs["torque"] = np.clip(pairs["torque"], -at_rest, at_rest)
+    stall_torques = np.array([curve[0][1] if curve else np.inf for curve in curves])
+    pairs["torque"] = np.clip(pairs["torque"], -stall_torques, stall_torques)
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
     free = [names[i] for i in np.flatnonzero(is_free)]
     if free:
@@ -239,8 +240,10 @@ def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
     changed: dict[str, Any] = {}
     for kind, value in vars(spec).items():
         if isinstance(value, Mapping):
-            kept = {name: limit for name, limit in value.items() if name not in joints}
-            changed[kind] = kept
+            remaining = {
+                name: limit for name, limit in value.items() if name not in joints
+            }
+            changed[kind] = remaining
     return replace(spec, **changed)
 
 
@@ -268,9 +271,9 @@ def _spread_limits(
     key = f"robot.limits.{kind}"
     limits = np.tile([[-np.inf], [np.inf]], len(names))
     listed = per_joint_values(key, value, names, FROM_URDF)
-    for i, (given, known) in enumerate(zip(listed, urdf, strict=True)):
-        ends: Any = given
-        if given == FROM_URDF and kind == "position":
+    for i, (stated, known) in enumerate(zip(listed, urdf, strict=True)):
+        ends: Any = stated
+        if stated == FROM_URDF and kind == "position":
             if known.needs_range:
                 raise LimitError(
                     "the joint has no position range in the URDF",
@@ -279,7 +282,7 @@ def _spread_limits(
                     allowed='<limit lower="..." upper="..." .../>, type="continuous", or a range in the task',
                 )
             ends = (known.lower, known.upper)
-        elif given == FROM_URDF:
+        elif stated == FROM_URDF:
             ends = known.of_kind(kind)
         if isinstance(ends, float):
             ends = (-ends, ends)
@@ -310,11 +313,11 @@ def _scale_limits(
     """Scale limits, (2, n), and refuse figures whose products and squares would not be accurate."""
     with np.errstate(over="ignore"):
         scaled = np.asarray(limits * factor)
-    for own, key in (limits, kind), (scaled, f"scale.{kind}"):
-        sizes = own * [[-1.0], [1.0]]
+    for figures, key in (limits, kind), (scaled, f"scale.{kind}"):
+        sizes = figures * [[-1.0], [1.0]]
         is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))
         for end, i in np.argwhere(is_wrong):
-            word = "scaled " if own is scaled else ""
+            word = "scaled " if figures is scaled else ""
             problem = f"{word}{kind} limit is too small or too large"
             if sizes[end, i] <= 0.0:
                 problem = f"{kind} limit in the URDF is not positive"
@@ -345,26 +348,26 @@ def _resolve_total_power(spec: LimitSpec) -> float:
     return float(scaled)
 
 
-def _resolve_curve(points: Any, joint: str, factor: float) -> Curve:
+def _resolve_curve(points: Any, joint: str, factor: float) -> TorqueSpeedCurve:
     """Check the points (speed, torque) of a joint's curve, and scale its torques."""
     if points is None:
         return ()
     key = f"robot.limits.torque_speed.{joint}"
     speed, torque = np.transpose(points)
-    found = ", ".join(f"[{v:g}, {tau:g}]" for v, tau in points)
+    points_text = ", ".join(f"[{v:g}, {tau:g}]" for v, tau in points)
     ascends = speed[0] == 0.0 and np.all(np.diff(speed) > 0.0)
     if not (ascends and speed[-1] <= LARGEST):
         raise InputError(
             "the speeds do not increase from 0",
             where=key,
-            found=found,
+            found=points_text,
             allowed=f"speeds that begin at 0 and ascend, at most {LARGEST:g}",
         )
     if not LEAST <= torque[0] * factor <= LARGEST:
         raise InputError(
             "the torque at speed 0 is too small or too large",
             where=key,
-            found=found,
+            found=points_text,
             allowed=f"{LEAST:g} to {LARGEST:g} N m (N), also after scaling",
         )
     # The same torque may have been rounded to different figures.
@@ -373,7 +376,7 @@ def _resolve_curve(points: Any, joint: str, factor: float) -> Curve:
         raise InputError(
             "the torque rises with the speed",
             where=f"{key}[{rising[0] + 1}]",
-            found=found,
+            found=points_text,
             allowed="torques that stay or fall from point to point",
             hint="Leave out the points to which it rises; the curve then lies below them",
         )

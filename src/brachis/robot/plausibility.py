@@ -72,11 +72,11 @@ def _join(stem: str, group: list[Issue]) -> Issue:
     """Make one issue of several with the same message below one key."""
     if len(group) == 1:
         return group[0]
-    found = ", ".join(
+    figures = ", ".join(
         f"{issue.where.removeprefix(f'{stem}.')} {issue.found}" for issue in group
     )
     usual = "; ".join(dict.fromkeys(issue.usual for issue in group))
-    return replace(group[0], where=stem or "robot", found=found, usual=usual)
+    return replace(group[0], where=stem or "robot", found=figures, usual=usual)
 
 
 def report_issues(
@@ -148,9 +148,9 @@ def issue_above(
         The figure in words, if it is more than one number.
     """
     if value > usual:
-        found = f"{shown or f'{value:.6g}'} {unit}"
+        figure = f"{shown or f'{value:.6g}'} {unit}"
         allowed = f"below {usual:.3g} {unit}{aside}"
-        yield Issue(where, message, found, allowed, advice)
+        yield Issue(where, message, figure, allowed, advice)
 
 
 def angle_issue(
@@ -243,8 +243,8 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
         return None
     for order in itertools.permutations(range(len(here))):
         if np.abs(here[list(order)] - stated).max() <= _ROUNDED:
-            found = ", ".join(rows[i] for i in order)
-            return f"It looks like the order {found}: the tool is there if they are read so"
+            names = ", ".join(rows[i] for i in order)
+            return f"It looks like the order {names}: the tool is there if they are read so"
     return None
 
 

@@ -45,8 +45,9 @@ def read_posture(
     else:
         is_list = isinstance(joints, Sequence) and not isinstance(joints, str | bytes)
         if not is_list and np.ndim(joints) != 1:
-            found = repr(joints)
-            raise InputError("wrong type", where=where, found=found, allowed=_ALLOWED)
+            raise InputError(
+                "wrong type", where=where, found=repr(joints), allowed=_ALLOWED
+            )
         joints = list(joints)
         is_short = len(joints) == len(names) - len(defaults)
         joints = [*joints, *defaults.values()] if is_short else joints
@@ -59,9 +60,13 @@ def read_posture(
             where=where,
             allowed="a position for each joint",
         )
-    if not all(isinstance(own, Real) and not isinstance(own, bool) for own in values):
-        problem = "a joint position is not a number"
-        raise InputError(problem, where=where, found=values, allowed=_ALLOWED)
+    if not all(isinstance(q_i, Real) and not isinstance(q_i, bool) for q_i in values):
+        raise InputError(
+            "a joint position is not a number",
+            where=where,
+            found=values,
+            allowed=_ALLOWED,
+        )
     q = np.array(values, dtype=float)
     if not np.all(np.abs(q) <= FARTHEST):
         raise InputError(

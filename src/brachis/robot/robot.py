@@ -98,15 +98,14 @@ class Robot(Summary):
     urdf: str
     tool_joints: tuple[ToolJoint, ...] = ()
 
-    def __new__(cls, *given: object, **named_fields: object) -> Self:
+    def __new__(cls, *arguments: object, **named_fields: object) -> Self:
         """Refuse a file name, which is for `from_urdf`."""
-        if given or (named_fields and "model" not in named_fields):
-            allowed = 'brachis.Robot.from_urdf("robot.urdf")'
+        if arguments or (named_fields and "model" not in named_fields):
             raise InputError(
                 "a robot cannot be made from these arguments",
                 where="Robot",
-                found=given or named_fields,
-                allowed=allowed,
+                found=arguments or named_fields,
+                allowed='brachis.Robot.from_urdf("robot.urdf")',
             )
         return super().__new__(cls)
 
@@ -155,13 +154,13 @@ class Robot(Summary):
         UrdfError, UnknownNameError, LimitError, InputError
             TaskError, one of them, where a keyword has a wrong form.
         """
-        given = {key: value for key, value in keywords.items() if value is not None}
-        given["urdf"] = str(Path(path).absolute())
+        content = {key: value for key, value in keywords.items() if value is not None}
+        content["urdf"] = str(Path(path).absolute())
         unchecked = {}
-        if isinstance(given.get("limits"), LimitSpec):
+        if isinstance(content.get("limits"), LimitSpec):
             # It is checked below, where the joints are known.
-            unchecked["limits"] = given.pop("limits")
-        settings = check_robot_settings(given).model_copy(update=unchecked)
+            unchecked["limits"] = content.pop("limits")
+        settings = check_robot_settings(content).model_copy(update=unchecked)
         return cls.from_settings(settings, str(path), urdf_text)
 
     @classmethod
@@ -320,10 +319,10 @@ class Robot(Summary):
         >>> brachis.robots.iiwa14.with_payload(5.0, com=[0, 0, 0.1]).settings.payload
         Payload(mass=5, com=[0, 0, 0.1])
         """
-        given = {"mass": mass, "com": com, "inertia": inertia}
-        asked = check_robot_settings({"payload": None if mass is None else given})
+        payload = {"mass": mass, "com": com, "inertia": inertia}
+        checked = check_robot_settings({"payload": None if mass is None else payload})
         changes = {
-            "payload": asked.payload,
+            "payload": checked.payload,
             "gravity": tuple(self.model.gravity.linear),
         }
         settings = self.settings.model_copy(update=changes)

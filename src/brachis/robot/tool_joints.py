@@ -43,7 +43,7 @@ class ToolJoint:
 
     Attributes
     ----------
-    way : {"roll", "lead", "side", "x", "y", "z"}
+    direction : {"roll", "lead", "side", "x", "y", "z"}
         How it moves the tool.
     lower, upper : float
         Its range, rad or m; infinite where it is free.
@@ -51,7 +51,7 @@ class ToolJoint:
         Key of the task that sets the range.
     """
 
-    way: str
+    direction: str
     lower: float
     upper: float
     key: str
@@ -59,17 +59,17 @@ class ToolJoint:
     @property
     def name(self) -> str:
         """Name of the joint."""
-        return f"tool_{self.way}"
+        return f"tool_{self.direction}"
 
     @property
     def axis(self) -> tuple[float, float, float]:
         """Direction about which it turns, or along which it slides."""
-        return _DIRECTIONS[self.way]
+        return _DIRECTIONS[self.direction]
 
     @property
     def turns(self) -> bool:
         """Whether it turns; it slides otherwise."""
-        return self.way in _TURNING
+        return self.direction in _TURNING
 
     @property
     def is_ranged(self) -> bool:
@@ -90,34 +90,42 @@ def tool_joints_of(
     A cone is as wide in lead and side, a sphere, or a box in the world's axes, as large along all axes. Ranges that are
     not asked for are a little wider, so that the cone, sphere or box itself is the limit.
     """
-    given = tolerances or Tolerances()
+    tolerances = tolerances or Tolerances()
     ranges: dict[str, _Range] = {}
-    for way in _DIRECTIONS:
-        part = "orientation" if way in _TURNING else "position"
-        ends = getattr(getattr(given, part), way)
+    for direction in _DIRECTIONS:
+        kind = "orientation" if direction in _TURNING else "position"
+        ends = getattr(getattr(tolerances, kind), direction)
         if ends == "free":
-            ranges[way] = _FREE
+            ranges[direction] = _FREE
         elif ends is not None:
-            low, high = map(math.radians, ends) if way in _TURNING else ends
-            ranges[way] = (low, high, f"tolerances.{part}.{way}")
-    if given.position.axes == "world":
+            low, high = map(math.radians, ends) if direction in _TURNING else ends
+            ranges[direction] = (low, high, f"tolerances.{kind}.{direction}")
+    if tolerances.position.axes == "world":
         reach = math.hypot(*(max(map(abs, ranges[axis][:2])) for axis in POSITION))
         for axis in POSITION:
             ranges[axis] = _within(None, reach, ranges[axis][2])
-    cone = math.radians(given.orientation.tilt or math.inf)
-    for reach, key, ways in (
+    cone = math.radians(tolerances.orientation.tilt or math.inf)
+    for reach, key, directions in (
         (cone, "tolerances.orientation.tilt", ("lead", "side")),
-        (given.position.sphere or math.inf, "tolerances.position.sphere", POSITION),
+        (
+            tolerances.position.sphere or math.inf,
+            "tolerances.position.sphere",
+            POSITION,
+        ),
     ):
-        for way in ways if reach < math.inf else ():
-            ranges[way] = _within(ranges.get(way), reach, key)
+        for direction in directions if reach < math.inf else ():
+            ranges[direction] = _within(ranges.get(direction), reach, key)
     if rolls_freely(space):
         ranges["roll"] = _FREE
-    return tuple(ToolJoint(way, *ranges[way]) for way in _DIRECTIONS if way in ranges)
+    return tuple(
+        ToolJoint(direction, *ranges[direction])
+        for direction in _DIRECTIONS
+        if direction in ranges
+    )
 
 
-def _within(given: _Range | None, reach: float, key: str) -> _Range:
+def _within(ends: _Range | None, reach: float, key: str) -> _Range:
     """Cut a range down to a little more than both sides of zero; without one, `key` is what sets it."""
     wide = 1.01 * reach
-    low, high, own_key = given or (-wide, wide, key)
+    low, high, own_key = ends or (-wide, wide, key)
     return max(low, -wide), min(high, wide), own_key

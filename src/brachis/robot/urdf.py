@@ -180,7 +180,7 @@ def read_chain(
     UnknownNameError
         A frame or joint does not exist.
     """
-    given = dict(locked_joints)
+    positions = dict(locked_joints)
     tree = read_tree(text, where)
     for key, frame in (("tool_frame", tool_frame), ("base_frame", base_frame)):
         if frame is not None:
@@ -198,17 +198,17 @@ def read_chain(
     path = _joints_between(tree, base, tool, where)
     joints = tree.joints.items()
     movable = [name for name, joint in joints if joint.get("type") != "fixed"]
-    check_names("moving joint", given, movable, f"{where}: locked_joints")
-    for name, position in given.items():
+    check_names("moving joint", positions, movable, f"{where}: locked_joints")
+    for name, position in positions.items():
         _check_locked_position(tree.joints[name], name, position)
-    chain = tuple(name for name in path if name in movable and name not in given)
+    chain = tuple(name for name in path if name in movable and name not in positions)
     _check_joints(tree, path, chain, where)
     if not chain:
         raise UrdfError(
             "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
         )
     still = [name for name in movable if name not in chain]
-    locked = _lock(tree, still, given, where)
+    locked = _lock(tree, still, positions, where)
     dynamics = read_dynamics(tree, chain, locked, tool)
     check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
@@ -229,14 +229,14 @@ def _check_locked_position(joint: Element, name: str, position: float) -> None:
 
 
 def _lock(
-    tree: UrdfTree, names: Sequence[str], given: Mapping[str, float], where: str
+    tree: UrdfTree, names: Sequence[str], positions: Mapping[str, float], where: str
 ) -> dict[str, float]:
     """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else nearest to 0.
 
     What a joint mimics may put it beyond its own range, as the file says.
     """
     locked = {
-        name: float(given.get(name, _clip_to_range(tree.joints[name], 0.0)))
+        name: float(positions.get(name, _clip_to_range(tree.joints[name], 0.0)))
         for name in names
     }
     leaders = {name: _leader_of(tree.joints[name]) for name in names}
@@ -257,13 +257,13 @@ def _lock(
         multiplier = number_of(joint, "mimic", "multiplier", 1.0)
         offset = number_of(joint, "mimic", "offset", 0.0)
         position = multiplier * locked[leader] + offset
-        if name in given and abs(given[name] - position) > tolerances.ANGLE:
+        if name in positions and abs(positions[name] - position) > tolerances.ANGLE:
             unit = _unit_of(joint)
             raise UrdfError(
                 f"joint {name!r} mimics {leader!r}, which is locked at "
                 f"{locked[leader]:g} {_unit_of(tree.joints[leader])}",
                 where=f"robot.locked_joints.{name}",
-                found=f"{given[name]:g} {unit}",
+                found=f"{positions[name]:g} {unit}",
                 allowed=f"{position:g} {unit}",
                 hint=f"Leave {name} out, or lock {leader} where {name} needs it",
             )
@@ -373,13 +373,13 @@ def _plain_xml(tree: UrdfTree) -> str:
 def _copy_parts(owner: Element, *tags: str) -> list[Element]:
     """Copy parts of a checked link or joint, with its numbers as Python writes them."""
     attributes = {entry.attribute for kind in ENTRIES.values() for entry in kind}
-    parts = [copy.deepcopy(part) for part in owner if part.tag in tags]
-    for part in parts:
-        for element in part.iter(etree.Element):
+    children = [copy.deepcopy(child) for child in owner if child.tag in tags]
+    for child in children:
+        for element in child.iter(etree.Element):
             for key in attributes & set(element.keys()):
                 numbers = map(float, element.get(key).split())
                 element.set(key, " ".join(map(str, numbers)))
-    return parts
+    return children
 
 
 @dataclass(frozen=True)
@@ -419,21 +419,23 @@ def default_chain(text: str, where: str) -> DefaultChain:
     chains = {
         leaf: _joints_between(tree, tree.root, leaf, where) for leaf in _leaves(tree)
     }
-    most = max(count_moving(chain) for chain in chains.values())
-    if not most:
+    most_joints = max(count_moving(chain) for chain in chains.values())
+    if not most_joints:
         raise UrdfError(
             "no joint moves", where=where, found=f"chains to {', '.join(chains)}"
         )
-    longest = [chain for chain in chains.values() if count_moving(chain) == most]
+    longest = [chain for chain in chains.values() if count_moving(chain) == most_joints]
     limb = {}
     for leaf, chain in chains.items():
         # What parts from the limb in its upper half, and moves there, is a branch of it; frames are not fingers.
         shared = count_moving(_common_beginning([longest[0], chain]))
-        if 2 * shared >= most and (count_moving(chain) > shared or shared == most):
+        if 2 * shared >= most_joints and (
+            count_moving(chain) > shared or shared == most_joints
+        ):
             limb[leaf] = chain
     trunk = _common_beginning(longest)
-    parts = trunk and 2 * count_moving(trunk) < most
-    base = end_of(tree.joints[trunk[-1]], "child") if parts else None
+    has_trunk = trunk and 2 * count_moving(trunk) < most_joints
+    base = end_of(tree.joints[trunk[-1]], "child") if has_trunk else None
     last_joint = _common_beginning(limb.values())[-1]
     return DefaultChain(base, end_of(tree.joints[last_joint], "child"), tuple(limb))
 

@@ -107,7 +107,7 @@ def read_dynamics(
     in_order = {link: carried[link] for link in tree.links}
     bodies = []
     for i, name in enumerate(chain, 1):
-        links = {link: placed for link, (own, placed) in in_order.items() if own == i}
+        links = {link: placed for link, (body, placed) in in_order.items() if body == i}
         bodies.append(_read_body(tree, name, befores[name], links))
     friction = {
         kind: np.array(
@@ -200,11 +200,11 @@ def check_inertia(
     moments = np.linalg.eigvalsh(matrix)
     slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
     if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
-        found = ", ".join(f"{moment:.4g}" for moment in moments)
+        moments_text = ", ".join(f"{moment:.4g}" for moment in moments)
         raise error(
             problem,
             where=where,
-            found=f"principal moments {found} kg m^2",
+            found=f"principal moments {moments_text} kg m^2",
             allowed="moments >= 0, none above the sum of the other two, about the centre of mass",
             hint=hint,
         )

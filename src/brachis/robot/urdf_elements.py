@@ -91,9 +91,9 @@ def read_tree(text: str, where: str) -> UrdfTree:
 def _place_of(element: Element, where: str) -> str:
     """Return where an element is: the file, its line, and the link or joint that it is part of."""
     place = f"{where}, line {element.sourceline}"
-    for each in (element, *element.iterancestors()):
-        if each.tag in ("link", "joint"):
-            return f"{place}: {each.tag} {each.get('name')!r}"
+    for ancestor in (element, *element.iterancestors()):
+        if ancestor.tag in ("link", "joint"):
+            return f"{place}: {ancestor.tag} {ancestor.get('name')!r}"
     return place
 
 
@@ -154,8 +154,9 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     for element in robot.findall(kind):
         name = element.get("name")
         if not name:
-            place = f"{where}, line {element.sourceline}"
-            raise UrdfError(f"a <{kind}> has no name", where=place)
+            raise UrdfError(
+                f"a <{kind}> has no name", where=f"{where}, line {element.sourceline}"
+            )
         if name in named:
             repeated[name] = None
         named[name] = element

@@ -42,10 +42,10 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     folder = Path(robot.source).absolute().parent
     tree = read_tree(robot.urdf, robot.source)
     check_names("link", settings.padding, tree.links, "collisions.padding")
-    own = list(read_solids(tree, folder, settings.padding))
-    if not own and settings.capsules == "auto":
-        own = list(build_capsules(tree, settings.padding))
-    if not own:
+    robot_solids = list(read_solids(tree, folder, settings.padding))
+    if not robot_solids and settings.capsules == "auto":
+        robot_solids = list(build_capsules(tree, settings.padding))
+    if not robot_solids:
         raise TaskError(
             "the robot has no collision geometry",
             where="scene",
@@ -53,7 +53,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
             allowed="a URDF with <collision> elements",
             hint="Add them, or set collisions.capsules: auto, or collisions.mode: off",
         )
-    solids = list(own)
+    solids = list(robot_solids)
     for body in task.scene:
         frame = placement_matrix(place_frame(task.frames, body.frame))
         solids += build_solids(body, frame)
@@ -78,8 +78,8 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     check_names("link or body", listed, known, "collisions.disable")
     disabled = {*map(frozenset, [*settings.disable, *_read_srdf(settings.srdf)])}
     # The robot's own solids have the names of their links, too; bodies of the scene only their own.
-    names = [{solid.name, solid.link} for solid in own]
-    names += [{solid.name} for solid in solids[len(own) :]]
+    names = [{solid.name, solid.link} for solid in robot_solids]
+    names += [{solid.name} for solid in solids[len(robot_solids) :]]
     pairs = [
         (first, second)
         for first, second in itertools.combinations(range(len(solids)), 2)
@@ -91,7 +91,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     ]
     check_most(len(pairs), _MOST_PAIRS, "pairs that keep apart", problem, "scene", hint)
     numbers = np.reshape(pairs, (-1, 2)).astype(int)
-    scene = Scene(tuple(solids), joints, placements, numbers, len(own))
+    scene = Scene(tuple(solids), joints, placements, numbers, len(robot_solids))
     return scene.with_pairs(_find_hazards(scene, robot, tree, task))
 
 
@@ -100,7 +100,7 @@ def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.
 
     Links that a joint joins may touch, and so may those that overlap in every one of many random postures.
     """
-    is_within = scene.pairs[:, 1] < scene.own  # the robot's solids come first
+    is_within = scene.pairs[:, 1] < scene.robot_count  # the robot's solids come first
     is_hazard = ~is_within
     if not task.collisions.self_collision:
         return is_hazard
@@ -150,7 +150,8 @@ def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:
     try:
         root = etree.fromstring(text.encode())
     except etree.XMLSyntaxError as error:
-        problem = "the SRDF file is not XML"
-        raise TaskError(problem, where=where, found=str(error)) from error
-    found = root.iter("disable_collisions")
-    return [(each.get("link1"), each.get("link2")) for each in found]
+        raise TaskError(
+            "the SRDF file is not XML", where=where, found=str(error)
+        ) from error
+    elements = root.iter("disable_collisions")
+    return [(element.get("link1"), element.get("link2")) for element in elements]

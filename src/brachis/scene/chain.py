@@ -53,8 +53,8 @@ class Chain:
             if self.revolute[j]:
                 skew = pin.skew(self.axes[j])
                 sine = np.sin(q[:, j])[:, None, None]
-                rest = (1.0 - np.cos(q[:, j]))[:, None, None]
-                turned = turned @ (np.eye(3) + sine * skew + rest * (skew @ skew))
+                versine = (1.0 - np.cos(q[:, j]))[:, None, None]
+                turned = turned @ (np.eye(3) + sine * skew + versine * (skew @ skew))
             else:
                 origin = origin + (turned @ self.axes[j]) * q[:, j, None]
             rotations[:, j + 1] = turned

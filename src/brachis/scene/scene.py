@@ -58,7 +58,7 @@ class Scene:
     placements : (S, 4, 4) ndarray
         Of each in the frame of its joint, or in the world.
     pairs : (P, 2) int ndarray
-    own : int
+    robot_count : int
         How many of the solids, in front, are the robot's own.
     """
 
@@ -66,7 +66,7 @@ class Scene:
     joints: np.ndarray
     placements: np.ndarray
     pairs: np.ndarray
-    own: int
+    robot_count: int
 
     def names(self, pair: int) -> str:
         """Name both solids of a pair."""
@@ -114,10 +114,10 @@ class Scene:
         bounds = apart - radii[first] - radii[second]
         for number in half_spaces:
             plane = self.solids[number].geometry
-            for mine, other in ((first, second), (second, first)):
-                own = np.flatnonzero(mine == number)
-                height = centres[:, other[own]] @ plane.n - plane.d
-                bounds[:, own] = height - radii[other[own]]
+            for mine, partner in ((first, second), (second, first)):
+                plane_pairs = np.flatnonzero(mine == number)
+                height = centres[:, partner[plane_pairs]] @ plane.n - plane.d
+                bounds[:, plane_pairs] = height - radii[partner[plane_pairs]]
         return bounds
 
     @cached_property
@@ -140,20 +140,20 @@ class Scene:
     def find_close(self, placed: Placed, within: float) -> ClosePairs:
         """Find the pairs that are closer than `within`, m, where the joints are placed so."""
         posture, pair = np.nonzero(self.bounds(placed) < within)
-        kept = self._gaps(placed, posture, pair) < within
-        found = self.measure(placed, posture[kept], pair[kept])
-        return found.only(found.distance < within)
+        is_close = self._gaps(placed, posture, pair) < within
+        close = self.measure(placed, posture[is_close], pair[is_close])
+        return close.only(close.distance < within)
 
     def find_closest(self, placed: Placed) -> ClosePairs:
         """Find the pair in each posture that is closest."""
         bounds = self.bounds(placed)
         every = np.arange(len(bounds))
-        one = self.measure(placed, every, bounds.argmin(axis=1))
-        posture, pair = np.nonzero(bounds <= one.distance[:, None])
-        found = self.measure(placed, posture, pair)
-        order = np.lexsort((found.distance, found.posture))
-        first = np.unique(found.posture[order], return_index=True)[1]
-        return found.only(order[first])
+        estimate = self.measure(placed, every, bounds.argmin(axis=1))
+        posture, pair = np.nonzero(bounds <= estimate.distance[:, None])
+        close = self.measure(placed, posture, pair)
+        order = np.lexsort((close.distance, close.posture))
+        first = np.unique(close.posture[order], return_index=True)[1]
+        return close.only(order[first])
 
     def _gaps(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
@@ -172,9 +172,9 @@ class Scene:
                 halves[second] + np.einsum("mij,mi->mj", across, halves[first]),
             )
             gaps = [
-                np.abs(np.einsum("mij,mi->mj", own, apart))
+                np.abs(np.einsum("mij,mi->mj", box_axes, apart))
                 - np.nan_to_num(side, nan=np.inf)
-                for own, side in zip(axes, sides, strict=True)
+                for box_axes, side in zip(axes, sides, strict=True)
             ]
         return np.maximum(*gaps).max(axis=1)
 

@@ -146,14 +146,16 @@ def read_solids(
         A shape cannot be read.
     """
     for name, link in tree.links.items():
-        found = link.findall("collision")
-        for number, collision in enumerate(found):
-            label = f"{name} {number}" if len(found) > 1 else name
+        collisions = link.findall("collision")
+        for number, collision in enumerate(collisions):
+            label = f"{name} {number}" if len(collisions) > 1 else name
             try:
                 geometry = _geometry(collision, folder)
             except (InputError, ValueError) as error:
-                problem = f"the collision geometry cannot be read: {error}"
-                raise UrdfError(problem, where=f"link {name!r}") from error
+                raise UrdfError(
+                    f"the collision geometry cannot be read: {error}",
+                    where=f"link {name!r}",
+                ) from error
             placement = origin_of(collision, "origin")
             yield Solid(label, name, geometry, placement, padding.get(name, 0.0))
 
@@ -182,7 +184,11 @@ def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Sol
 def _geometry(collision: Element, folder: Path) -> Geometry:
     """Read a ``<collision>``."""
     known = (*_SHAPES, "mesh")
-    shapes = [each for each in collision.iterfind("geometry[1]/*") if each.tag in known]
+    shapes = [
+        element
+        for element in collision.iterfind("geometry[1]/*")
+        if element.tag in known
+    ]
     if len(shapes) != 1:
         raise InputError(
             "<geometry> must contain exactly one known shape",
@@ -213,16 +219,16 @@ def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[fl
     """Read so many lengths from attributes."""
     words = " ".join(shape.get(attribute, "") for attribute in attributes).split()
     try:
-        found = [float(word) for word in words]
+        lengths = [float(word) for word in words]
     except ValueError:
-        found = []
-    if len(found) != count or not all(0.0 < length < np.inf for length in found):
+        lengths = []
+    if len(lengths) != count or not all(0.0 < length < np.inf for length in lengths):
         raise InputError(
             f"<{shape.tag}> is wrong",
             found=" ".join(words) or "nothing",
             allowed=f"{count} numbers > 0, m, under {' and '.join(attributes)}",
         )
-    return found
+    return lengths
 
 
 def _check_size(geometry: Geometry, where: str, padding: float = 0.0) -> None:

@@ -189,7 +189,7 @@ def _sample_postures(
     if not opened:
         q_r[0] = np.clip(near, low, high)[redundant]
     targets = decomposition.problem.path.sample(s).target
-    parts = []
+    postures = []
     # No more than 20,000 postures at once, so that the deadline is noticed.
     for block in np.array_split(targets, min(len(s), -(-len(s) * tries // 20_000))):
         if deadline.passed:
@@ -197,8 +197,8 @@ def _sample_postures(
         repeated = np.repeat(block, tries, axis=0)
         q = solve_all(decomposition, repeated, np.tile(q_r, (len(block), 1)))
         q = q.reshape(len(block), tries, *q.shape[1:])
-        parts.append(in_turn_of(q, 0.5 * (low + high), robot.revolute))
-    return np.concatenate(parts)
+        postures.append(in_turn_of(q, 0.5 * (low + high), robot.revolute))
+    return np.concatenate(postures)
 
 
 def _describe_nearest(robot: Robot, q: np.ndarray) -> str:

@@ -33,7 +33,7 @@ from brachis.search.guesses import FAMILY, bring_onto_path
 from brachis.search.joint_choice import SELECTABLE
 from brachis.search.least_motion import LeastMotion
 from brachis.search.schedule import has_charts
-from brachis.search.stages import FinishedCandidate, InitialGuess, PathMap
+from brachis.search.stages import FinishedCandidate, InitialGuess, SearchMap
 from brachis.task import Posture, Task, Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
@@ -82,13 +82,13 @@ def given_guess(
     passed = np.clip(motion.path_coordinate(t), 0.0, 1.0)
     ends = np.concatenate([[0.0], np.interp(splits, passed, t), [motion.t_end]])
     times = [np.linspace(*pair, 401) for pair in itertools.pairwise(ends)]
-    parts = []
+    s_by_leg = []
     for leg, leg_times in zip(problem.legs, times, strict=True):
         s = np.clip(motion.path_coordinate(leg_times), leg.begin, leg.end)
         s[[0, -1]] = [leg.begin, leg.end]
-        parts.append(s)
+        s_by_leg.append(s)
     t = np.concatenate(times)
-    s = np.concatenate(parts)
+    s = np.concatenate(s_by_leg)
     joint_map, curves, family = _in_coordinates(
         problem, decompositions, motion, s, _positions(problem, motion, t)
     )
@@ -242,7 +242,7 @@ def _in_coordinates(
     motion: Trajectory,
     s: np.ndarray,
     q: np.ndarray,
-) -> tuple[PathMap, np.ndarray, str]:
+) -> tuple[SearchMap, np.ndarray, str]:
     """Joint map, its curves (S, 1 + r), and family, for path coordinates (S,) and postures (S, n)."""
     if isinstance(problem.task_map, JointSpace):
         return JointSpaceMap(problem.robot, problem.path), s[:, None], FAMILY

@@ -144,7 +144,7 @@ def _explain_loads(
         for remedy in load_remedies(robot, load.limit, load.column, load.mean):
             earlier = remedies.get(remedy.key, remedy)
             remedies[remedy.key] = max(
-                earlier, remedy, key=lambda change: abs(change.guess - change.asked)
+                earlier, remedy, key=lambda change: abs(change.guess - change.current)
             )
     error = PlanningError(
         cause,

@@ -89,11 +89,11 @@ def move_to_chart(
         maps = maps_by_leg(problem, chart, starts)
         grids = [phase.grid for phase in solved.program.phases]
         program = program_over(problem, maps, grids)
-        parts = []
+        x_by_phase = []
         for phase, (t_end, t_norm, state) in zip(program.phases, dense, strict=True):
             curves = chart.curves(state.s, state.q)
-            parts.append(fit_curves(phase, t_end, t_norm, curves))
-        return program, shortest_time(program, np.concatenate(parts))
+            x_by_phase.append(fit_curves(phase, t_end, t_norm, curves))
+        return program, shortest_time(program, np.concatenate(x_by_phase))
     except UnreachableError:
         return None
 

@@ -74,8 +74,8 @@ def fastest_times(
         that cannot be passed.
     """
     timed_legs = []
-    parts = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
-    for leg, rates, law in parts:
+    legs = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
+    for leg, rates, law in legs:
         plane = phase_plane_on(problem, leg, s, q)
         times: np.ndarray | None
         if law is None:

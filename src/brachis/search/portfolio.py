@@ -352,26 +352,26 @@ class Search:
 
     def list_unfinished_work(self) -> tuple[str, ...]:
         """Say in plain words what was not completed."""
-        parts = []
+        notes = []
         best = self.best
         if best is not None and self._given_motion and best.origin != GIVEN:
-            parts.append(
+            notes.append(
                 f"the plan does not start from the given motion: {self._given_motion}; it was searched for as usual"
             )
         if best is not None and best.not_completed:
-            parts.append(best.not_completed)
+            notes.append(best.not_completed)
         if not self.interrupted:
-            return tuple(parts)
+            return tuple(notes)
         if self._unfinished_lattices:
             names = name_first(list(self._unfinished_lattices), " | ")
-            parts.append(f"the lattice of {names} was not searched completely")
+            notes.append(f"the lattice of {names} was not searched completely")
         untried = sum(candidate.status == NOT_TRIED for candidate in self.candidates)
         counts = {"tried": untried, "finished": len(self._waiting)}
         unfinished = [f"{n} not {what}" for what, n in counts.items() if n]
         if unfinished:
             total = write_count(len(self.candidates), "candidate")
-            parts.append(f"of {total} {', '.join(unfinished)}")
-        return (*parts, "the search that search.effort requires was not completed")
+            notes.append(f"of {total} {', '.join(unfinished)}")
+        return (*notes, "the search that search.effort requires was not completed")
 
     def in_order(self) -> tuple[Candidate, ...]:
         """All candidates, the fastest verified one first, without their programs."""

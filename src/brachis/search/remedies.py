@@ -124,7 +124,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
         return ""
     verified = "(a plan with it was verified"
     # Quick trials may miss a plan: only after a whole search the message says that it found none.
-    if bad != remedy.asked and not deadline.passed:
+    if bad != remedy.current and not deadline.passed:
         outcome = is_enough(bad, None)
         if outcome:
             good = bad
@@ -138,10 +138,10 @@ def _bracket(
 ) -> tuple[float | None, float]:
     """Find the smallest change known to be enough, None without any, and the largest one that is not."""
     # Numbers are rounded towards the larger change.
-    lowers = remedy.guess < remedy.asked
+    lowers = remedy.guess < remedy.current
     away = -1.0 if lowers else 1.0
     good = None
-    bad = remedy.asked
+    bad = remedy.current
     step = _NEAR
     value = round_to_three_digits(remedy.guess, down=lowers)
     for _ in range(_TRIALS):
@@ -149,7 +149,7 @@ def _bracket(
             break
         if is_enough(value, 1):
             good = value
-            if remedy.is_known and bad == remedy.asked:
+            if remedy.is_known and bad == remedy.current:
                 break
         else:
             bad = value
@@ -160,7 +160,7 @@ def _bracket(
         else:
             value = math.sqrt(good * bad)
             back = good / step**away
-            if bad == remedy.asked and abs(back - good) < abs(value - good):
+            if bad == remedy.current and abs(back - good) < abs(value - good):
                 value = back
         value = round_to_three_digits(value, down=lowers)
         # While all numbers are enough, or none, the steps grow.

@@ -79,9 +79,9 @@ def _free_share(guesses: Sequence[InitialGuess]) -> float:
     """Part of the least time that is not given: no more can be gained."""
     problem = guesses[0].problem
     durations = [law.duration for law in problem.time_laws if law is not None]
-    given = sum(durations) + problem.dwell_time
+    fixed_time = sum(durations) + problem.dwell_time
     least = min(guess.estimate for guess in guesses)
-    return 1.0 - given / least if np.isfinite(least) else 1.0
+    return 1.0 - fixed_time / least if np.isfinite(least) else 1.0
 
 
 def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[InitialGuess]:
@@ -138,9 +138,9 @@ def _improve_in_parallel(
             is_near = [
                 guess.estimate <= _NEAR_LEAST * least < np.inf for guess in solved
             ]
-            kept = _count_worthwhile(count, solved)
-            is_enough = sum(is_near) >= spare * kept
-            if is_enough or len(solved) >= _MOST * kept:
+            worthwhile = _count_worthwhile(count, solved)
+            is_enough = sum(is_near) >= spare * worthwhile
+            if is_enough or len(solved) >= _MOST * worthwhile:
                 break
     return solved
 

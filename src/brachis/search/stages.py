@@ -34,7 +34,7 @@ SLOW = "not refined: no faster than another over as many knots"
 """Status of a candidate that does not beat the best one before refinement."""
 NO_TIMING = "the limits allow no timing"
 """Status of a candidate whose joint path cannot be followed within the limits."""
-PathMap = ClosedFormMap | ChartMap | JointSpaceMap
+SearchMap = ClosedFormMap | ChartMap | JointSpaceMap
 """Joint maps along a path."""
 
 
@@ -81,7 +81,7 @@ class InitialGuess(Summary):
     """
 
     problem: Problem
-    joint_map: PathMap
+    joint_map: SearchMap
     joint_path: np.ndarray
     estimate: float
     origin: str
@@ -97,19 +97,19 @@ class InitialGuess(Summary):
         if self.durations is not None or len(legs) == 1:
             return np.split(self.joint_path, len(legs))
         s = self.joint_path[:, 0]
-        parts = []
+        curves_by_leg = []
         for leg in legs:
             stations = cut(s, leg.begin, leg.end)
-            parts.append(interpolate_columns(stations, s, self.joint_path))
-        return parts
+            curves_by_leg.append(interpolate_columns(stations, s, self.joint_path))
+        return curves_by_leg
 
     def maps_by_leg(self) -> list[JointMap]:
         """Take the joint map leg by leg; raise UnreachableError where the joint path leaves it."""
-        parts = self.legs
-        if len(parts) == 1:
+        legs = self.legs
+        if len(legs) == 1:
             return [self.joint_map]
-        q = self.joint_map.postures(np.concatenate(parts))
-        begins = np.cumsum([0, *(len(curves) for curves in parts[:-1])])
+        q = self.joint_map.postures(np.concatenate(legs))
+        begins = np.cumsum([0, *(len(curves) for curves in legs[:-1])])
         if not np.isfinite(q).all():
             raise UnreachableError("the joint path leaves the branch, or the chart")
         return maps_by_leg(self.problem, self.joint_map, q[begins])

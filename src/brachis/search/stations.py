@@ -74,12 +74,12 @@ def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
 def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
     """Spread about so many path coordinates, (S,), over the legs, the ends of the legs among them."""
     s, steps = measure(problem.path, problem.task_map)
-    parts = [np.zeros(1)]
+    s_by_leg = [np.zeros(1)]
     for leg in problem.legs:
         first, last = np.interp([leg.begin, leg.end], s, steps)
         least = min(count, _LEAST_STATIONS)
         share = (last - first) / steps[-1]
         on_leg = max(least, math.ceil((count - 1) * share - 1e-6) + 1)
         inner = np.interp(np.linspace(first, last, on_leg)[1:-1], steps, s)
-        parts.append(np.append(inner, leg.end))
-    return np.concatenate(parts)
+        s_by_leg.append(np.append(inner, leg.end))
+    return np.concatenate(s_by_leg)

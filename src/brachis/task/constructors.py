@@ -35,9 +35,9 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
     name = kind.capitalize()
     shapes: list[Any] = [*models_in(model.model_fields[kind].annotation)]
     fields = {
-        key: describe_fields(part).get(key, "")
-        for part in (*shapes, model)
-        for key in part.model_fields
+        key: describe_fields(owner).get(key, "")
+        for owner in (*shapes, model)
+        for key in owner.model_fields
         if key != kind
     }
     needed = required_keys(shapes[0]) if len(shapes) == 1 else ()
@@ -56,9 +56,11 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
     def make(*args: Any, **keys: Any) -> _S:
         """Make the segment from positional and named values."""
         bound = signature.bind(*args, **keys).arguments
-        given = {key: value for key, value in bound.items() if value is not None}
-        beside = {key: given.pop(key) for key in model.model_fields if key in given}
-        return validate(model, {kind: given, **beside}, name)
+        shape_keys = {key: value for key, value in bound.items() if value is not None}
+        beside = {
+            key: shape_keys.pop(key) for key in model.model_fields if key in shape_keys
+        }
+        return validate(model, {kind: shape_keys, **beside}, name)
 
     described = [
         f"{key} : {'required' if key in needed else 'optional'}\n    {description}"

@@ -125,20 +125,20 @@ class CheckedModel(Model):
     @model_validator(mode="after")
     def _refuse_mistakes(self) -> Self:
         for key, problem, allowed in self._mistakes():
-            found: Any = self
-            for part in re.findall(r"\w+", key):
-                found = found[int(part)] if part.isdecimal() else getattr(found, part)
-            raise refuse(problem, key=key, found=found, allowed=allowed)
+            value: Any = self
+            for step in re.findall(r"\w+", key):
+                value = value[int(step)] if step.isdecimal() else getattr(value, step)
+            raise refuse(problem, key=key, found=value, allowed=allowed)
         return self
 
 
 def describe_fields(model: type) -> dict[str, str]:
     """Return the description of every field of a model or dataclass: from `Field`, else from the docstring below it."""
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for base in model.__mro__[::-1]:
-        found |= _docstrings_in(base.__module__).get(base.__name__, {})
+        descriptions |= _docstrings_in(base.__module__).get(base.__name__, {})
     fields = getattr(model, "model_fields", {}).items()
-    return found | {
+    return descriptions | {
         name: field.description for name, field in fields if field.description
     }
 
@@ -154,7 +154,7 @@ def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
         return {}
     tree = ast.parse(source)
     classes = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
-    return {own.name: dict(_docstrings_of(own)) for own in classes}
+    return {definition.name: dict(_docstrings_of(definition)) for definition in classes}
 
 
 def _docstrings_of(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
@@ -261,9 +261,9 @@ def plain(
         if names and all(isinstance(name, str) for name in names):
             value = dict(zip(names, value, strict=True))
     if isinstance(value, Mapping):
-        return {key: plain(one, sequence) for key, one in value.items()}
+        return {key: plain(item, sequence) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return sequence(plain(one, sequence) for one in value)
+        return sequence(plain(item, sequence) for item in value)
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 

@@ -64,9 +64,9 @@ def segments_along(
             where=f"{where}.orientation",
         )
     stops = settings.corner == "stop"
-    parts: Sequence[Points | FittedCurve]
+    sections: Sequence[Points | FittedCurve]
     if settings.tolerance is not None:
-        parts, report = fit_curves(points, settings.tolerance, stops=stops)
+        sections, report = fit_curves(points, settings.tolerance, stops=stops)
     elif points.speed is not None and segment.speed is None:
         raise TaskError(
             "feed rates need a fitted path",
@@ -76,25 +76,25 @@ def segments_along(
             hint="Set csv.tolerance, or remove the feed rates",
         )
     else:
-        parts, report = cut_at_corners(points, stops=stops)
+        sections, report = cut_at_corners(points, stops=stops)
     _check_corners(report, segment, where)
     fit: FitReport | None = report.model_copy(update={"source": settings.file})
     segments: list[SplineSegment | BSplineSegment] = []
-    for part in parts:
+    for section in sections:
         keys = _shared_keys(segment)
-        if part is not parts[-1]:
-            blend = None if isinstance(part, Points) else part.blend
+        if section is not sections[-1]:
+            blend = None if isinstance(section, Points) else section.blend
             keys |= {"blend": blend, "stop": blend is None, "dwell": 0.0}
-        if isinstance(part, Points):
-            spline = _spline_through(part, fit, settings)
+        if isinstance(section, Points):
+            spline = _spline_through(section, fit, settings)
             segments.append(SplineSegment(spline=spline, **keys))
         else:
             keys["bspline"] = {
-                "degree": part.spline.k,
-                "knots": part.spline.t.tolist(),
-                "control_points": part.spline.c.tolist(),
+                "degree": section.spline.k,
+                "knots": section.spline.t.tolist(),
+                "control_points": section.spline.c.tolist(),
                 "relative": settings.relative or fit is None,
-                "speeds": part.speeds,
+                "speeds": section.speeds,
                 "fit": fit,
             }
             segments.append(BSplineSegment(**keys))
@@ -321,5 +321,5 @@ def fit_path(
         content["speed"] = speed
         speed = None
     segment = validate(CsvSegment, content, "fit_path")
-    given = points_from(points, orientations, speed, segment.csv.units, "points")
-    return tuple(segments_along(given, segment, "points"))
+    points = points_from(points, orientations, speed, segment.csv.units, "points")
+    return tuple(segments_along(points, segment, "points"))

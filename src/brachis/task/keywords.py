@@ -163,7 +163,7 @@ def task_with(
 
 
 def check_keywords(
-    keywords: Iterable[str], where: str = "plan", own: Sequence[str] = ()
+    keywords: Iterable[str], where: str = "plan", arguments: Sequence[str] = ()
 ) -> None:
     """Refuse unknown keywords, and say where keys of these names belong, or which is meant.
 
@@ -172,7 +172,7 @@ def check_keywords(
     keywords : iterable of str
     where : str, optional
         The function that takes them.
-    own : sequence of str, optional
+    arguments : sequence of str, optional
         What else it takes by name.
 
     Raises
@@ -184,24 +184,24 @@ def check_keywords(
     if name is None:
         return
     limits = [word for word in name.split("_") if word in LimitKeywords.__annotations__]
-    found = (key_paths(word, Task) for word in (name, *limits))
-    paths = next(filter(None, found), [])
+    paths_of_words = (key_paths(word, Task) for word in (name, *limits))
+    paths = next(filter(None, paths_of_words), [])
     hint = " or ".join(_as_keyword(path.split(".")) for path in paths)
     raise UnknownNameError(
         "keyword",
         name,
-        sorted((*known, *own)),
+        sorted((*known, *arguments)),
         where=where,
         hint=hint and f"This name is a key inside another keyword: {hint}",
     )
 
 
-def _as_keyword(parts: Sequence[str]) -> str:
+def _as_keyword(names: Sequence[str]) -> str:
     """Write a dotted key as a keyword: ``limits={'torque': ...}``."""
-    own = parts[1:-1] and _SECTION_OF.get(parts[1]) == parts[0]
-    first, *others = parts[1:] if own else parts
+    names_section = names[1:-1] and _SECTION_OF.get(names[1]) == names[0]
+    first, *inner_keys = names[1:] if names_section else names
     text = "..."
-    for key in reversed(others):
+    for key in reversed(inner_keys):
         text = f"{{{key!r}: {text}}}"
     return f"{first}={text}"
 

@@ -66,21 +66,21 @@ _EntryOrNull = Annotated[
     AnyPositive | _Pair | None,
     ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
 ]
-UrdfLimit = Annotated[
+PairEntry = Annotated[
     Literal["urdf"] | AnyPositive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
     ByForm(
         "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
         "zero or null; null (no limit), urdf (as in the URDF)"
     ),
 ]
-OwnLimit = Annotated[
+NumberEntry = Annotated[
     AnyPositive | NonEmpty[AnyPositive] | dict[Name, AnyPositive | None] | None,
     ByForm(
         "a number > 0 for all joints, a list of numbers > 0, "
         "a mapping of joint name to number > 0 or null, null (no limit)"
     ),
 ]
-PositionLimit = Annotated[
+RangeEntry = Annotated[
     Literal["urdf"] | NonEmpty[Interval] | dict[Name, Interval | None] | None,
     ByForm(
         "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), "
@@ -92,7 +92,7 @@ TorqueCurve = Annotated[
 ]
 """Points [speed, torque]."""
 
-_FORMS = {"number": OwnLimit, "pair": UrdfLimit, "range": PositionLimit}
+_FORMS = {"number": NumberEntry, "pair": PairEntry, "range": RangeEntry}
 _JointLimits: Any = make_dataclass(
     "_JointLimits",
     [
@@ -155,11 +155,11 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
     def __post_init__(self) -> None:
         """Take arrays for plain numbers, and a mapping for the scale."""
-        for each in fields(self):
-            value: Any = plain(getattr(self, each.name), tuple)
-            if each.name == "scale" and isinstance(value, Mapping | None):
+        for entry in fields(self):
+            value: Any = plain(getattr(self, entry.name), tuple)
+            if entry.name == "scale" and isinstance(value, Mapping | None):
                 value = LimitScale().model_copy(update=value)
-            object.__setattr__(self, each.name, value)
+            object.__setattr__(self, entry.name, value)
 
 
 def without_defaults(limits: LimitSpec) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def map_by_joint(
     """Return the values of the joints by name, without those that are `missing`; see `per_joint_values`."""
     values = per_joint_values(key, value, names, missing)
     pairs = zip(names, values, strict=True)
-    return {name: each for name, each in pairs if each != missing}
+    return {name: joint_value for name, joint_value in pairs if joint_value != missing}
 
 
 Speed = Annotated[AnyPositive, Field(ge=LEAST, le=LARGEST)]
@@ -316,28 +316,28 @@ class ToolLimits(CheckedModel):
     can change."""
 
     def _mistakes(self) -> Iterator[Mistake]:
-        for number, (before, part) in enumerate(
+        for number, (before, section) in enumerate(
             itertools.pairwise(self.process_speed), 1
         ):
             end = before.s[1]
-            if part.s[0] <= end:
+            if section.s[0] <= end:
                 yield (
                     f"process_speed[{number}].s",
                     "the parts of the path overlap, meet or are out of order",
-                    f"a begin{part.origin} above {end:g}, the end of the part{before.origin} before it, with a gap",
+                    f"a begin{section.origin} above {end:g}, the end of the part{before.origin} before it, with a gap",
                 )
-        for number, part in enumerate(self.process_speed):
-            cap = _least_between(self.speed, part.s)
-            if cap is not None and cap < part.speed:
+        for number, section in enumerate(self.process_speed):
+            cap = _least_between(self.speed, section.s)
+            if cap is not None and cap < section.speed:
                 yield (
                     f"process_speed[{number}].speed",
-                    f"the tool's largest speed is below the process speed{part.origin}",
+                    f"the tool's largest speed is below the process speed{section.origin}",
                     f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )
 
 
 def _least_between(
-    cap: float | SpeedTable | None, part: Sequence[float]
+    cap: float | SpeedTable | None, interval: Sequence[float]
 ) -> float | None:
     """Least of the largest speeds over a part of the path."""
     if not isinstance(cap, SpeedTable):
@@ -345,6 +345,6 @@ def _least_between(
     inside = [
         speed
         for s, speed in zip(cap.s, cap.speed, strict=True)
-        if part[0] <= s <= part[1]
+        if interval[0] <= s <= interval[1]
     ]
-    return float(min([*inside, *np.interp(part, cap.s, cap.speed)]))
+    return float(min([*inside, *np.interp(interval, cap.s, cap.speed)]))

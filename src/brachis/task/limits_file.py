@@ -203,15 +203,15 @@ def with_limits_of_file(
         settings = RobotSettings.model_validate(plain(robot))
     except ValidationError:
         return content  # the check of the task says what is wrong
-    own = robot.get("limits") or {}
-    if isinstance(own, LimitSpec):
-        own = without_defaults(own)
+    task_limits = robot.get("limits") or {}
+    if isinstance(task_limits, LimitSpec):
+        task_limits = without_defaults(task_limits)
     name = str(settings.limits_file)
     path = folder / name
     file = _read_file(path, f"{source}: robot.limits_file", folder, name)
-    rest = {key: value for key, value in robot.items() if key != "limits_file"}
-    limits = merge(file.by_kind(str(path)), own)
-    return {**content, "robot": {**rest, "limits": limits}}
+    robot_keys = {key: value for key, value in robot.items() if key != "limits_file"}
+    limits = merge(file.by_kind(str(path)), task_limits)
+    return {**content, "robot": {**robot_keys, "limits": limits}}
 
 
 def _read_file(

@@ -62,26 +62,26 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
     >>> task
     {'path': [{'line': {'by': [0.0, 1.0]}}], 'spline': {'intervals': 40}}
     """
-    parts = _INDEX.sub(r".\1", key).split(".")
-    if not all(parts):
+    names = _INDEX.sub(r".\1", key).split(".")
+    if not all(names):
         raise TaskError(
             "this is not a valid key",
             found=repr(key),
             allowed="names and indices joined by dots, such as path.0.line.by",
         )
     place: Any = content
-    for i, part in enumerate(parts[:-1]):
-        step = _step(place, part, parts[:i], key)
+    for i, name in enumerate(names[:-1]):
+        step = _step(place, name, names[:i], key)
         if isinstance(place, MutableMapping) and place.get(step) is None:
             place[step] = {}
         place = place[step]
-    place[_step(place, parts[-1], parts[:-1], key)] = value
+    place[_step(place, names[-1], names[:-1], key)] = value
 
 
-def _step(place: object, part: str, before: list[str], key: str) -> str | int:
+def _step(place: object, name: str, before: list[str], key: str) -> str | int:
     """Return what `place` has to be indexed with: a name in a mapping, a number within a list."""
     if isinstance(place, MutableMapping):
-        return part
+        return name
     where = ".".join(before)
     if not isinstance(place, list):
         raise TaskError(
@@ -90,14 +90,14 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
             found=show(place),
             hint=f"Set {where} itself",
         )
-    if not part.isdecimal() or int(part) >= len(place):
+    if not name.isdecimal() or int(name) >= len(place):
         raise TaskError(
             f"{where} is a list of {len(place)}",
             where=key,
-            found=f"{where}.{part}",
+            found=f"{where}.{name}",
             allowed=f"0 to {len(place) - 1}" if place else "none: it is empty",
         )
-    return int(part)
+    return int(name)
 
 
 def read_assignment(text: str) -> tuple[str, object]:

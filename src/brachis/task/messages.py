@@ -68,7 +68,7 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
     errors = [_one(detail, source, model) for detail in details[:_MOST_MISTAKES]]
     if len(details) == 1:
         return errors[0]
-    lines = "".join(f"\n  {one}" for one in errors)
+    lines = "".join(f"\n  {mistake}" for mistake in errors)
     if len(details) > len(errors):
         lines += f"\n  and {len(details) - len(errors)} more"
     return TaskError(f"{len(details)} mistakes{lines}", where=source)
@@ -98,30 +98,30 @@ def _shorten(text: str) -> str:
 
 
 def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
-    problem, *parts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
+    problem, *facts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
     key = _write_location(detail["loc"], detail.get("ctx", {}).get("key", ""))
     return TaskError(
         problem,
         where=f"{source}: {key}" if key else source,
-        **dict(zip(("found", "allowed", "hint"), parts, strict=False)),
+        **dict(zip(("found", "allowed", "hint"), facts, strict=False)),
     )
 
 
-def _is_tag(part: str | int) -> bool:
-    return str(part).startswith("<")
+def _is_tag(step: str | int) -> bool:
+    return str(step).startswith("<")
 
 
 def _names_in(location: _Location) -> list[str]:
     """Return the keys of a location, without indices and tags of unions."""
-    return [part for part in location if isinstance(part, str) and not _is_tag(part)]
+    return [step for step in location if isinstance(step, str) and not _is_tag(step)]
 
 
 def _write_location(location: _Location, key: str) -> str:
     """Return a location, and a key below it, as ``path[0].line.to``, without the tags of unions."""
     keys = [
-        f"[{part}]" if isinstance(part, int) else part
-        for part in location
-        if not _is_tag(part) and part != "[key]"
+        f"[{step}]" if isinstance(step, int) else step
+        for step in location
+        if not _is_tag(step) and step != "[key]"
     ]
     return ".".join(filter(None, [*keys, key])).replace(".[", "[")
 
@@ -132,8 +132,8 @@ def models_in(annotation: object) -> Iterator[type]:
         issubclass(annotation, Model) or is_dataclass(annotation)
     ):
         yield annotation
-    for part in get_args(annotation):
-        yield from models_in(part)
+    for argument in get_args(annotation):
+        yield from models_in(argument)
 
 
 def _fields_of(model: type) -> Mapping[str, object]:
@@ -146,33 +146,42 @@ def _fields_of(model: type) -> Mapping[str, object]:
 def _models_at(location: _Location, model: type[Model]) -> list[type]:
     """Return the models that may stand at a location."""
     models: list[type] = [model]
-    for part in location:
-        if _is_tag(part):
-            models = [one for one in models if f"<{one.__name__}>" == part] or models
+    for step in location:
+        if _is_tag(step):
+            models = [
+                parent for parent in models if f"<{parent.__name__}>" == step
+            ] or models
             continue
-        fields = [_fields_of(one) for one in models]
-        if any(part in each for each in fields):  # else a name in a mapping
-            annotations = [each.get(str(part)) for each in fields]
-            models = [inner for each in annotations for inner in models_in(each)]
+        fields = [_fields_of(parent) for parent in models]
+        if any(step in annotations for annotations in fields):
+            models = [
+                inner
+                for annotations in fields
+                for inner in models_in(annotations.get(str(step)))
+            ]  # else it is a name in a mapping
     return models
 
 
 def _keys_at(location: _Location, model: type[Model]) -> list[str]:
     """Return the keys that are allowed at a location."""
-    return [name for one in _models_at(location, model) for name in _fields_of(one)]
+    return [
+        name for parent in _models_at(location, model) for name in _fields_of(parent)
+    ]
 
 
 def key_paths(name: str, model: type[Model]) -> list[str]:
     """Return the shortest dotted keys, of up to three parts, that end in a name: ``refinement.tolerance``."""
     level: list[tuple[str, type]] = [("", model)]
     for _ in range(3):
-        found = [f"{path}{name}" for path, one in level if name in _fields_of(one)]
-        if found:
-            return list(dict.fromkeys(found))
+        paths = [
+            f"{path}{name}" for path, parent in level if name in _fields_of(parent)
+        ]
+        if paths:
+            return list(dict.fromkeys(paths))
         level = [
             (f"{path}{key}.", inner)
-            for path, one in level
-            for key, annotation in _fields_of(one).items()
+            for path, parent in level
+            for key, annotation in _fields_of(parent).items()
             for inner in models_in(annotation)
         ]
     return []
@@ -185,7 +194,7 @@ def _description_at(location: _Location, model: type[Model]) -> str | None:
         return None
     last = names[-1]
     models = _models_at(location[: location.index(last)], model)
-    texts = {describe_fields(one).get(last, "") for one in models} - {""}
+    texts = {describe_fields(parent).get(last, "") for parent in models} - {""}
     if len(texts) != 1:
         return None
     return f"{last}: {' '.join(texts.pop().split()).removesuffix('.')}"
@@ -226,38 +235,38 @@ def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
 
 def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     facts = detail["ctx"]
-    found = detail["input"]
+    content = detail["input"]
     known = re.findall(r"\w+", facts["allowed"])
     hint = None
-    if isinstance(found, Mapping) and not any(key in found for key in known):
-        hints = (suggest(str(name), known) for name in found)
+    if isinstance(content, Mapping) and not any(key in content for key in known):
+        hints = (suggest(str(name), known) for name in content)
         hint = next(filter(None, hints), None)
-    return facts["problem"], show(found), facts["allowed"], hint
+    return facts["problem"], show(content), facts["allowed"], hint
 
 
 def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     """Describe a mistake by the table; a wrong type by the keys of the mapping and what the key is for as well."""
-    found = show(detail["input"])
+    shown = show(detail["input"])
     location = detail["loc"]
     if location and location[-1] == "[key]":
-        return "a name must be a string", found, "a string, in quotes if need be"
+        return "a name must be a string", shown, "a string, in quotes if need be"
     if detail["type"] in _TYPES:
         allowed = _TYPES[detail["type"]]
         keys = _keys_at(location, model) if allowed == _MAPPING else []
         if keys:
             allowed += f" with keys out of {', '.join(keys)}"
-        return "wrong type", found, allowed, _description_at(location, model)
+        return "wrong type", shown, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
     facts = detail.get("ctx", {})
     words = re.findall(r"'(\w+)'", facts.get("expected", ""))
     words += facts.get("words", "").split()
-    given = detail["input"]
-    hint = suggest(given, words) if isinstance(given, str) else None
+    value = detail["input"]
+    hint = suggest(value, words) if isinstance(value, str) else None
     allowed = form.format(**facts)
     unit = unit_of(".".join(_names_in(location)))
     if problem == _OUT_OF_RANGE and unit:
         allowed += f", in {unit}"
-    return problem, found, allowed or None, hint
+    return problem, shown, allowed or None, hint
 
 
 _MAPPING = "a mapping"

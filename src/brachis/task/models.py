@@ -209,12 +209,12 @@ class Task(CheckedModel):
                 found=path,
                 allowed="{frame: NAME, segments: [...]}",
             )
-        other = content.get("path_frame")
-        if other not in (None, path["frame"]):
+        path_frame = content.get("path_frame")
+        if path_frame not in (None, path["frame"]):
             raise refuse(
                 "this frame differs from path.frame",
                 key="path_frame",
-                found=other,
+                found=path_frame,
                 allowed=f"{path['frame']}, or only one of the two keys",
             )
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
@@ -305,9 +305,9 @@ class Task(CheckedModel):
         first = self.path[0]
         is_unread = isinstance(first, CsvSegment) and not first.csv.relative
         is_free = self.start == "free"
-        is_given = self.path_start is not None
+        has_path_start = self.path_start is not None
         is_pose = isinstance(self.path_start, ToolPose)
-        if is_free and not (is_given or is_unread) and self.start_place is None:
+        if is_free and not (has_path_start or is_unread) and self.start_place is None:
             if self.task_space == "joints":
                 yield (
                     "start",
@@ -325,7 +325,7 @@ class Task(CheckedModel):
                 "numeric inverse kinematics needs a posture to begin with, and start is free",
                 "lattice",
             )
-        if is_given and self.of_poses and not is_pose:
+        if has_path_start and self.of_poses and not is_pose:
             yield (
                 "path_start",
                 "a list does not state its convention, such as whether w of a quaternion is first or last",
@@ -375,21 +375,21 @@ class Task(CheckedModel):
                 )
 
     def _mistakes_in_tolerances(self) -> Iterator[Mistake]:
-        asked = self.tolerances
+        tolerances = self.tolerances
         of_places = self.task_space in {"pose", "pose_free_roll", POSITION}
-        if asked.orientation != OrientationTolerance() and not self.of_poses:
+        if tolerances.orientation != OrientationTolerance() and not self.of_poses:
             yield (
                 "tolerances.orientation",
                 "the path does not prescribe the orientation",
                 "tolerances of the orientation with task_space: pose or axis",
             )
-        if asked.position != PositionTolerance() and not of_places:
+        if tolerances.position != PositionTolerance() and not of_places:
             yield (
                 "tolerances.position",
                 "this task space has no tolerances of the position",
                 "task_space: position, pose or pose_free_roll with them",
             )
-        if asked.orientation.roll is not None and self.task_space != "pose":
+        if tolerances.orientation.roll is not None and self.task_space != "pose":
             yield (
                 "tolerances.orientation.roll",
                 "the roll is free in this task space",

@@ -95,8 +95,8 @@ class Attitude(Model):
     @model_validator(mode="before")
     @classmethod
     def _one_convention(cls, value: object) -> object:
-        given = value if isinstance(value, Mapping) else {}
-        stated = [key for key in Attitude.model_fields if given.get(key) is not None]
+        keys = value if isinstance(value, Mapping) else {}
+        stated = [key for key in Attitude.model_fields if keys.get(key) is not None]
         if not isinstance(value, Attitude) and len(stated) != 1:
             raise refuse(
                 "an orientation needs exactly one convention",
@@ -138,11 +138,11 @@ class ToolPose(Attitude):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_transform(cls, given: object) -> object:
+    def _of_transform(cls, content: object) -> object:
         """Take a transform such as Pinocchio's SE3 too."""
-        if not hasattr(given, "homogeneous"):
-            return given
-        ((position, turn),) = poses_of([given], "transform")
+        if not hasattr(content, "homogeneous"):
+            return content
+        ((position, turn),) = poses_of([content], "transform")
         return {"position": position, **turn}
 
 

@@ -138,7 +138,7 @@ class FitReport(Model):
     @property
     def listed_corners(self) -> str:
         """The first ten corners."""
-        return name_first([str(corner) for corner in self.corners], ", ", most=10)
+        return name_first([str(corner) for corner in self.corners], ", ", count=10)
 
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""
@@ -151,16 +151,16 @@ class FitReport(Model):
         allowed = 1e3 * self.position_tolerance
         rms = 1e3 * self.position_rms
         intervals = write_count(self.intervals, "knot interval")
-        parts = [
+        statements = [
             f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {intervals}",
             f"at most {1e3 * self.position_error:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm",
         ]
         if self.orientation_error:
-            parts.append(
+            statements.append(
                 f"orientation at most {degrees(self.orientation_error):.2g} deg off "
                 f"(allowed {degrees(self.orientation_tolerance):.3g} deg)"
             )
-        return "; ".join([*parts, corners, *self.told])
+        return "; ".join([*statements, corners, *self.told])
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, without the profile."""

@@ -101,11 +101,11 @@ class SceneBody(CheckedModel):
         return Placement(xyz=self.position, rpy_deg=self.rpy_deg)
 
     def _mistakes(self) -> Iterator[Mistake]:
-        given = [key for key in SHAPES if getattr(self, key) is not None]
-        if len(given) != 1:
+        shapes = [key for key in SHAPES if getattr(self, key) is not None]
+        if len(shapes) != 1:
             raise refuse(
                 "a body has exactly one shape",
-                found=given or "none",
+                found=shapes or "none",
                 allowed=f"one of {', '.join(SHAPES)}",
             )
         if self.link is not None and self.frame is not None:

@@ -20,10 +20,10 @@ def json_schema() -> dict[str, Any]:
     schema = Task.model_json_schema(mode="validation")
     known: list[type] = [LimitSpec, *_subclasses(Model)]
     models = {model.__name__: model for model in known}
-    parts: dict[str, Any] = {"Task": schema, **schema["$defs"]}
-    for name in models.keys() & parts.keys():
+    schemas: dict[str, Any] = {"Task": schema, **schema["$defs"]}
+    for name in models.keys() & schemas.keys():
         for key, description in describe_fields(models[name]).items():
-            parts[name]["properties"][key].setdefault("description", description)
+            schemas[name]["properties"][key].setdefault("description", description)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:brachis:task:1",
@@ -36,6 +36,6 @@ def json_schema() -> dict[str, Any]:
 
 
 def _subclasses(model: type[Model]) -> Iterator[type[Model]]:
-    for own in model.__subclasses__():
-        yield own
-        yield from _subclasses(own)
+    for subclass in model.__subclasses__():
+        yield subclass
+        yield from _subclasses(subclass)

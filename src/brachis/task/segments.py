@@ -326,16 +326,16 @@ class SegmentModel(CheckedModel):
             )
 
     def __add__(
-        self, other: SegmentModel | tuple[SegmentModel, ...]
+        self, following: SegmentModel | tuple[SegmentModel, ...]
     ) -> tuple[SegmentModel, ...]:
         """Join a segment, or a path, to the end of this segment."""
-        if isinstance(other, SegmentModel):
-            return (self, other)
-        return (self, *other) if isinstance(other, tuple) else NotImplemented
+        if isinstance(following, SegmentModel):
+            return (self, following)
+        return (self, *following) if isinstance(following, tuple) else NotImplemented
 
-    def __radd__(self, other: tuple[SegmentModel, ...]) -> tuple[SegmentModel, ...]:
+    def __radd__(self, path: tuple[SegmentModel, ...]) -> tuple[SegmentModel, ...]:
         """Join this segment to the end of a path."""
-        return (*other, self) if isinstance(other, tuple) else NotImplemented
+        return (*path, self) if isinstance(path, tuple) else NotImplemented
 
     def __repr__(self) -> str:
         """Show it as a program makes it."""
@@ -371,8 +371,8 @@ class MovingSegment(SegmentModel):
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()
-        has_own = getattr(self.shape, "has_orientations", False)
-        if self.orientation is not None and has_own:
+        has_orientations = getattr(self.shape, "has_orientations", False)
+        if self.orientation is not None and has_orientations:
             yield (
                 "orientation",
                 f"the {self.kind} already has orientations",

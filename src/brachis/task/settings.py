@@ -43,13 +43,13 @@ class Placement(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_transform(cls, given: object) -> object:
+    def _of_transform(cls, content: object) -> object:
         """Take a transform such as Pinocchio's SE3 too."""
-        if not hasattr(given, "homogeneous"):
-            return given
+        if not hasattr(content, "homogeneous"):
+            return content
         from pinocchio import rpy
 
-        matrix = np.array(given.homogeneous)
+        matrix = np.array(content.homogeneous)
         angles = np.degrees(rpy.matrixToRpy(matrix[:3, :3]))
         return {"xyz": matrix[:3, 3].tolist(), "rpy_deg": angles.tolist()}
 

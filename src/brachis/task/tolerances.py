@@ -62,15 +62,15 @@ _FARTHEST = 10.0
 def _range_within(largest: float) -> AfterValidator:
     """Return what reads a number a as [-a, a], and refuses ranges that are empty or end farther from zero."""
 
-    def read(given: _Given) -> _Given:
+    def read(value: _Given) -> _Given:
         """Read one range."""
-        if given is None or given == "free":
-            return given
-        low, high = given if isinstance(given, tuple) else (-given, given)
+        if value is None or value == "free":
+            return value
+        low, high = value if isinstance(value, tuple) else (-value, value)
         if not -largest <= low < high <= largest:
             raise refuse(
                 "this is not a range",
-                found=given,
+                found=value,
                 allowed=f"{_FORMS}, all within {largest:g} of zero",
             )
         return low, high
@@ -89,12 +89,12 @@ _Distance = Annotated[_Ends, _range_within(_FARTHEST)]
 
 
 def _ranges_outside(
-    given: Model, largest: str, ranges: Iterable[str]
+    model: Model, largest: str, ranges: Iterable[str]
 ) -> Iterator[Mistake]:
     """Yield the ranges that lie outside the cone or sphere beside them."""
-    reach = getattr(given, largest)
+    reach = getattr(model, largest)
     for key in ranges:
-        ends = getattr(given, key)
+        ends = getattr(model, key)
         if reach is not None and ends is not None and min(-ends[0], ends[1]) <= -reach:
             yield (
                 key,
@@ -136,13 +136,13 @@ class PositionTolerance(CheckedModel):
     """Axes of x, y and z: those of the path's orientation, or those of the world."""
 
     def _mistakes(self) -> Iterator[Mistake]:
-        given = [axis for axis in POSITION if getattr(self, axis) is not None]
-        yield from _ranges_outside(self, "sphere", given)
-        if self.axes == "world" and len(given) < len(POSITION):
+        axes = [axis for axis in POSITION if getattr(self, axis) is not None]
+        yield from _ranges_outside(self, "sphere", axes)
+        if self.axes == "world" and len(axes) < len(POSITION):
             yield (
                 "axes",
                 "a box along the world's axes needs all three lengths",
-                f"x, y and z with it (there is {' and '.join(given) or 'none'}), or axes: tool",
+                f"x, y and z with it (there is {' and '.join(axes) or 'none'}), or axes: tool",
             )
 
 

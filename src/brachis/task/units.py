@@ -47,11 +47,11 @@ def unit_of(key: str) -> str:
     >>> unit_of("robot.payload.mass"), unit_of("path.0.line.angle_deg"), unit_of("spline.intervals")
     ('kg', 'deg', '')
     """
-    names = [part for part in key.split(".") if not part.isdecimal()]
+    names = [name for name in key.split(".") if not name.isdecimal()]
     if names[0] == "postures":
         return "rad (m)"
     if names[0] == "frames":
         del names[1:2]  # its name
     units = (_UNITS.get(".".join(pair)) for pair in reversed([*pairwise(names)]))
-    other = "deg" if key.endswith("_deg") else ""
-    return next((unit for unit in units if unit is not None), other)
+    unit_by_name = "deg" if key.endswith("_deg") else ""
+    return next((unit for unit in units if unit is not None), unit_by_name)

@@ -49,15 +49,15 @@ class _Loader(yaml.SafeLoader):
     ) -> dict[Hashable, Any]:
         """Make a mapping of a node, as PyYAML does, unless a key occurs twice (MarkedYAMLError)."""
         # Before merge keys (<<) are expanded: what they bring in may be overridden.
-        seen: set[str] = set()
+        keys: set[str] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
-                if key.value in seen:
+                if key.value in keys:
                     raise yaml.MarkedYAMLError(
                         problem=f"the key {key.value!r} occurs twice",
                         problem_mark=key.start_mark,
                     )
-                seen.add(key.value)
+                keys.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
     def get_single_node(self) -> yaml.Node | None:
@@ -77,12 +77,12 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
         return 1.0
     if id(node) not in known:
         known[id(node)] = math.inf  # while inside
-        parts = (
+        children = (
             node.value
             if isinstance(node, yaml.SequenceNode)
-            else [each for pair in node.value for each in pair]
+            else [child for pair in node.value for child in pair]
         )
-        known[id(node)] = 1.0 + sum(_size(part, known) for part in parts)
+        known[id(node)] = 1.0 + sum(_size(child, known) for child in children)
     return known[id(node)]
 
 
@@ -113,8 +113,10 @@ def _describe(node: yaml.Node) -> str:
 
 def _refuse_tag(_loader: _Loader, node: yaml.Node) -> NoReturn:
     """Refuse a tag that neither YAML nor the units define (MarkedYAMLError)."""
-    problem = str(UnknownNameError("tag", node.tag, _UNITS))
-    raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+    raise yaml.MarkedYAMLError(
+        problem=str(UnknownNameError("tag", node.tag, _UNITS)),
+        problem_mark=node.start_mark,
+    )
 
 
 for _tag in _UNITS:

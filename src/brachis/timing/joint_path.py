@@ -55,8 +55,8 @@ def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
     is_known = slower > 0.0
     ratio = np.divide(faster, slower, out=np.ones_like(turn), where=is_known)
     counts = np.maximum(np.ceil(turn / _TURN), np.round(ratio))
-    parts = np.where(is_known, counts, 1.0).clip(1, _MOST_PARTS)
-    numbers = np.append(0.0, np.cumsum(parts))
+    divisions = np.where(is_known, counts, 1.0).clip(1, _MOST_PARTS)
+    numbers = np.append(0.0, np.cumsum(divisions))
     return np.interp(np.arange(numbers[-1] + 1.0), numbers, p)
 
 
@@ -149,8 +149,8 @@ class JointPath:
     def middles(self) -> JointPath:
         """Take the path half-way between its stations, by cubics between these."""
         steps = np.diff(self.p)[:, None]
-        parts = (self.p, self.s, self.q, self.q_dp, self.q_ddp)
-        p, s, q, q_dp, q_ddp = map(halfway, parts)
+        arrays = (self.p, self.s, self.q, self.q_dp, self.q_ddp)
+        p, s, q, q_dp, q_ddp = map(halfway, arrays)
         q -= 0.125 * steps * np.diff(self.q_dp, axis=0)
         q_dp -= 0.125 * steps * np.diff(self.q_ddp, axis=0)
         return JointPath(p, s, q, q_dp, q_ddp)

@@ -248,16 +248,16 @@ class PhasePlane:
         first = max(begin - 1, 0)
         steps = self._steps[first:end, None]
         a, b, low, high = self._stack(slice(first, end))
-        own = slice(begin, end)
+        chunk = slice(begin, end)
         inside = slice(begin - first, None)
         # Half-way x is x + step u, seen from the station before, and x + 2 step u is x at the next station.
         lines = _as_lines(a + steps * b, b, low, high)
-        self._next[:, own] = 2.0 * steps[inside] * np.array(lines)[:, inside]
-        self._next[0, own] += 1.0
+        self._next[:, chunk] = 2.0 * steps[inside] * np.array(lines)[:, inside]
+        self._next[0, chunk] += 1.0
         floor, ceiling = kernel.bounds_of_pairs(*lines, _TINY)
-        self._floor[own] = floor[inside]
+        self._floor[chunk] = floor[inside]
         # The rows at the stations themselves keep u from swinging between its neighbours.
-        lines = _as_lines(*(to_stations(part, steps) for part in (a, b, low, high)))
+        lines = _as_lines(*(to_stations(term, steps) for term in (a, b, low, high)))
         at_stations = kernel.bounds_of_pairs(*lines, _TINY)[1]
         last = end + 1 if end == len(self._steps) else end
         stations = slice(begin, last)

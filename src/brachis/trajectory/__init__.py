@@ -12,7 +12,7 @@ from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import (
     CONTINUOUS_TORQUE,
-    Motion,
+    MotionSource,
     Trajectory,
     motion_of,
     of_motion,
@@ -21,8 +21,8 @@ from brachis.trajectory.trajectory import (
 __all__ = [
     "CONTINUOUS_TORQUE",
     "PHASE_COLUMNS",
-    "Motion",
     "MotionPhase",
+    "MotionSource",
     "PhaseSpline",
     "Pieces",
     "Recovered",

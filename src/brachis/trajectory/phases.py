@@ -150,9 +150,9 @@ def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray
     outer = splines[0].degree + 1
     knots = []
     for spline, begin, end in zip(splines, begins, ends, strict=True):
-        own = (begin + spline.knots * spline.t_end) / ends[-1]
-        own[-outer:] = end / ends[-1]
-        knots.append(own if begin == 0.0 else own[outer:])
+        phase_knots = (begin + spline.knots * spline.t_end) / ends[-1]
+        phase_knots[-outer:] = end / ends[-1]
+        knots.append(phase_knots if begin == 0.0 else phase_knots[outer:])
     points = np.hstack([spline.control_points for spline in splines])
     return np.concatenate(knots), points
 

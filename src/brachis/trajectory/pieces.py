@@ -54,10 +54,10 @@ class Pieces:
             return self.derivative(t, nu - 1)
         t = np.asarray(t, dtype=float)
         flat = t.ravel()
-        piece = np.searchsorted(self.x[1:-1], flat, side="right")
-        begin = self.x[piece]
-        u = (flat - begin) / (self.x[piece + 1] - begin)
-        values = bernstein(self.c, piece, u)
+        index = np.searchsorted(self.x[1:-1], flat, side="right")
+        begin = self.x[index]
+        u = (flat - begin) / (self.x[index + 1] - begin)
+        values = bernstein(self.c, index, u)
         return values.reshape(t.shape + self.c.shape[2:])
 
     @cached_property
@@ -106,7 +106,9 @@ def piece_coefficients(
     a0 = after[:-1]
     a1 = before[1:]
     linear = 0.5 * h * (v0 + v1) - h**2 / 12.0 * (a1 - a0)  # travel if b were zero
-    far, fast = (np.maximum(np.abs(part[1:]), np.abs(part[:-1])) for part in (q, qdot))
+    far, fast = (
+        np.maximum(np.abs(values[1:]), np.abs(values[:-1])) for values in (q, qdot)
+    )
     rounding = np.finfo(float).eps * (far + h * fast)
     miss = np.diff(q, axis=0) - linear
     miss = miss - np.clip(miss, -rounding, rounding)

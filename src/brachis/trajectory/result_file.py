@@ -125,11 +125,12 @@ def read_result(path: Path) -> dict[str, Any]:
     except FileNotFoundError as error:
         raise ResultFileError("the file does not exist", where=where) from error
     except _BROKEN as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ResultFileError(
             "the file is not a brachis result",
             where=where,
-            found=reason,
+            found=getattr(error, "strerror", None)
+            or str(error)
+            or type(error).__name__,
             allowed="a file written by brachis plan",
         ) from error
     schema = meta.get("schema")
@@ -144,11 +145,11 @@ def read_result(path: Path) -> dict[str, Any]:
     try:
         return _check_parts(_Meta.model_validate(meta), arrays)
     except (ValidationError, InputError) as error:
-        found: Exception = error
+        cause: Exception = error
         if isinstance(error, ValidationError):
-            found = task_error(error, "meta", _Meta)
+            cause = task_error(error, "meta", _Meta)
         raise ResultFileError(
-            "the result file is broken", where=where, found=str(found)
+            "the result file is broken", where=where, found=str(cause)
         ) from error
 
 
@@ -191,9 +192,9 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         meta.joint_names,
         robot.joint_names,
     )
-    for given in (task.joints_at("start"), task.joints_at("end")):
-        if given:
-            robot.posture(given[0], f"task.{given[1]}")
+    for stated in (task.joints_at("start"), task.joints_at("end")):
+        if stated:
+            robot.posture(stated[0], f"task.{stated[1]}")
     redundant = [name for name in robot.joint_names if name in meta.redundant_joints]
     _refuse_unless(
         meta.redundant_joints == redundant,
@@ -232,13 +233,13 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _refuse_unless(
-    fits: bool | np.bool_, where: str, problem: str, found: object, allowed: object
+    fits: bool | np.bool_, where: str, problem: str, value: object, allowed: object
 ) -> None:
     if fits:
         return
-    if isinstance(found, np.ndarray):
-        found = f"an array of {found.dtype}, {found.shape}, that begins with {found.ravel()[:4].tolist()}"
-    raise InputError(problem, where=where, found=found, allowed=allowed)
+    if isinstance(value, np.ndarray):
+        value = f"an array of {value.dtype}, {value.shape}, that begins with {value.ravel()[:4].tolist()}"
+    raise InputError(problem, where=where, found=value, allowed=allowed)
 
 
 def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
@@ -322,8 +323,8 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
     shapes["control_points"] = (1 + r, len(knots) - degree - 1)
     for name, shape in shapes.items():
-        found = arrays[name].shape
-        _refuse_unless(found == shape, name, "wrong shape", found, shape)
+        actual = arrays[name].shape
+        _refuse_unless(actual == shape, name, "wrong shape", actual, shape)
 
 
 def _check_nodes(times: np.ndarray) -> None:

@@ -59,7 +59,7 @@ class Sensitivity:
             "subject": self.label.subject,
             "kind": self.label.kind,
             "key": self.label.key,
-            "s": [list(part) for part in self.s],
+            "s": [list(interval) for interval in self.s],
             "end": self.side,
             "limit": self.figure,
             "unit": self.label.unit,

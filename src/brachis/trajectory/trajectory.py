@@ -192,8 +192,12 @@ class Trajectory(Summary):
             is_dwell = s_begin == s_end
             # The phases of a recorded motion are between its stops, and longer than the parts.
             s = (s_begin, s_end)
-            given = (part.speed for part in speeds if np.allclose(s, part.s, 0.0, 1e-9))
-            speed = None if is_dwell else next(given, None)
+            matching = (
+                section.speed
+                for section in speeds
+                if np.allclose(s, section.s, 0.0, 1e-9)
+            )
+            speed = None if is_dwell else next(matching, None)
             phases.append(MotionPhase(begin, end, *s, speed, is_dwell))
         return tuple(phases)
 
@@ -295,8 +299,8 @@ class Trajectory(Summary):
                 where="last",
                 allowed="exact",
             )
-        whole = int(np.ceil(self.t_end / dt * (1.0 - tolerances.ROUNDING)))
-        t = np.arange(whole + 1.0) * dt
+        periods = int(np.ceil(self.t_end / dt * (1.0 - tolerances.ROUNDING)))
+        t = np.arange(periods + 1.0) * dt
         if last == "exact":
             t[-1] = self.t_end
             return self.at(t)
@@ -401,10 +405,10 @@ class HasMotion(Protocol):
         """Return the motion."""
 
 
-Motion = Trajectory | HasMotion | str | os.PathLike[str]
+MotionSource = Trajectory | HasMotion | str | os.PathLike[str]
 
 
-def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
+def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
     """Return the trajectory that is given, as the argument `where` of a public function.
 
     Raises
@@ -414,29 +418,28 @@ def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
     InputError
         It is something else.
     """
-    if isinstance(given, Trajectory):
-        return given
-    if isinstance(given, str | os.PathLike):
-        return Trajectory.load(given)
-    motion = getattr(given, "trajectory", None)
+    if isinstance(source, Trajectory):
+        return source
+    if isinstance(source, str | os.PathLike):
+        return Trajectory.load(source)
+    motion = getattr(source, "trajectory", None)
     if not isinstance(motion, Trajectory):
-        allowed = "a Trajectory, a Result, or the npz file of one"
         raise InputError(
             "this is not a motion",
             where=where,
-            found=type(given).__name__,
-            allowed=allowed,
+            found=type(source).__name__,
+            allowed="a Trajectory, a Result, or the npz file of one",
         )
     return motion
 
 
 def of_motion(
     function: Callable[Concatenate[Trajectory, _P], _R],
-) -> Callable[Concatenate[Motion, _P], _R]:
+) -> Callable[Concatenate[MotionSource, _P], _R]:
     """Let a function of a trajectory take all that `motion_of` does."""
 
     @wraps(function)
-    def taking(trajectory: Motion, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+    def taking(trajectory: MotionSource, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         """Call the function with the trajectory of what is given."""
         return function(motion_of(trajectory), *args, **kwargs)
 

@@ -48,8 +48,8 @@ def tool_placements(
         return origin, rotation
     still = np.zeros(len(q))
     x, y, z, side, lead, roll = (
-        away.get(f"tool_{way}", still)
-        for way in ("x", "y", "z", "side", "lead", "roll")
+        away.get(f"tool_{direction}", still)
+        for direction in ("x", "y", "z", "side", "lead", "roll")
     )
     # The path's axes in the tool frame.
     turned = (
@@ -199,8 +199,8 @@ def _motions(
             acceleration = moved + 2.0 * cross(spin, rate) + push
         else:
             spin, gain, acceleration = (
-                _rotate(body.axis, -q[:, joint], part)
-                for part in (spin, gain, acceleration)
+                _rotate(body.axis, -q[:, joint], vectors)
+                for vectors in (spin, gain, acceleration)
             )
             gain = gain + push + cross(spin, rate)
             spin = spin + rate

@@ -52,7 +52,7 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     column = np.arange(coefficients.shape[1])
     low = np.zeros(len(column))
     width = 1.0
-    found = [(column[:0], low[:0])]
+    root_arrays = [(column[:0], low[:0])]
     for _ in range(_HALVINGS):
         # Coefficients that do not change their sign have no root.
         changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
@@ -66,25 +66,25 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         coefficients = _halve(coefficients)
         right = slice(len(column) // 2, None)
         is_root = coefficients[0, right] == 0.0
-        found.append((column[right][is_root], low[right][is_root]))
+        root_arrays.append((column[right][is_root], low[right][is_root]))
     first, last = coefficients[[0, -1]]
     crossing = first * last < 0.0
     share = first[crossing] / (first[crossing] - last[crossing])
-    found.append((column[crossing], low[crossing] + width * share))
-    number, u = (np.concatenate(part) for part in zip(*found, strict=True))
+    root_arrays.append((column[crossing], low[crossing] + width * share))
+    number, u = (np.concatenate(arrays) for arrays in zip(*root_arrays, strict=True))
     order = np.lexsort((u, number))
     return number[order], u[order]
 
 
 def _halve(coefficients: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients, (m + 1, 2 F), of the left and then of the right halves of F polynomials."""
-    left = [coefficients[0]]
-    right = [coefficients[-1]]
+    """Bernstein coefficients, (m + 1, 2 F), of the lower and then of the upper halves of F polynomials."""
+    lower = [coefficients[0]]
+    upper = [coefficients[-1]]
     while len(coefficients) > 1:
         coefficients = 0.5 * (coefficients[:-1] + coefficients[1:])
-        left.append(coefficients[0])
-        right.append(coefficients[-1])
-    return np.hstack([left, right[::-1]])
+        lower.append(coefficients[0])
+        upper.append(coefficients[-1])
+    return np.hstack([lower, upper[::-1]])
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -143,19 +143,19 @@ class MotionPieces:
         self.path_coordinate = trajectory.path_spline
         self.robot = robot
 
-    def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def time(self, index: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the times of places, s."""
-        return self.times[piece] + u * self.lengths[piece]
+        return self.times[index] + u * self.lengths[index]
 
-    def positions(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def positions(self, index: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Joint positions at places, (K, n)."""
-        return self.nodes[piece] + bernstein(self.position, piece, u)
+        return self.nodes[index] + bernstein(self.position, index, u)
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
-        piece = np.searchsorted(self.times, t, side="right") - 1
-        piece = np.clip(piece, 0, len(self.lengths) - 1)
-        return piece, np.clip((t - self.times[piece]) / self.lengths[piece], 0.0, 1.0)
+        index = np.searchsorted(self.times, t, side="right") - 1
+        index = np.clip(index, 0, len(self.lengths) - 1)
+        return index, np.clip((t - self.times[index]) / self.lengths[index], 0.0, 1.0)
 
     def place_on_path(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pieces and places in them at which path coordinates, (P,), are reached; s(t) does not decrease."""
@@ -170,32 +170,34 @@ class MotionStates:
     Attributes
     ----------
     pieces : MotionPieces
-    piece : (K,) int ndarray
+    index : (K,) int ndarray
     u, t, s : (K,) ndarray
-        Place in the piece; time, s; path coordinate.
+        Place in the piece of this index; time, s; path coordinate.
     q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
     pieces: MotionPieces
-    piece: np.ndarray
+    index: np.ndarray
     u: np.ndarray
 
     @classmethod
-    def at(cls, pieces: MotionPieces, piece: np.ndarray, u: np.ndarray) -> MotionStates:
+    def at(cls, pieces: MotionPieces, index: np.ndarray, u: np.ndarray) -> MotionStates:
         """Take pieces at places, in any order; each place once."""
-        order = np.lexsort((u, piece))
-        piece = piece[order]
+        order = np.lexsort((u, index))
+        index = index[order]
         u = u[order]
-        near = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= SAME_PLACE)
+        near = (index[1:] == index[:-1]) & (u[1:] - u[:-1] <= SAME_PLACE)
         again = near & ((u[1:] < 1.0) | (u[:-1] == 1.0))  # an end stays
-        first = np.append(True, ~again)[: len(piece)]
-        return cls(pieces, piece[first], u[first])
+        first = np.append(True, ~again)[: len(index)]
+        return cls(pieces, index[first], u[first])
 
     @classmethod
-    def join(cls, parts: list[MotionStates]) -> MotionStates:
+    def join(cls, chunks: list[MotionStates]) -> MotionStates:
         """Put states one after the other."""
-        piece = np.concatenate([part.piece for part in parts])
-        return cls(parts[0].pieces, piece, np.concatenate([part.u for part in parts]))
+        index = np.concatenate([states.index for states in chunks])
+        return cls(
+            chunks[0].pieces, index, np.concatenate([states.u for states in chunks])
+        )
 
     def split(self) -> Iterator[MotionStates]:
         """Yield the states in parts that take little memory."""
@@ -205,7 +207,7 @@ class MotionStates:
     @cached_property
     def t(self) -> np.ndarray:
         """Times, (K,), s."""
-        return self.pieces.time(self.piece, self.u)
+        return self.pieces.time(self.index, self.u)
 
     @cached_property
     def s(self) -> np.ndarray:
@@ -215,22 +217,22 @@ class MotionStates:
     @cached_property
     def q(self) -> np.ndarray:
         """Positions, (K, n)."""
-        return self.pieces.positions(self.piece, self.u)
+        return self.pieces.positions(self.index, self.u)
 
     @cached_property
     def qdot(self) -> np.ndarray:
         """Velocities, (K, n)."""
-        return bernstein(self.pieces.velocity, self.piece, self.u)
+        return bernstein(self.pieces.velocity, self.index, self.u)
 
     @cached_property
     def qddot(self) -> np.ndarray:
         """Accelerations, (K, n)."""
-        return bernstein(self.pieces.acceleration, self.piece, self.u)
+        return bernstein(self.pieces.acceleration, self.index, self.u)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
         """Jerks, (K, n)."""
-        return bernstein(self.pieces.jerk, self.piece, self.u)
+        return bernstein(self.pieces.jerk, self.index, self.u)
 
     @cached_property
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
@@ -242,7 +244,10 @@ class MotionStates:
         """Torques, (K, n)."""
         robot = self.pieces.robot
         return np.concatenate(
-            [torques(robot, part.q, part.qdot, part.qddot) for part in self.split()]
+            [
+                torques(robot, states.q, states.qdot, states.qddot)
+                for states in self.split()
+            ]
         )
 
     def torque(self, robot: Robot) -> np.ndarray:
@@ -252,17 +257,17 @@ class MotionStates:
 
     def only(self, chosen: np.ndarray | slice | list[int]) -> MotionStates:
         """Return some of the states, in the order that is chosen."""
-        return MotionStates(self.pieces, self.piece[chosen], self.u[chosen])
+        return MotionStates(self.pieces, self.index[chosen], self.u[chosen])
 
-    def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
+    def merge(self, added: MotionStates) -> tuple[MotionStates, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
-        both = self.join([self, other])
-        order = np.lexsort((both.u, both.piece))
+        both = self.join([self, added])
+        order = np.lexsort((both.u, both.index))
         return both.only(order), order
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class CheckedMotion:
     """What is verified, and against what.
 
     Attributes
@@ -307,7 +312,7 @@ class Given:
         rounding = tolerances.TIME * times[-1]
         first = np.searchsorted(times, phase.begin + rounding, side="right") - 1
         last = np.searchsorted(times, phase.end - rounding)
-        inside = (self.states.piece >= first) & (self.states.piece < last)
+        inside = (self.states.index >= first) & (self.states.index < last)
         return self.states.only(inside)
 
 
@@ -328,7 +333,7 @@ Places = tuple[np.ndarray, np.ndarray]
 """Pieces (K,) and places u in them (K,)."""
 
 
-def _all_places(given: Given) -> Places:
+def _all_places(motion: CheckedMotion) -> Places:
     """List all places at which a motion is checked, in any order.
 
     Raises
@@ -336,22 +341,22 @@ def _all_places(given: Given) -> Places:
     InputError
         They are more than `MOST_INSTANTS`.
     """
-    pieces = given.pieces
-    parts = (
-        _spread(given),
-        pieces.place_on_path(_path_coordinates(given)),
+    pieces = motion.pieces
+    places = (
+        _spread(motion),
+        pieces.place_on_path(_path_coordinates(motion)),
         _peaks(pieces),
         _reversals(pieces),
     )
-    piece, u = (np.concatenate(part) for part in zip(*parts, strict=True))
-    _check_count(len(piece))
-    return piece, u
+    index, u = (np.concatenate(arrays) for arrays in zip(*places, strict=True))
+    _check_count(len(index))
+    return index, u
 
 
-def _spread(given: Given) -> Places:
+def _spread(motion: CheckedMotion) -> Places:
     """Both ends of every piece and places between, no two of them further apart than a knot interval allows."""
-    pieces = given.pieces
-    trajectory = given.trajectory
+    pieces = motion.pieces
+    trajectory = motion.trajectory
     knots = np.unique(trajectory.knots) * trajectory.t_end
     edges = np.union1d(pieces.times, knots[(knots > 0.0) & (knots < pieces.times[-1])])
     first, _ = pieces.place(edges[:-1])
@@ -361,16 +366,16 @@ def _spread(given: Given) -> Places:
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]
     most_steps = max(_USUAL_INSTANTS / len(knots), _FEWEST)
-    steps_per_interval = min(given.options.points_per_interval, most_steps)
+    steps_per_interval = min(motion.options.points_per_interval, most_steps)
     by_interval = share * steps_per_interval - 1e-6  # less rounding
     travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)
     by_travel = travel[first] * (high - low) / _TRAVEL
-    wanted = np.nan_to_num(np.maximum(by_interval, by_travel))
-    steps = np.ceil(np.clip(wanted, _LEAST_STEPS, 10_000)).astype(int)
+    steps = np.nan_to_num(np.maximum(by_interval, by_travel))
+    steps = np.ceil(np.clip(steps, _LEAST_STEPS, 10_000)).astype(int)
     count = steps + 1
     _check_count(count.sum())
-    part = count_each(count) / np.repeat(steps, count)
-    u = (1.0 - part) * np.repeat(low, count) + part * np.repeat(high, count)
+    fraction = count_each(count) / np.repeat(steps, count)
+    u = (1.0 - fraction) * np.repeat(low, count) + fraction * np.repeat(high, count)
     return np.repeat(first, count), u
 
 
@@ -378,7 +383,7 @@ def list_speed_tables(task: Task) -> list[SpeedTable]:
     """List the tool's largest speeds that depend on s: the task's, feed rates of points, those of leads to speeds."""
     limits = task.tool_limits
     tables = [limits.speed] if isinstance(limits.speed, SpeedTable) else []
-    leads = [lead for part in limits.process_speed for lead in part.leads]
+    leads = [lead for section in limits.process_speed for lead in section.leads]
     return [*tables, *limits.feed, *leads]
 
 
@@ -395,13 +400,13 @@ def _check_count(count: int) -> None:
         )
 
 
-def _path_coordinates(given: Given) -> np.ndarray:
+def _path_coordinates(motion: CheckedMotion) -> np.ndarray:
     """Spread s over every piece of the path, however short: no small blend is stepped over; and add that of tables."""
-    breaks = given.path.breaks
-    parts = np.linspace(0.0, 1.0, given.options.points_per_interval)
-    _check_count(len(breaks) * len(parts))
-    s = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
-    return np.concatenate([s, *(table.s for table in list_speed_tables(given.task))])
+    breaks = motion.path.breaks
+    fractions = np.linspace(0.0, 1.0, motion.options.points_per_interval)
+    _check_count(len(breaks) * len(fractions))
+    s = (breaks[:-1, None] + np.diff(breaks)[:, None] * fractions).ravel()
+    return np.concatenate([s, *(table.s for table in list_speed_tables(motion.task))])
 
 
 def _peaks(pieces: MotionPieces) -> Places:
@@ -412,9 +417,9 @@ def _peaks(pieces: MotionPieces) -> Places:
         ends.min(axis=0) - pieces.acceleration.min(axis=0),
     )
     # Coefficients may leave the range between both ends by 1 % of the largest acceleration.
-    piece, joint = np.nonzero(beyond > 0.01 * np.abs(ends).max(axis=(0, 1)))
-    turning, u, _ = turns(pieces.acceleration[:, piece, joint])
-    return piece[turning], u
+    index, joint = np.nonzero(beyond > 0.01 * np.abs(ends).max(axis=(0, 1)))
+    turning, u, _ = turns(pieces.acceleration[:, index, joint])
+    return index[turning], u
 
 
 def _reversals(pieces: MotionPieces) -> Places:
@@ -426,14 +431,14 @@ def _reversals(pieces: MotionPieces) -> Places:
     friction = pieces.robot.friction
     rubbing = np.flatnonzero(friction.coulomb > 0.0)
     velocity = pieces.velocity[:, :, rubbing] / friction.v_eps[rubbing]
-    least = velocity.min(axis=0)
-    most = velocity.max(axis=0)
+    lowest = velocity.min(axis=0)
+    highest = velocity.max(axis=0)
     # A joint that stands still crosses zero only by rounding.
-    moving = np.maximum(most, -least) > speeds[0]
-    piece, joint = np.nonzero(moving & (least < near) & (most > -near))
-    slow = velocity[:, piece, joint]
+    moving = np.maximum(highest, -lowest) > speeds[0]
+    index, joint = np.nonzero(moving & (lowest < near) & (highest > -near))
+    slow = velocity[:, index, joint]
     crossing, u = roots((slow[:, :, None] - levels).reshape(len(slow), -1))
     turning, at, least_speed = turns(slow)
     is_near = np.abs(least_speed) < near
-    found = [piece[crossing // len(levels)], piece[turning[is_near]]]
-    return np.concatenate(found), np.concatenate([u, at[is_near]])
+    indices = [index[crossing // len(levels)], index[turning[is_near]]]
+    return np.concatenate(indices), np.concatenate([u, at[is_near]])

@@ -106,13 +106,13 @@ class Check:
     def in_words(self) -> str:
         """Say what was found, and what is allowed."""
         unit = "" if self.unit == "-" else f" {self.unit}"
-        found, _ = write_apart(self.value, self.allowed)
+        value, _ = write_apart(self.value, self.allowed)
         _, allowed, _ = self.figures(degrees=False)
         verdict = "<=" if self.passed else "FAILED, allowed"
         subject = f", {self.subject}" if self.subject else ""
         time = f" at {self.time:.4g} s" if self.time is not None else ""
         remark = f", {self.remark}" if self.remark else ""
-        return f"{found}{unit} {verdict} {allowed}{unit}{subject}{time}{remark}"
+        return f"{value}{unit} {verdict} {allowed}{unit}{subject}{time}{remark}"
 
 
 @dataclass(frozen=True, repr=False)

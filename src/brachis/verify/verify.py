@@ -20,7 +20,7 @@ from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace, RowsAndAngle
 from brachis.robot.urdf_bodies import turns_about
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import MotionSource, motion_of
 from brachis.verify.checks import (
     check_continuity,
     check_ends,
@@ -32,12 +32,12 @@ from brachis.verify.checks import (
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
 def verify_trajectory(
-    trajectory: Motion,
+    trajectory: MotionSource,
     options: VerifyOptions | None = None,
     *,
     robot: Robot | None = None,
@@ -86,8 +86,8 @@ def verify_trajectory(
         ratio_tolerance=trajectory.task.refinement.tolerance
     )
     task = trajectory.task
-    asked = robot or trajectory.robot
-    robot, task_map = bind(asked, task.task_space, task.tolerances)
+    robot = robot or trajectory.robot
+    robot, task_map = bind(robot, task.task_space, task.tolerances)
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
             "the joints of the robot are not those of the trajectory",
@@ -95,15 +95,17 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    given = Given(trajectory, robot, task_map, path_of(task_map, task), options)
+    motion = CheckedMotion(
+        trajectory, robot, task_map, path_of(task_map, task), options
+    )
     # Part by part, for placements of all joints take much memory.
     surveys = [
-        (_path_errors(given, part), find_margins(given, part))
-        for part in given.states.split()
+        (_path_errors(motion, states), find_margins(motion, states))
+        for states in motion.states.split()
     ]
     errors, margins = zip(*surveys, strict=True)
-    path_check = _check_path(given, np.concatenate(errors))
-    ratios = check_limits(given, own_limits)
+    path_check = _check_path(motion, np.concatenate(errors))
+    ratios = check_limits(motion, own_limits)
     names = Counter(check.name.removesuffix(" ratio") for check in ratios)
     left_out = Counter(trajectory.own_limits) - names
     if left_out:
@@ -116,12 +118,12 @@ def verify_trajectory(
     checks = [
         path_check,
         *ratios,
-        *check_progress(given),
-        *check_stops(given),
-        *check_process_speed(given),
-        *check_ends(given),
-        *check_splines(given),
-        *check_continuity(given),
+        *check_progress(motion),
+        *check_stops(motion),
+        *check_process_speed(motion),
+        *check_ends(motion),
+        *check_splines(motion),
+        *check_continuity(motion),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     least = (
@@ -129,17 +131,17 @@ def verify_trajectory(
         for same in zip(*margins, strict=False)
     )
     return Verification(
-        tuple(checks), len(given.states.t), worst, path_check.value, tuple(least)
+        tuple(checks), len(motion.states.t), worst, path_check.value, tuple(least)
     )
 
 
-def _path_errors(given: Given, states: MotionStates) -> np.ndarray:
+def _path_errors(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
     """Return the tool's distance, m, or largest angle of an axis, rad, from the path at the saved s(t), (K,)."""
-    task_map = given.task_map
-    targets = given.path.derivatives(np.clip(states.s, 0.0, 1.0), 0)[0]
+    task_map = motion.task_map
+    targets = motion.path.derivatives(np.clip(states.s, 0.0, 1.0), 0)[0]
     if isinstance(task_map, JointSpace):
         return np.linalg.norm(states.q - targets, axis=1)
-    positions, rotations = tool_placements(given.robot, states.q, states.joints)
+    positions, rotations = tool_placements(motion.robot, states.q, states.joints)
     axes = list(task_map.axes)
     distances = np.linalg.norm(positions[:, axes] - targets[:, : len(axes)], axis=1)
     if not task_map.angles:
@@ -149,23 +151,23 @@ def _path_errors(given: Given, states: MotionStates) -> np.ndarray:
         axis = task_map.world_axis
         pointers = np.delete(rotations, axis, axis=1)[:, :, [task_map.tool_axis]]
         turned = turns_about(np.eye(3)[axis], targets[:, -1])
-        wanted = np.delete(turned, axis, axis=1)[:, :, [task_map.plane[0]]]
+        axes_of_target = np.delete(turned, axis, axis=1)[:, :, [task_map.plane[0]]]
     else:
         pointers = rotations
-        wanted = targets[:, -9:].reshape(-1, 3, 3)
-    chords = np.linalg.norm(pointers - wanted, axis=1).max(axis=1)
+        axes_of_target = targets[:, -9:].reshape(-1, 3, 3)
+    chords = np.linalg.norm(pointers - axes_of_target, axis=1).max(axis=1)
     return np.maximum(distances, 2.0 * np.arcsin((0.5 * chords).clip(max=1.0)))
 
 
-def _check_path(given: Given, errors: np.ndarray) -> Check:
+def _check_path(motion: CheckedMotion, errors: np.ndarray) -> Check:
     """Check the largest distance, (K,), of the tool from the path at the saved s(t)."""
     worst = np.argmax(errors)
-    tolerance = given.options.path_tolerance
+    tolerance = motion.options.path_tolerance
     remark = ""
-    recovered = given.trajectory.recovered
+    recovered = motion.trajectory.recovered
     if recovered is not None:
         tolerance = max(tolerance, recovered.tolerance)
         remark = "the path was recovered from the motion"
     error = errors[worst]
-    time = given.states.t[worst]
+    time = motion.states.t[worst]
     return Check("path error", error, tolerance, "m, rad", time=time, remark=remark)

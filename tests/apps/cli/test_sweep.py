@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from brachis.apps.sweeps import run as sweeps_run
-from brachis.apps.sweeps.plans import Outcome
+from brachis.apps.sweeps.plans import PlanOutcome
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def sweep_file(tmp_path, write, task, monkeypatch):
             if length > 3.0:
                 yield (
                     plan,
-                    Outcome(
+                    PlanOutcome(
                         {
                             "status": "failed",
                             "error": "PathError",
@@ -30,7 +30,7 @@ def sweep_file(tmp_path, write, task, monkeypatch):
             else:
                 yield (
                     plan,
-                    Outcome(
+                    PlanOutcome(
                         {
                             "status": "verified",
                             "t_end_s": length / 2.0,

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import brachis
-from brachis.apps.sweeps.plans import Outcome
+from brachis.apps.sweeps.plans import PlanOutcome
 from brachis.apps.sweeps.pools import as_completed, on_executor, pool_for
 from brachis.errors import ClusterError, InputError, TaskError
 
@@ -44,7 +44,7 @@ class Processes:
                 future.set_exception(BrokenExecutor("killed"))
             else:
                 future.set_result(
-                    Outcome({"status": "verified", "t_end_s": float(plan)})
+                    PlanOutcome({"status": "verified", "t_end_s": float(plan)})
                 )
         self.running.clear()
 
@@ -86,7 +86,7 @@ def test_a_plan_that_its_workers_did_not_survive_fails_alone():
     """Dask says so by an error that only Dask has."""
     answers = {0: Future(), 1: Future()}
     answers[0].set_exception(RuntimeError("killed four workers"))
-    answers[1].set_result(Outcome({"status": "verified"}))
+    answers[1].set_result(PlanOutcome({"status": "verified"}))
     found = dict(as_completed([0, 1], answers.get, 2))
     assert found[0].facts["status"] == "failed"
     assert found[0].facts["message"] == "killed four workers"
@@ -106,7 +106,7 @@ def test_an_executor_without_workers_is_an_error():
 def test_plans_that_wait_are_cancelled_with_the_sweep():
     future = Future()
     done = Future()
-    done.set_result(Outcome({"status": "verified"}))
+    done.set_result(PlanOutcome({"status": "verified"}))
     outcomes = as_completed([0, 1], {0: done, 1: future}.get, 2)
     next(outcomes)
     outcomes.close()

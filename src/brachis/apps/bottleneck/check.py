@@ -197,10 +197,10 @@ def _check_limit(
     before = base
     off = abs(predicted - (t_end(answer) - t_end(base)))
     if off > max(0.02 * abs(predicted), same):
-        other, is_optimum = _solve_again(program, answer)
+        returned, is_optimum = _solve_again(program, answer)
         optimal = optimal and is_optimum
-        if abs(t_end(other) - t_end(base)) > same:
-            before = other
+        if abs(t_end(returned) - t_end(base)) > same:
+            before = returned
     return CheckedSensitivity(
         sensitivity=entry,
         predicted=predicted,

@@ -99,11 +99,11 @@ class BottleneckReport:
             if costs is not None and len(costs.limits) > len(self.check.entries):
                 lines.append("process speeds are not checked")
         lines += write_active(self.saturations)
-        rows = phase_rows([each.phase for each in self.phases])
+        rows = phase_rows([limits.phase for limits in self.phases])
         if len(rows) > 1:
-            for (name, s, time, speed), each in zip(rows, self.phases, strict=True):
+            for (name, s, time, speed), limits in zip(rows, self.phases, strict=True):
                 motion = f"phase {name}, s = {s}, {time}, {speed}"
-                lines.append(f"{motion}; active limits: {each}")
+                lines.append(f"{motion}; active limits: {limits}")
         best = self.reference
         if best is not None:
             longer = f"{100.0 * best.distance:.2f} % ({1e3 * (self.t_end - best.t_end):.1f} ms)"
@@ -131,7 +131,7 @@ class BottleneckReport:
             "sensitivities": self.sensitivities and self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
-            "phases": [each.to_dict() for each in self.phases],
+            "phases": [phase.to_dict() for phase in self.phases],
             "timing_gap": self.timing and self.timing.to_dict(),
             "check": self.check and self.check.to_dict(),
             "reference": self.reference and self.reference.to_dict(),
@@ -181,8 +181,8 @@ def report(
     --------
     >>> import brachis
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
-    >>> found = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
-    >>> [sensitivity.label.subject for sensitivity in found.sensitivities.limits][0]
+    >>> report = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
+    >>> [sensitivity.label.subject for sensitivity in report.sensitivities.limits][0]
     'j1'
     """
     if isinstance(motion, str | os.PathLike):
@@ -265,37 +265,37 @@ def _part(saved: float, t_end: float) -> str:
     return f"{_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
 
 
-def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
+def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     """Say what every limit costs, the costliest first."""
     lines = []
-    if not found.reliable:
+    if not sensitivities.reliable:
         lines.append(
-            f"warning: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
-            "motion is not an optimum, and the savings below are rough"
+            f"warning: the multipliers leave {100.0 * sensitivities.residual:.2g} % of the gradient of t_E unbalanced, "
+            "so the motion is not an optimum, and the savings below are rough"
         )
     savings = [
         (_predict_saving(entry), f"{_more_room(entry, degrees=degrees)} saves")
-        for entry in found.limits
+        for entry in sensitivities.limits
     ]
     savings += [
         (entry.saved, f"{entry.change} {_VERBS[entry.accuracy]}")
-        for entry in found.task
+        for entry in sensitivities.task
     ]
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
     lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
     if len(costly) < len(savings):
         lines.append("no other limit costs time" if costly else "no limit costs time")
-    if found.source == TIMINGS:
+    if sensitivities.source == TIMINGS:
         how = "timings of the same joint path with limits raised"
     else:
-        how = f"multipliers by the {found.source}, residual {found.residual:.0e}"
+        how = f"multipliers by the {sensitivities.source}, residual {sensitivities.residual:.0e}"
     lines.append(f"(to first order, from {how})")
-    if not found.unique:
+    if not sensitivities.unique:
         lines.append(
             "(each saving is for one limit that is raised alone; lowered as much, it may cost more time than that)"
         )
-    for boundary in found.boundaries:
+    for boundary in sensitivities.boundaries:
         saved = boundary.derivative * boundary.margin
         if saved > _NOTHING * t_end:
             lines.append(
@@ -336,13 +336,13 @@ def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
     return f"{amount} more room at the {end} end of {label}"
 
 
-def _timing(found: TimingGap, t_end: float) -> list[str]:
+def _timing(gap: TimingGap, t_end: float) -> list[str]:
     """Say what the timing costs from 1 % on: ``intervals: auto`` leaves 0.1 %."""
-    saved = t_end - found.least_time
-    if saved < 0.01 * t_end or found.left_out:
+    saved = t_end - gap.least_time
+    if saved < 0.01 * t_end or gap.left_out:
         return []
     line = (
-        f"the timing costs about {_part(saved, t_end)}: the same joint path takes {found.least_time:.4g} s "
+        f"the timing costs about {_part(saved, t_end)}: the same joint path takes {gap.least_time:.4g} s "
         "with torques that may jump; for a faster motion, set spline.intervals: auto or a larger number"
     )
     return [line]
@@ -383,10 +383,10 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
     return lines
 
 
-def write_active(found: tuple[Saturation, ...]) -> list[str]:
+def write_active(entries: tuple[Saturation, ...]) -> list[str]:
     """Say which limits are active for some time."""
     lines = []
-    for entry in found:
+    for entry in entries:
         if entry.share < SHORTEST_SHARE:
             continue
         label = entry.label

@@ -63,8 +63,8 @@ def dense_samples(trajectory: Trajectory) -> Samples:
 def _dense_times(trajectory: Trajectory, per_interval: int) -> np.ndarray:
     """Return the times of knots and nodes, and `per_interval` times in every knot interval, s; fewer of very many."""
     knots = knot_times(trajectory)
-    most = max(_FEWEST_TIMES, _MOST_TIMES // len(knots))
-    grid = spread(knots, min(per_interval, most))
+    per_interval = min(per_interval, max(_FEWEST_TIMES, _MOST_TIMES // len(knots)))
+    grid = spread(knots, per_interval)
     return np.union1d(grid, trajectory.times)
 
 
@@ -184,7 +184,10 @@ class Saturation(Summary):
             "kind": self.label.kind,
             "share": self.share,
             "peak_ratio": self.peak,
-            "active_s": [[each.begin, each.end, each.side] for each in self.active],
+            "active_s": [
+                [interval.begin, interval.end, interval.side]
+                for interval in self.active
+            ],
         }
 
 
@@ -202,7 +205,7 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
         Of all limits, those active longest first.
     """
     ratios = limit_ratios(motion) if isinstance(motion, Trajectory) else motion
-    found = []
+    entries = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
             ActiveInterval(begin, end, side)
@@ -213,8 +216,8 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
         duration = sum(interval.end - interval.begin for interval in active)
         share = float(duration / ratios.t[-1])
         peak = float(np.abs(column).max())
-        found.append(Saturation(label, share, peak, tuple(active)))
-    return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
+        entries.append(Saturation(label, share, peak, tuple(active)))
+    return tuple(sorted(entries, key=lambda entry: (-entry.share, -entry.peak)))
 
 
 @dataclass(frozen=True)
@@ -249,16 +252,16 @@ class PhaseLimits:
 
 
 def limits_by_phase(
-    trajectory: Trajectory, found: Sequence[Saturation]
+    trajectory: Trajectory, saturated: Sequence[Saturation]
 ) -> tuple[PhaseLimits, ...]:
     """Find which of a motion's limits are active in each of its phases."""
     phases = []
     for phase in trajectory.phases:
         shares = []
-        for entry in found:
+        for entry in saturated:
             overlaps = [
-                min(each.end, phase.end) - max(each.begin, phase.begin)
-                for each in entry.active
+                min(interval.end, phase.end) - max(interval.begin, phase.begin)
+                for interval in entry.active
             ]
             share = sum(max(0.0, overlap) for overlap in overlaps) / phase.duration
             if share >= SHORTEST_SHARE:

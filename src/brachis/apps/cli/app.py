@@ -80,7 +80,9 @@ class _Commands(TyperGroup):
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
         """Find a command, and add the options that all commands have."""
         command = super().get_command(ctx, cmd_name)
-        shared = [each for each in self.params if each.name in {"quiet", "verbose"}]
+        shared = [
+            option for option in self.params if option.name in {"quiet", "verbose"}
+        ]
         if command is not None and shared[0] not in command.params:
             command.params += shared
         return command
@@ -147,13 +149,13 @@ class DocumentedCommand(TyperCommand):
         super().__init__(*args, **keywords)
         docstring = inspect.getdoc(self.callback) or ""  # none under python -OO
         titles = r"\n\n(Parameters|Examples)\n-+\n"
-        self.help, *parts = re.split(titles, docstring)
-        sections = dict(zip(parts[::2], parts[1::2], strict=True))
+        self.help, *titled_texts = re.split(titles, docstring)
+        sections = dict(zip(titled_texts[::2], titled_texts[1::2], strict=True))
         # The help must not wrap examples, so that each can be copied.
         self.epilog = f"\b\nExamples:\n{indent(sections.get('Examples', ''), '  ')}"
         entry = re.compile(r"^(\w+) : .*\n((?: +.*\n?)+)", re.MULTILINE)
-        own = sections.get("Parameters", "")
-        texts = dict(entry.findall(_SHARED) + entry.findall(own))
+        described = sections.get("Parameters", "")
+        texts = dict(entry.findall(_SHARED) + entry.findall(described))
         parameters: list[Any] = self.params
         for parameter in parameters:
             parameter.help = " ".join(texts.get(parameter.name, "").split())
@@ -181,7 +183,7 @@ def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
         else:
             words.append(argument)
             continue
-        words += [part for part in re.split(r"[,\s]+", value) if part] or [value]
+        words += [number for number in re.split(r"[,\s]+", value) if number] or [value]
     return words
 
 
@@ -196,16 +198,16 @@ app = typer.Typer(
 )
 
 
-def _print_version(asked: bool) -> None:
+def _print_version(is_set: bool) -> None:
     """Print the version and stop."""
-    if asked:
+    if is_set:
         typer.echo(f"brachis {brachis.__version__}")
         raise typer.Exit
 
 
-def _set_verbosity(option: typer.CallbackParam, asked: bool) -> None:
+def _set_verbosity(option: typer.CallbackParam, is_set: bool) -> None:
     """Remember ``--quiet`` or ``--verbose``."""
-    if asked:
+    if is_set:
         _VERBOSITY.set(Verbosity[str(option.name).upper()])
 
 
@@ -312,12 +314,12 @@ def load_changed_task(path: Path, keys: Mapping[str, object]) -> brachis.Task:
     return brachis.load_task(path, changes=keys)
 
 
-def refuse_options(given: Mapping[str, object], source: str, allowed: str) -> None:
+def refuse_options(values: Mapping[str, object], source: str, allowed: str) -> None:
     """Refuse options that do not fit the input.
 
     Parameters
     ----------
-    given : mapping of str to object
+    values : mapping of str to object
         The options and their values; None: not given.
     source : str
         What the input is, with its article.
@@ -328,7 +330,7 @@ def refuse_options(given: Mapping[str, object], source: str, allowed: str) -> No
     ------
     InputError
     """
-    for option, value in given.items():
+    for option, value in values.items():
         if value is not None:
             raise InputError(
                 f"this option cannot be used with {source}",
@@ -338,7 +340,7 @@ def refuse_options(given: Mapping[str, object], source: str, allowed: str) -> No
             )
 
 
-def urdf_of(given: Path) -> Path:
+def urdf_of(source: Path) -> Path:
     """Return the URDF file; of a robot that comes with brachis, given by its name, its file.
 
     Raises
@@ -346,7 +348,7 @@ def urdf_of(given: Path) -> Path:
     UnknownNameError
         There is neither a file nor a robot of this name.
     """
-    if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
-        return given
-    check_names("URDF file or robot", [str(given)], brachis.robots.names(), "URDF")
-    return brachis.robots.path_of(str(given))
+    if is_file(source) or is_folder(source) or source.suffix or len(source.parts) > 1:
+        return source
+    check_names("URDF file or robot", [str(source)], brachis.robots.names(), "URDF")
+    return brachis.robots.path_of(str(source))

@@ -64,12 +64,14 @@ def check_output(
     """
     problem = "the file cannot be written"
     if is_folder(out):
-        found = "a folder of this name"
-        raise InputError(problem, where=str(out), found=found)
+        raise InputError(problem, where=str(out), found="a folder of this name")
     if not is_folder(out.parent):
-        found = f"no folder {out.parent}"
-        hint = "Make the folder first"
-        raise InputError(problem, where=str(out), found=found, hint=hint)
+        raise InputError(
+            problem,
+            where=str(out),
+            found=f"no folder {out.parent}",
+            hint="Make the folder first",
+        )
     if not is_file(out):
         return
     for path in inputs:
@@ -140,9 +142,9 @@ def write_files(
 
 
 def _write_results(
-    out: Path, results: Mapping[str, Writer], others: Iterable[str]
+    out: Path, results: Mapping[str, Writer], stale: Iterable[str]
 ) -> None:
-    """Write results into a temporary folder, remove `others`, and move the results to their places."""
+    """Write results into a temporary folder, remove `stale`, and move the results to their places."""
     temporary = temporary_in(out)
     with writing_errors(out):
         temporary.mkdir()
@@ -153,7 +155,7 @@ def _write_results(
             except InputError as error:
                 error.where = str(out / name)  # not the temporary file
                 raise
-        for name in others:
+        for name in stale:
             with writing_errors(out / name):
                 (out / name).unlink(missing_ok=True)
         for name in results:
@@ -284,11 +286,13 @@ def finish(
     """
     failures: list[InputError] = []
     if out is not None:
-        own = str if verified else _unverified
-        files = {own(name): write for name, write in results.items()}
-        (data_file,) = (own(name) for name in names if name.endswith(".json"))
+        name_file = str if verified else _unverified
+        files = {name_file(name): write for name, write in results.items()}
+        (data_file,) = (name_file(name) for name in names if name.endswith(".json"))
         files[data_file] = partial(write_text, json_text(data))
-        drawings = {own(name): partial(draw, make) for name, make in figures.items()}
+        drawings = {
+            name_file(name): partial(draw, make) for name, make in figures.items()
+        }
         stale = {*names, *map(_unverified, names)} - {*files}
         with show_progress() as listener:
             data["files"], failures = write_files(
@@ -304,12 +308,12 @@ def finish(
     if result is not None:
         if result.interrupted:
             print_error("the search was ended early; this is the best motion so far")
-        for each in result.not_completed:
-            print_error(f"not completed: {each}")
+        for step in result.not_completed:
+            print_error(f"not completed: {step}")
     if not verified:
         checks = () if result is None else result.verification.checks
         failed = [
-            f"{each.name} {each.in_words()}" for each in checks if not each.passed
+            f"{check.name} {check.in_words()}" for check in checks if not check.passed
         ]
         named = f" ({name_first(failed, '; ')})" if failed else ""
         print_error(

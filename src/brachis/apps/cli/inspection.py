@@ -88,9 +88,13 @@ def inspect(
     keys = read_changes(changes)
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
-        given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
+        options = {
+            "--tool-frame": tool_frame,
+            "--base-frame": base_frame,
+            "--lock": lock,
+        }
         set_it = "robot.tool_frame, robot.base_frame, robot.locked_joints"
-        refuse_options(given, "a task file", f"a URDF; a task has {set_it}")
+        refuse_options(options, "a task file", f"a URDF; a task has {set_it}")
         task = load_changed_task(source, keys)
         space = space or task.task_space
         tolerances = task.tolerances
@@ -120,7 +124,7 @@ def inspect(
         remarks.append(brachis.ik.NO_CLOSED_FORM)
     if missing := brachis.ik.missing_eaik(candidates):
         remarks.append(missing)
-    found = {
+    summary = {
         "robot": str(source),
         "tool": place,
         "task_space": list(task_map.rows),
@@ -128,7 +132,7 @@ def inspect(
         "remarks": remarks,
         "decompositions": [_decomposition(candidate) for candidate in candidates],
     }
-    data = found | _describe(robot, problem, collisions)
+    data = summary | _describe(robot, problem, collisions)
     if json:
         print_json(data)
     else:
@@ -416,9 +420,11 @@ def _robot_of_urdf(
     for text in lock:
         name, equals, value = text.partition("=")
         if not equals:
-            allowed = "name=value, in rad or m"
             raise InputError(
-                "not understood", where="--lock", found=text, allowed=allowed
+                "not understood",
+                where="--lock",
+                found=text,
+                allowed="name=value, in rad or m",
             )
         locked[name] = float(numbers(value, f"--lock {name}", "rad or m"))
     robot = brachis.Robot.from_urdf(
@@ -468,8 +474,8 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     cells = [[row[name] for name in columns] for row in shown]
     print_table("choices of redundant joints (-: no closed form)", columns, cells)
     if not is_verbose:
-        more = f"... and {len(rows) - len(shown)} more; " if rows != shown else ""
-        print_lines(f"{more}--verbose lists branches, and reasons against choices")
+        omission = f"... and {len(rows) - len(shown)} more; " if rows != shown else ""
+        print_lines(f"{omission}--verbose lists branches, and reasons against choices")
         return
     for labels in dict.fromkeys(row["labels"] for row in rows if row["labels"]):
         alike = [row["redundant joints"] for row in rows if row["labels"] == labels]

@@ -286,7 +286,7 @@ def _read_candidates(
     try:
         data = json_library.loads(read_file(path.with_suffix(".json"), 64_000_000))
         same = math.isclose(data["t_end"], trajectory.t_end, rel_tol=1e-12)
-        return [dict(each) for each in data["candidates"]] if same else []
+        return [dict(candidate) for candidate in data["candidates"]] if same else []
     except (OSError, ValueError, KeyError, TypeError):
         return []
 

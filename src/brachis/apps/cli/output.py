@@ -62,11 +62,11 @@ def print_table(
         uncut = map(cell_len, texts if is_number else ())
         least.append(max((1, *shortened, *uncut)))
     is_lined = sum(width + 3 for width in least) + 1 <= console.width
-    parts = [[*range(len(columns))]]
+    column_groups = [[*range(len(columns))]]
     if not is_lined:
-        parts = _split_columns(least, console.width)
-    for number, part in enumerate(parts, start=1):
-        count = f" ({number} of {len(parts)})" if len(parts) > 1 else ""
+        column_groups = _split_columns(least, console.width)
+    for number, indices in enumerate(column_groups, start=1):
+        count = f" ({number} of {len(column_groups)})" if len(column_groups) > 1 else ""
         table = Table(
             title=title + count,
             title_justify="left",
@@ -75,29 +75,29 @@ def print_table(
             padding=(0, 1),
             pad_edge=is_lined,
         )
-        for i in part:
+        for i in indices:
             is_number = columns[i] in numbers
             side: JustifyMethod = "right" if is_number else "left"
             table.add_column(columns[i], justify=side, overflow="fold")
         for row in cells:
-            table.add_row(*(row[i] for i in part))
+            table.add_row(*(row[i] for i in indices))
         unlimited = console.options.update_width(10_000)
         if console.measure(table, options=unlimited).maximum > console.width:
-            for i, column in zip(part, table.columns, strict=True):
+            for i, column in zip(indices, table.columns, strict=True):
                 column.width = least[i] if columns[i] in numbers else None
         console.print(table)
 
 
 def _split_columns(least: Sequence[int], width: int) -> list[list[int]]:
     """Share the columns out to tables without lines that fit; the first column is in each."""
-    parts = [[0]]
+    column_groups = [[0]]
     for i in range(1, len(least)):
-        part = [*parts[-1], i]
-        if len(part) > 2 and sum(least[k] + 2 for k in part) - 2 > width:
-            parts.append([0, i])
+        indices = [*column_groups[-1], i]
+        if len(indices) > 2 and sum(least[k] + 2 for k in indices) - 2 > width:
+            column_groups.append([0, i])
         else:
-            parts[-1] = part
-    return parts
+            column_groups[-1] = indices
+    return column_groups
 
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
@@ -123,7 +123,9 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
         numbers=("worst", "allowed", "time [s]"),
     )
     print_lines(*scales)
-    print_lines(*(f"{each.name}: {each.in_words()}" for each in verification.margins))
+    print_lines(
+        *(f"{margin.name}: {margin.in_words()}" for margin in verification.margins)
+    )
 
 
 def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
@@ -132,12 +134,12 @@ def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
 
     if data[key] is None:
         return "free"
-    parts = []
+    positions = []
     columns = (data["joint_names"], data[key], data["position_units"])
     for name, value, si_unit in zip(*columns, strict=True):
         unit, factor = shown_unit(si_unit, degrees=degrees)
-        parts.append(f"{name} {factor * value:z.4f} {unit}")
-    return ", ".join(parts)
+        positions.append(f"{name} {factor * value:z.4f} {unit}")
+    return ", ".join(positions)
 
 
 def print_error(message: str) -> None:

@@ -203,8 +203,8 @@ def bottleneck(
     with output_folder(out, _BOTTLENECK, (task, urdf)), show_progress() as listener:
         source = motion_file(task)
         if source.suffix.lower() == ".npz":
-            given = {"--urdf": urdf, "--set": changes, "--strict": strict}
-            refuse_options(given, "a saved motion", "a task file")
+            options = {"--urdf": urdf, "--set": changes, "--strict": strict}
+            refuse_options(options, "a saved motion", "a task file")
             trajectory = brachis.Trajectory.load(source)
             verification = brachis.verify_trajectory(trajectory)
             data = describe_motion(trajectory, verification)

@@ -116,7 +116,7 @@ def compare(
     from brachis.apps.comparison import plot_both_motions
 
     with output_folder(out, _FILES, (csv, robot)), show_progress() as listener:
-        found = brachis.compare(
+        comparison = brachis.compare(
             csv,
             str(robot),
             task_space=task_space_of(task_space),
@@ -126,16 +126,18 @@ def compare(
             keep_end=keep_end,
             listener=listener,
         )
-    drawings: dict[str, Drawing] = {"comparison.png": lambda: plot_both_motions(found)}
+    drawings: dict[str, Drawing] = {
+        "comparison.png": lambda: plot_both_motions(comparison)
+    }
     code = finish(
-        found.to_dict(),
-        {"today.npz": found.recorded.save, "result.npz": found.result.save},
+        comparison.to_dict(),
+        {"today.npz": comparison.recorded.save, "result.npz": comparison.result.save},
         drawings if figures else {},
         out=out,
         names=_FILES,
-        verified=found.result.verified,
+        verified=comparison.result.verified,
         json=json,
-        show=lambda: print_lines(str(found)),
-        result=found.result,
+        show=lambda: print_lines(str(comparison)),
+        result=comparison.result,
     )
     raise typer.Exit(code)

@@ -48,7 +48,7 @@ def robots(json: Json = False) -> None:
     columns = ("name", "what it is", "joints", "their names")
     print_table("included robots", columns, rows, numbers=("joints",))
     print_lines(
-        *(f"{each['name']}: {each['urdf']}" for each in listed),
+        *(f"{entry['name']}: {entry['urdf']}" for entry in listed),
         "A name may stand for the URDF: brachis inspect scara3, brachis new scara3",
     )
 

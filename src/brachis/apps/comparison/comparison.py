@@ -18,7 +18,7 @@ from brachis.common.files import file_name
 from brachis.common.progress import Listener
 from brachis.common.summary import Summary
 from brachis.errors import PathError, PlanningError
-from brachis.planner import Given, plan
+from brachis.planner import RobotOrTask, plan
 from brachis.result import Result
 from brachis.robot.task_map import JOINTS
 from brachis.task import Source, Task
@@ -102,8 +102,8 @@ class Comparison(Summary):
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
-    ...     found = brachis.compare(f"{folder}/recorded.csv", task=result.task)
-    >>> [use.limit for use in found.uses], isinstance(found, brachis.Comparison)
+    ...     comparison = brachis.compare(f"{folder}/recorded.csv", task=result.task)
+    >>> [use.limit for use in comparison.uses], isinstance(comparison, brachis.Comparison)
     (['torque'], True)
     """
 
@@ -213,7 +213,7 @@ class Comparison(Summary):
 @check_keywords
 def compare(
     recorded: str | os.PathLike[str] | Trajectory,
-    robot: Given = None,
+    robot: RobotOrTask = None,
     *,
     task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
@@ -257,8 +257,8 @@ def compare(
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
-    ...     found = brachis.compare(f"{folder}/recorded.csv", task=result.task)
-    >>> found.result.verified, found.saved > -1e-3
+    ...     comparison = brachis.compare(f"{folder}/recorded.csv", task=result.task)
+    >>> comparison.result.verified, comparison.saved > -1e-3
     (True, True)
     """
     check_callable(listener, "listener")
@@ -274,9 +274,11 @@ def compare(
         )
     results = []
     failures = []
-    for asked in tasks_of(recorded, keep_end=keep_end):
+    for path_task in tasks_of(recorded, keep_end=keep_end):
         try:
-            result = plan(recorded.robot, asked, listener=listener, check_advice=False)
+            result = plan(
+                recorded.robot, path_task, listener=listener, check_advice=False
+            )
         except PlanningError as error:
             failures.append(error)
             continue
@@ -285,7 +287,7 @@ def compare(
             break
     if not results:
         raise failures[0]
-    best = max(results, key=lambda each: (each.verified, -each.t_end))
+    best = max(results, key=lambda result: (result.verified, -result.t_end))
     verification = verify_trajectory(recorded)
     return Comparison(recorded, verification, bound_ratios(recorded), best)
 

@@ -122,9 +122,9 @@ class Rail:
     def __post_init__(self) -> None:
         """Check the figures."""
         for figure, (allowed, shape, test) in _FIGURES.items():
-            given = getattr(self, figure)
+            raw = getattr(self, figure)
             try:
-                value = np.array(given, dtype=float)
+                value = np.array(raw, dtype=float)
             except (TypeError, ValueError):
                 value = np.array(np.nan)
             is_finite = value.shape == shape and np.isfinite(value).all()
@@ -132,7 +132,7 @@ class Rail:
                 raise InputError(
                     "this value is not valid",
                     where=figure,
-                    found=str(given),
+                    found=str(raw),
                     allowed=allowed,
                 )
             if figure == "axis":
@@ -141,12 +141,12 @@ class Rail:
             plain = tuple(value.tolist()) if shape else float(value)
             object.__setattr__(self, figure, plain)
         for figure in ("name", "root"):
-            given = getattr(self, figure)
-            if not (isinstance(given, str) and _NAME.fullmatch(given)):
+            raw = getattr(self, figure)
+            if not (isinstance(raw, str) and _NAME.fullmatch(raw)):
                 raise InputError(
                     "this is not a valid name",
                     where=figure,
-                    found=repr(given),
+                    found=repr(raw),
                     allowed="a letter or underscore, then letters, digits, underscores, dots and hyphens",
                 )
 
@@ -166,8 +166,8 @@ class Rail:
         relocate_meshes(arm.robot, source, target)
         arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
         arm.robot[:0] = self._elements(root)
-        declaration, _, rest = robot_text(arm.robot).partition("\n")
-        return "\n".join((declaration, COMPOSED, rest.removeprefix(f"{COMPOSED}\n")))
+        declaration, _, body = robot_text(arm.robot).partition("\n")
+        return "\n".join((declaration, COMPOSED, body.removeprefix(f"{COMPOSED}\n")))
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
         """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""

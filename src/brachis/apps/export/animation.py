@@ -140,7 +140,7 @@ def film_of(
             found=slower,
             allowed="> 0: 10 is ten times slower",
         )
-    most = 5000
+    max_pictures = 5000
     usable = np.isfinite(dt) and dt > 0.0
     if not usable or abs(dt / step - round(dt / step)) > 1e-6:
         raise InputError(
@@ -150,16 +150,16 @@ def film_of(
             allowed=f"a multiple of {step:g} s",
         )
     count = slower * trajectory.t_end / dt
-    if count >= most:
+    if count >= max_pictures:
         raise InputError(
             "the animation would have too many pictures",
             where="dt" if slower <= 1.0 else "slower",
             found=f"{count:.6g} pictures: {slower:g} x {trajectory.t_end:.4g} s / {dt:g} s",
-            allowed=f"fewer than {most}",
+            allowed=f"fewer than {max_pictures}",
             hint="Lower slower, or raise dt",
         )
-    found = frames(trajectory, trajectory.sample(dt / slower).t, slower)
-    return (pixels[:, :, :3].copy() for _, pixels in found), dt
+    pictures = frames(trajectory, trajectory.sample(dt / slower).t, slower)
+    return (pixels[:, :, :3].copy() for _, pixels in pictures), dt
 
 
 def write_gif(film: Film, stream: BinaryIO) -> None:
@@ -168,15 +168,15 @@ def write_gif(film: Film, stream: BinaryIO) -> None:
     pictures, period = film
     images = [pillow.fromarray(picture) for picture in pictures]
     palette = images[len(images) // 2].quantize(128)
-    first, *others = (
+    first, *following = (
         image.quantize(palette=palette, dither=pillow.Dither.NONE) for image in images
     )
     first.save(
         stream,
         format="GIF",
         save_all=True,
-        append_images=others,
-        duration=[*[round(1e3 * period)] * len(others), 1000],
+        append_images=following,
+        duration=[*[round(1e3 * period)] * len(following), 1000],
         loop=0,
         optimize=True,
     )

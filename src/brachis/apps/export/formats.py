@@ -13,7 +13,7 @@ from brachis.apps.export.rows import rows_of
 from brachis.apps.export.tables import write_csv, write_json, write_parquet
 from brachis.common.files import atomic_write, file_name
 from brachis.errors import InputError, check_names
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import MotionSource, motion_of
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,8 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
         check_names("format", [name], FORMATS, "format")
         return FORMATS[name]
     suffix = file_name(path, "path").suffix.lower()
-    found = [form for form in FORMATS.values() if form.suffix == suffix]
-    if not found:
+    formats = [form for form in FORMATS.values() if form.suffix == suffix]
+    if not formats:
         raise InputError(
             "the suffix of the file is not that of a known format",
             where=str(path),
@@ -122,11 +122,11 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
             allowed=", ".join(form.suffix for form in FORMATS.values()),
             hint=f"Or name the format: {', '.join(FORMATS)}",
         )
-    return found[0]
+    return formats[0]
 
 
 def write(
-    trajectory: Motion,
+    trajectory: MotionSource,
     path: str | os.PathLike[str],
     *,
     form: str | None = None,
@@ -179,7 +179,9 @@ def write(
     if chosen.step is not None:
         content = film_of(motion, period, chosen.step, joints, slower)
     elif slower != 1.0:
-        animations = [each.suffix for each in FORMATS.values() if each.step]
+        animations = [
+            animation.suffix for animation in FORMATS.values() if animation.step
+        ]
         raise InputError(
             "only animations can be slowed down",
             where="slower",

@@ -105,14 +105,16 @@ def rows_of(
     if left_out:
         hint = "Move the missing joints with their own controller at the same time, or write all joints"
         warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=3)
-    own = {name: getattr(samples, name)[:, index] for name in samples.columns.values()}
+    columns = {
+        name: getattr(samples, name)[:, index] for name in samples.columns.values()
+    }
     return JointRows(
         tuple(chosen),
-        tuple(units[each] for each in index),
+        tuple(units[joint_index] for joint_index in index),
         tuple(left_out),
         trajectory.t_end,
         dt,
-        replace(samples, **own),
+        replace(samples, **columns),
     )
 
 
@@ -137,5 +139,6 @@ def require_library(
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        name = library or module.partition(".")[0]
-        raise NotInstalledError(user, name, extra) from error
+        raise NotInstalledError(
+            user, library or module.partition(".")[0], extra
+        ) from error

@@ -93,8 +93,9 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
         case, choice, t_end = row
         if (case, choice) in cells:
             problem = "this case and choice are already in another row"
-            found = f"{_name(case)} with {choice!r}"
-            raise InputError(problem, where=where, found=found)
+            raise InputError(
+                problem, where=where, found=f"{_name(case)} with {choice!r}"
+            )
         cells[case, choice] = t_end
     return cells
 
@@ -130,13 +131,13 @@ def _draw_bars(
             if (case, choice) not in cells:
                 continue
             t_end = cells[case, choice]
-            is_found = not math.isnan(t_end)
-            if is_found:
+            has_plan = not math.isnan(t_end)
+            if has_plan:
                 bars[place + shift] = t_end
-            others = [cells.get((case, other), math.inf) for other in choices]
-            is_best = is_found and not any(other < t_end for other in others)
+            end_times = [cells.get((case, rival), math.inf) for rival in choices]
+            is_best = has_plan and not any(time < t_end for time in end_times)
             ax.annotate(
-                f"{t_end:.3f}" if is_found else "no plan",
+                f"{t_end:.3f}" if has_plan else "no plan",
                 (place + shift, bars.get(place + shift, 0.0)),
                 xytext=(0.0, 2.0),
                 textcoords="offset points",
@@ -205,7 +206,7 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
         `candidates` is empty, or has other entries than candidates.
     """
     check_list(candidates, "candidates", "candidates")
-    if not candidates or not all(isinstance(each, Candidate) for each in candidates):
+    if not candidates or not all(isinstance(entry, Candidate) for entry in candidates):
         raise InputError(
             "the list of candidates is empty, or has other entries",
             where="candidates",
@@ -246,8 +247,8 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
 
 def _row(candidate: Candidate) -> str:
     """Name the choice of redundant joints and the branch."""
-    found = coordinates(candidate.redundant_joints, candidate.branch)
-    joints = "no redundant joint" if found == "none" else found
+    name = coordinates(candidate.redundant_joints, candidate.branch)
+    joints = "no redundant joint" if name == "none" else name
     is_named = candidate.branch not in {"", joints}
     return f"{joints}: {candidate.branch}" if is_named else joints
 

@@ -115,8 +115,8 @@ def plot_limits(
     >>> save_figure(plot_limits(Trajectory.load("out/result.npz")), "limits.pdf")  # doctest: +SKIP
     """
     ratios = limit_ratios(trajectory, limits)
-    found = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
-    return _stack(trajectory, found)
+    panels = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
+    return _stack(trajectory, panels)
 
 
 @of_motion
@@ -146,8 +146,8 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     style.legend_above(postures, 0.5 * style.PAGE_WIDTH - 10.0)
     draw_holding(figure, grid[0, 1], trajectory, samples)
     joints = []
-    for column, found in enumerate(columns):
-        joints += draw_panels(figure, grid, trajectory, found, row=1, column=column)
+    for column, panels in enumerate(columns):
+        joints += draw_panels(figure, grid, trajectory, panels, row=1, column=column)
     style.legend_below(figure, lines_of(joints, trajectory))
     return figure
 
@@ -158,15 +158,17 @@ def draw_holding(
     """Draw the limits that hold the motion, one panel below the other; see `plot_overview`."""
     ratios = limit_ratios(trajectory)
     shares = dict.fromkeys(titles_of(ratios), 0.0)
-    for found in saturations(ratios):
-        shares[found.label.axis] += found.share
+    for entry in saturations(ratios):
+        shares[entry.label.axis] += entry.share
     longest = sorted(shares, key=shares.__getitem__, reverse=True)[:3]
     active = [title for title in longest if shares[title] > 0.0]
     torques = torque_panels(trajectory, samples, ratios)
     torques = torques or panels_of(trajectory, samples, "acceleration")
-    others = [title for title in active if title not in torques[0].title.split(", ")]
-    shown = [] if active and others == active else torques
-    shown += [ratio_panel(trajectory, ratios, title) for title in others]
+    other_titles = [
+        title for title in active if title not in torques[0].title.split(", ")
+    ]
+    shown = [] if active and other_titles == active else torques
+    shown += [ratio_panel(trajectory, ratios, title) for title in other_titles]
     grid = place.subgridspec(len(shown), 1)
     axes = draw_panels(figure, grid, trajectory, shown)
     style.mark_end(axes[0], trajectory.t_end)
@@ -178,12 +180,12 @@ def draw_holding(
     return axes
 
 
-def _stack(trajectory: Trajectory, found: Sequence[Panel]) -> Figure:
+def _stack(trajectory: Trajectory, panels: Sequence[Panel]) -> Figure:
     """Draw panels one below the other, one column wide, with one legend."""
-    heights = [_height(panel) for panel in found]
+    heights = [_height(panel) for panel in panels]
     figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 20.0)
-    grid = figure.add_gridspec(len(found), 1, height_ratios=heights)
-    axes = draw_panels(figure, grid, trajectory, found)
+    grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
+    axes = draw_panels(figure, grid, trajectory, panels)
     style.legend_above(axes[0], style.COLUMN_WIDTH - 15.0, lines_of(axes, trajectory))
     style.mark_end(axes[-1], trajectory.t_end)
     return figure
@@ -198,14 +200,14 @@ def draw_panels(
     figure: Figure,
     grid: GridSpecBase,
     trajectory: Trajectory,
-    found: Sequence[Panel],
+    panels: Sequence[Panel],
     *,
     row: int = 0,
     column: int = 0,
 ) -> list[Axes]:
     """Draw panels into a column of a grid, from a row on downwards, over one time axis."""
     axes = []
-    for number, panel in enumerate(found):
+    for number, panel in enumerate(panels):
         ax = figure.add_subplot(grid[row + number, column])
         _draw_panel(ax, panel)
         dress(ax, trajectory, panel.label)
@@ -243,9 +245,9 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
 
 def lines_of(axes: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
     """Collect one line of each subject that the axes show, by its label; joints first, in chain order."""
-    found = style.lines_by_label(axes)
+    lines = style.lines_by_label(axes)
     joints = [style.plain(name) for name in trajectory.joint_names]
-    return {name: found[name] for name in (*joints, *found) if name in found}
+    return {name: lines[name] for name in (*joints, *lines) if name in lines}
 
 
 def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
@@ -290,16 +292,16 @@ def plot_timeline(
 
     ratios = limit_ratios(trajectory, limits)
     used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
-    found = [entry for entry in saturations(ratios) if entry.is_half_used]
-    found.sort(key=lambda entry: ratios.labels.index(entry.label))
-    rows = max(len(found), 1)
+    entries = [entry for entry in saturations(ratios) if entry.is_half_used]
+    entries.sort(key=lambda entry: ratios.labels.index(entry.label))
+    rows = max(len(entries), 1)
     figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * rows)
     ax = figure.add_subplot()
     orange = style.COLOURS[1]
     thick = 0.84  # of the distance between rows
-    for row, entry in enumerate(found):
-        part = used[entry.label]
-        cells = 0.5 * (part[1:] + part[:-1])[None]
+    for row, entry in enumerate(entries):
+        ratio = used[entry.label]
+        cells = 0.5 * (ratio[1:] + ratio[:-1])[None]
         edges = (row - 0.5 * thick, row + 0.5 * thick)
         ax.pcolormesh(
             ratios.t,
@@ -316,9 +318,12 @@ def plot_timeline(
     dress(ax, trajectory, "")
     style.mark_phases(ax, trajectory.phases, labels=False)
     ax.set_ylim(rows - 0.5, -0.5)
-    ax.set_yticks(range(len(found)), [style.plain(str(each.label)) for each in found])
+    ax.set_yticks(
+        range(len(entries)),
+        [style.plain(str(row_entry.label)) for row_entry in entries],
+    )
     ax.tick_params(axis="y", length=0.0)
-    if not found:
+    if not entries:
         style.write(ax, 0.5, 0.5, "no limit is used by 50 % or more", ha="center")
     blue = ScalarMappable(Normalize(0.0, 1.0), "Blues")
     bar = figure.colorbar(blue, ax=ax, pad=0.01, fraction=0.03)

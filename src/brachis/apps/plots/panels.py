@@ -22,12 +22,12 @@ MOST_CURVES = 10
 BLACK = 48
 """Style of curves of the whole arm: a number that gives a solid black line in all figures."""
 
-Bound = np.ndarray | float
+CurveBound = np.ndarray | float
 """A limit over time, (K,), or at all times."""
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PanelCurve:
     """One curve of a panel.
 
     Attributes
@@ -46,8 +46,8 @@ class Curve:
     name: str
     style: int
     values: np.ndarray
-    lower: Bound = -np.inf
-    upper: Bound = np.inf
+    lower: CurveBound = -np.inf
+    upper: CurveBound = np.inf
     is_range: bool = False
 
     @property
@@ -77,7 +77,7 @@ class Panel:
         Of the values; empty if they are dimensionless.
     t : (K,) ndarray
         s.
-    curves : tuple of Curve
+    curves : tuple of PanelCurve
         Joints in chain order.
     ratio_title : str
         Title of the values over their limits.
@@ -91,7 +91,7 @@ class Panel:
     symbol: str
     unit: str
     t: np.ndarray
-    curves: tuple[Curve, ...]
+    curves: tuple[PanelCurve, ...]
     ratio_title: str = ""
     is_ratio: bool = False
     ends: tuple[float | None, float | None] = (None, None)
@@ -111,16 +111,16 @@ class Panel:
         """Values of all curves, (K, c)."""
         return np.column_stack([curve.values for curve in self.curves])
 
-    def near_limits(self) -> list[tuple[np.ndarray, list[Curve]]]:
+    def near_limits(self) -> list[tuple[np.ndarray, list[PanelCurve]]]:
         """List the limits that are drawn: all of ratios, others if the motion comes within 30 % of its own range.
 
         Returns
         -------
-        list of ((K,) ndarray, list of Curve)
+        list of ((K,) ndarray, list of PanelCurve)
             The limit over time, NaN where it is far away, and the curves that share it.
         """
         reach = 0.3 * max(np.ptp(self.values), 1e-9)
-        found: dict[bytes, tuple[np.ndarray, list[Curve]]] = {}
+        drawn: dict[bytes, tuple[np.ndarray, list[PanelCurve]]] = {}
         for curve in self.curves:
             lowest = curve.values.min() - reach
             highest = curve.values.max() + reach
@@ -129,8 +129,8 @@ class Panel:
                 is_drawn = np.isfinite(limit) & (is_near | self.is_ratio)
                 if np.any(is_drawn):
                     line = np.where(is_drawn, limit, np.nan) + np.zeros_like(self.t)
-                    found.setdefault(line.tobytes(), (line, []))[1].append(curve)
-        return list(found.values())
+                    drawn.setdefault(line.tobytes(), (line, []))[1].append(curve)
+        return list(drawn.values())
 
     def view(self) -> tuple[float, float]:
         """Return the ends of the axis: `ends`, or those of the values and of the limits near them."""
@@ -147,7 +147,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Row:
+class PanelRow:
     """A row of the table of panels.
 
     Attributes
@@ -159,7 +159,7 @@ class Row:
     prismatic : tuple of str
         Title and symbol for prismatic joints if they differ.
     is_range : bool
-        See `Curve`.
+        See `PanelCurve`.
     needs_masses : bool
         Whether the values are known only if the URDF has masses.
     only_if_limited : bool
@@ -181,12 +181,14 @@ class Row:
     needs_masses: bool = False
     only_if_limited: bool = False
     unit: str | None = None
-    bounds: Callable[[Trajectory, Samples], tuple[Bound, Bound]] | None = None
+    bounds: Callable[[Trajectory, Samples], tuple[CurveBound, CurveBound]] | None = None
     name: str = "tool"
     ends: tuple[float | None, float | None] = (None, None)
 
 
-def _bound_tool_speed(trajectory: Trajectory, samples: Samples) -> tuple[Bound, Bound]:
+def _bound_tool_speed(
+    trajectory: Trajectory, samples: Samples
+) -> tuple[CurveBound, CurveBound]:
     """Return no lower bound, and the largest speed of the tool that the task allows, (K,), m/s."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
     largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
@@ -202,31 +204,31 @@ def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
 
 
 PANELS = {
-    "position": Row(lambda _, samples: samples.q, "$q$", is_range=True),
-    "velocity": Row(lambda _, samples: samples.qdot, r"$\dot{q}$"),
-    "acceleration": Row(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
-    "jerk": Row(
+    "position": PanelRow(lambda _, samples: samples.q, "$q$", is_range=True),
+    "velocity": PanelRow(lambda _, samples: samples.qdot, r"$\dot{q}$"),
+    "acceleration": PanelRow(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
+    "jerk": PanelRow(
         lambda trajectory, samples: trajectory.jerk(samples.t),
         r"$\dddot{q}$",
         only_if_limited=True,
     ),
-    "torque": Row(
+    "torque": PanelRow(
         lambda trajectory, samples: trajectory.torque(samples.t),
         r"$\tau$",
         prismatic=("force", "$F$"),
         needs_masses=True,
     ),
-    "path coordinate": Row(
+    "path coordinate": PanelRow(
         lambda _, samples: samples.s, "$s$", unit="", ends=(-0.04, 1.04)
     ),
-    "tool speed": Row(
+    "tool speed": PanelRow(
         lambda _, samples: samples.tool_speed,
         "tool speed",
         unit="m/s",
         bounds=_bound_tool_speed,
         ends=(0.0, None),
     ),
-    "clearance": Row(
+    "clearance": PanelRow(
         _smallest_distances,
         "clearance",
         unit="m",
@@ -278,21 +280,21 @@ def panels_of(
     list of Panel
         One or two of each row, revolute joints first; none of torques without masses.
     """
-    found = []
+    panels = []
     for name in names:
         row = PANELS[name]
         if row.needs_masses and not trajectory.robot.has_masses:
             continue
         if row.unit is None:
-            found += _joint_panels(trajectory, samples, name, degrees=degrees)
+            panels += _joint_panels(trajectory, samples, name, degrees=degrees)
             continue
         values = row.values(trajectory, samples)
         bounds = row.bounds(trajectory, samples) if row.bounds else ()
-        curve = Curve(row.name, BLACK, values, *bounds)
-        found.append(
+        curve = PanelCurve(row.name, BLACK, values, *bounds)
+        panels.append(
             Panel(name, row.symbol, row.unit, samples.t, (curve,), ends=row.ends)
         )
-    return found
+    return panels
 
 
 def _joint_panels(
@@ -304,29 +306,32 @@ def _joint_panels(
     lower, upper = robot.limits.both_ways(name)
     columns = row.values(trajectory, samples).T
     names = trajectory.joint_names
-    found = []
+    panels = []
     for base, is_shown in (("rad", robot.revolute), ("m", ~robot.revolute)):
         unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
         curves = []
         for joint in np.flatnonzero(is_shown).tolist():
             values, low, high = (
-                factor * each[joint] for each in (columns, lower, upper)
+                factor * figures[joint] for figures in (columns, lower, upper)
             )
-            curve = Curve(names[joint], joint, values, low, high, row.is_range)
+            curve = PanelCurve(names[joint], joint, values, low, high, row.is_range)
             curves.append(curve)
         if curves:
-            own = row.prismatic if base == "m" else None
-            title, symbol = own or (name, row.symbol)
+            for_prismatic = row.prismatic if base == "m" else None
+            title, symbol = for_prismatic or (name, row.symbol)
             unit = unit.replace("^2", "²").replace("^3", "³")
             ratio = f"{title} in its range" if row.is_range else f"{title} / limit"
-            found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
-    return found
+            panels.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
+    return panels
 
 
-def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, Curve]]:
+def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, PanelCurve]]:
     """List the curves of a joint with their panels."""
     return [
-        (panel, each) for panel in panels for each in panel.curves if each.name == name
+        (panel, curve)
+        for panel in panels
+        for curve in panel.curves
+        if curve.name == name
     ]
 
 
@@ -355,7 +360,7 @@ def ratio_panel(
     is_signed = ratios.values[:, nearest].min() < 0.0
     lower = -1.0 if is_signed else -np.inf
     curves = [
-        Curve(subjects[k], number, ratios.values[:, k], lower, 1.0)
+        PanelCurve(subjects[k], number, ratios.values[:, k], lower, 1.0)
         for number, k in shown
     ]
     title = ", ".join(titles)
@@ -384,14 +389,14 @@ def torque_panels(
 
     Without masses the list is empty.
     """
-    parts = panels_of(trajectory, samples, "torque")
+    panels = panels_of(trajectory, samples, "torque")
     titles = titles_of(ratios)
-    limited = [part for part in parts if part.ratio_title in titles]
+    limited = [panel for panel in panels if panel.ratio_title in titles]
     if not limited:
-        return parts
-    symbols = [part.symbol.strip("$") for part in limited]
-    symbol = ", ".join(rf"${each} / {each}_\mathrm{{max}}$" for each in symbols)
-    shown = [part.ratio_title for part in limited]
+        return panels
+    symbols = [panel.symbol.strip("$") for panel in limited]
+    symbol = ", ".join(rf"${tau} / {tau}_\mathrm{{max}}$" for tau in symbols)
+    shown = [panel.ratio_title for panel in limited]
     return [ratio_panel(trajectory, ratios, *shown, symbol=symbol)]
 
 

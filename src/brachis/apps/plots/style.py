@@ -257,7 +257,7 @@ def _add_legend(
     labels = list(lines)
     columns = len(labels)
     while columns > 1:
-        longest = [max(map(len, part)) for part in np.array_split(labels, columns)]
+        longest = [max(map(len, column)) for column in np.array_split(labels, columns)]
         if 10.5 * columns + 1.45 * sum(longest) <= width:  # mm of handles and letters
             break
         columns -= 1

@@ -16,7 +16,7 @@ import numpy as np
 
 from brachis import ik
 from brachis.apps.recording.nodes import (
-    Nodes,
+    RecordedNodes,
     find_rests,
     nodes_of,
     split_at_rests,
@@ -28,7 +28,7 @@ from brachis.common.arrays import spread, with_like_signs
 from brachis.common.files import file_name
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import Path, build_path
-from brachis.planner import Given
+from brachis.planner import RobotOrTask
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace
@@ -56,7 +56,7 @@ _SURE = 3.0
 @check_keywords
 def import_motion(
     path: str | os.PathLike[str],
-    robot: Given = None,
+    robot: RobotOrTask = None,
     *,
     task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
@@ -129,7 +129,7 @@ def import_motion(
     error = recording.rounding if noise is None else _SURE * deviation
     virtual = (0, bound.n - given_robot.n)  # virtual joints stand still
     states = np.pad(nodes.states, ((0, 0), (0, 0), virtual))
-    nodes = with_rests(Nodes(nodes.t, states, nodes.notes))
+    nodes = with_rests(RecordedNodes(nodes.t, states, nodes.notes))
     if tolerance is None:
         slopes = np.abs(task_map.jacobian(task_map.twists(nodes.q)))
         moved = slopes[:, :, : len(deviation)] @ deviation
@@ -177,7 +177,7 @@ def import_motion(
     )
 
 
-def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
+def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | None]:
     """Return the robot with the settings of the task, and the task, which may stand in the robot's place."""
     if task is None and robot is not None and not is_robot(robot):
         task = robot  # type: ignore[assignment]
@@ -195,14 +195,14 @@ def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
 
 
 def _join_coordinate(
-    nodes: Nodes, followed: RecoveredPath
+    nodes: RecordedNodes, followed: RecoveredPath
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return knots and control points of s over time, which stays where it is during the waits; see `join_splines`."""
-    at_rest, _ = nodes.at_rest
-    splines = [fit_coordinate(*followed.parts[0], at_rest=at_rest)]
+    is_resting, _ = nodes.at_rest
+    splines = [fit_coordinate(*followed.parts[0], is_resting=is_resting)]
     for (first, end), (t, s) in zip(followed.rests, followed.parts[1:], strict=True):
         splines.append(splines[-1].wait(nodes.t[end] - nodes.t[first]))
-        splines.append(fit_coordinate(t, s, at_rest=at_rest))
+        splines.append(fit_coordinate(t, s, is_resting=is_resting))
     return join_splines(splines)
 
 
@@ -217,7 +217,7 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
     assert trajectory.recovered is not None
     _, task_map = bind(trajectory.robot, JOINTS)
     states = np.stack([trajectory.q, trajectory.qdot, trajectory.qddot])
-    nodes = Nodes(trajectory.times, states)
+    nodes = RecordedNodes(trajectory.times, states)
     return recover_path(task_map, nodes, trajectory.recovered.tolerance).segments
 
 
@@ -243,7 +243,9 @@ class RecoveredPath:
     miss: float
 
 
-def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> RecoveredPath:
+def recover_path(
+    task_map: TaskMap, nodes: RecordedNodes, tolerance: float
+) -> RecoveredPath:
     """Recover the path that a motion prescribes in a task space, within a tolerance, m and rad; it stops at waits.
 
     Raises
@@ -254,27 +256,27 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
     """
     rests = find_rests(nodes)
     moves = split_at_rests(nodes, rests)
-    parts = [_follow(task_map, move, tolerance) for move in moves]
-    (segments, _, first_values, _), *others = parts
-    for (first, end), (following, *_) in zip(rests, others, strict=True):
+    followed = [_follow(task_map, move, tolerance) for move in moves]
+    (segments, _, first_values, _), *followed_later = followed
+    for (first, end), (following, *_) in zip(rests, followed_later, strict=True):
         dwell = float(nodes.t[end] - nodes.t[first])
         waits = segments[-1].model_copy(update={"stop": True, "dwell": dwell})
         segments = [*segments[:-1], waits, *following]
     path = build_path(segments, first_values[0], task_map.rows)
     places = pairwise([0.0, *path.stops.tolist(), 1.0])
-    found = []
+    coordinates = []
     worst = 0.0
-    for (_, t, values, share), ends in zip(parts, places, strict=True):
-        own = path.between(*ends)
-        s = _nearest(task_map, own, values, share, ends)
-        miss = task_map.difference(values, own.sample(s).target)
+    for (_, t, values, share), ends in zip(followed, places, strict=True):
+        span = path.between(*ends)
+        s = _nearest(task_map, span, values, share, ends)
+        miss = task_map.difference(values, span.sample(s).target)
         worst = max(worst, float(np.max(task_map.norms(miss))))
-        found.append((t, s))
-    return RecoveredPath(tuple(segments), rests, tuple(found), worst)
+        coordinates.append((t, s))
+    return RecoveredPath(tuple(segments), rests, tuple(coordinates), worst)
 
 
 def _follow(
-    task_map: TaskMap, nodes: Nodes, tolerance: float
+    task_map: TaskMap, nodes: RecordedNodes, tolerance: float
 ) -> tuple[list[Segment], np.ndarray, np.ndarray, np.ndarray]:
     """Fit segments to a part of a motion between waits; see `recover_path`.
 
@@ -378,7 +380,7 @@ DEGREE = 3
 """Degree of the spline of the path coordinate."""
 
 
-def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSpline:
+def fit_coordinate(t: np.ndarray, s: np.ndarray, *, is_resting: bool) -> PhaseSpline:
     """Return s over time as the spline of a phase.
 
     The knots lie where s bends. The control points do not decrease, and so the spline does not either.
@@ -387,15 +389,15 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSplin
     ----------
     t, s : (K,) ndarray
         Ascending.
-    at_rest : bool
+    is_resting : bool
         Whether ds/dt vanishes at the ends of the path; at waits, which begin between rows, it nearly does.
     """
     from scipy.interpolate import splrep
 
     duration = t[-1] - t[0]
     t_norm = (t - t[0]) / duration
-    first = 2 if at_rest and s[0] == 0.0 else 1
-    last = 2 if at_rest and s[-1] == 1.0 else 1
+    first = 2 if is_resting and s[0] == 0.0 else 1
+    last = 2 if is_resting and s[-1] == 1.0 else 1
     for rms in (2e-8, 1e-9, 2e-10):  # of what the spline may differ from s
         knots, points, _ = splrep(t_norm, s, k=DEGREE, s=len(s) * rms**2)
         points = points[: len(knots) - DEGREE - 1].clip(s[0], s[-1])
@@ -419,23 +421,26 @@ def _deviations(
     """
     if noise is None:
         return recording.rounding / np.sqrt(3.0)
-    given = numbers(noise, "noise", "rad or m")
+    deviations = numbers(noise, "noise", "rad or m")
     n = recording.q.shape[1]
-    if given.shape not in ((), (n,)) or not ((given > 0.0) & (given < np.inf)).all():
+    if (
+        deviations.shape not in ((), (n,))
+        or not ((deviations > 0.0) & (deviations < np.inf)).all()
+    ):
         raise InputError(
             "the noise is not a valid standard deviation",
             where="noise",
             found=noise,
             allowed=f"one number > 0 rad or m, or {n} of them",
         )
-    return np.broadcast_to(given, n)
+    return np.broadcast_to(deviations, n)
 
 
 def _task_of(
     settings: Task | None,
     robot: Robot,
     task_map: TaskMap,
-    nodes: Nodes,
+    nodes: RecordedNodes,
     segments: Sequence[Segment],
     space: str | Sequence[str],
 ) -> Task:
@@ -451,8 +456,8 @@ def _task_of(
         "spline": {},
     }
     if settings is not None:
-        given = settings.to_dict()
-        kept = (
+        stated = settings.to_dict()
+        copied = (
             "tool_limits",
             "custom_limits",
             "search",
@@ -460,7 +465,7 @@ def _task_of(
             "refinement",
             "spline",
         )
-        content |= {key: given[key] for key in kept if key in given}
+        content |= {key: stated[key] for key in copied if key in stated}
     content["spline"]["rest"] = "full" if is_calm else "velocity"
     if not is_resting:
         first, last = _tool_speed(task_map, nodes.q[[0, -1]], nodes.qdot[[0, -1]])

@@ -41,7 +41,7 @@ _NARROWEST = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class RecordedNodes:
     """A motion in quintic pieces between nodes.
 
     Attributes
@@ -80,7 +80,7 @@ class Nodes:
         return not self.qdot[ends].any(), not self.qddot[ends].any()
 
 
-def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
+def nodes_of(recording: Recording, deviation: np.ndarray) -> RecordedNodes:
     """Find velocities and accelerations.
 
     Parameters
@@ -113,7 +113,7 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
         for end in (0, -1):
             if np.all(np.abs(states[order, end]) <= small):
                 states[order, end] = 0.0
-    return Nodes(t, states[:3], tuple(notes))
+    return RecordedNodes(t, states[:3], tuple(notes))
 
 
 def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
@@ -141,14 +141,14 @@ def _interpolate(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, 
         "velocities and accelerations are those of polynomials through five rows each"
     )
     rates = ((1, recording.qdot, "velocities"), (2, recording.qddot, "accelerations"))
-    for order, given, words in rates:
-        if given is None:
+    for order, recorded, words in rates:
+        if recorded is None:
             continue
-        differences = np.median(np.abs(given[:, joints] - states[order]), axis=0)
+        differences = np.median(np.abs(recorded[:, joints] - states[order]), axis=0)
         if (differences > 0.02 * np.abs(states[order]).max(axis=0)).any():
             note += f"; the file's {words} do not agree with them and are left out"
             continue
-        states[order:] = _differentiate(recording.t, given[:, joints])[: 4 - order]
+        states[order:] = _differentiate(recording.t, recorded[:, joints])[: 4 - order]
         note = f"{words} are the file's"
         if order == 1:
             note += ", accelerations are those of polynomials through five rows of them"
@@ -215,9 +215,9 @@ def _count_vanishing(
         powers = u[:, None] ** np.array([0, order, order + 1, order + 2])
         covariance = np.linalg.inv(powers.T @ powers)
         factor = order / float(near[-1]) ** order  # 1! and 2!
-        found = factor * np.abs(covariance[1] @ powers.T @ q[:count])
+        derivatives = factor * np.abs(covariance[1] @ powers.T @ q[:count])
         known = 5.0 * factor * np.sqrt(covariance[1, 1]) * deviation
-        if (found <= np.maximum(small * largest[order], known)).all():
+        if (derivatives <= np.maximum(small * largest[order], known)).all():
             return order
     return 0
 
@@ -280,20 +280,20 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
     scale = np.maximum(np.abs(states[2]).max(axis=0), _TINY)
     overshoots = _overshoots(t, states, scale)
     times = [t]
-    parts = [states[:3]]
+    state_arrays = [states[:3]]
     for i in np.flatnonzero(overshoots > 0.01):
-        left = states[:, i]
-        right = states[:, i + 1]
+        begin = states[:, i]
+        end = states[:, i + 1]
         h = float(t[i + 1] - t[i])
-        after, nodes = _place_jump(left, right, h, scale)
-        whole_t = np.array([0.0, *after, h])
-        whole = np.concatenate([left[:3, None], nodes, right[:3, None]], axis=1)
-        if _overshoots(whole_t, whole, scale).max() < 0.5 * overshoots[i]:
+        after, nodes = _place_jump(begin, end, h, scale)
+        refined_t = np.array([0.0, *after, h])
+        refined = np.concatenate([begin[:3, None], nodes, end[:3, None]], axis=1)
+        if _overshoots(refined_t, refined, scale).max() < 0.5 * overshoots[i]:
             times.append(t[i] + after)
-            parts.append(nodes)
+            state_arrays.append(nodes)
     merged = np.concatenate(times)
     order = np.argsort(merged, kind="stable")
-    return merged[order], np.concatenate(parts, axis=1)[:, order], len(times) - 1
+    return merged[order], np.concatenate(state_arrays, axis=1)[:, order], len(times) - 1
 
 
 def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -311,7 +311,7 @@ def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndar
 
 
 def _place_jump(
-    left: np.ndarray, right: np.ndarray, h: float, scale: np.ndarray
+    before: np.ndarray, after: np.ndarray, h: float, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return two nodes in a period h between which the acceleration changes from one side's to the other's.
 
@@ -320,7 +320,7 @@ def _place_jump(
 
     Parameters
     ----------
-    left, right : (4, n) ndarray
+    before, after : (4, n) ndarray
         Position and three derivatives at both ends of the period.
     h : float
     scale : (n,) ndarray
@@ -337,7 +337,7 @@ def _place_jump(
     def gap(place: Any, order: int) -> Any:
         """Difference of both sides' derivatives at parts of the period, as parts of `scale`."""
         t = np.asarray(place)[..., None] * h
-        difference = extrapolate(right, t - h)[order] - extrapolate(left, t)[order]
+        difference = extrapolate(after, t - h)[order] - extrapolate(before, t)[order]
         return difference / scale
 
     places = np.linspace(1.5 * _NARROWEST, 1.0 - 1.5 * _NARROWEST, 401)
@@ -352,8 +352,8 @@ def _place_jump(
     width = h * share
     first = place * h - 0.5 * width
     last = place * h + 0.5 * width
-    begin = extrapolate(left, first)
-    end = extrapolate(right, last - h)
+    begin = extrapolate(before, first)
+    end = extrapolate(after, last - h)
     # The node nearer to its row is exact; from it the acceleration changes at constant jerk to that of the other.
     jerk = (end[2] - begin[2]) / width
     if place <= 0.5:
@@ -363,7 +363,7 @@ def _place_jump(
     return np.array([first, last]), np.stack([begin, end], axis=1)
 
 
-def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
+def find_rests(nodes: RecordedNodes) -> list[tuple[int, int]]:
     """Find the waits inside a motion: numbers of the first and the last node of each.
 
     A wait has five rows or more, none of them the first or the last one of the motion.
@@ -381,17 +381,19 @@ def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
     ]
 
 
-def with_rests(nodes: Nodes) -> Nodes:
+def with_rests(nodes: RecordedNodes) -> RecordedNodes:
     """Return the motion without the rounding of its positions, velocities and accelerations at rest."""
     states = nodes.states.copy()
     for first, end in find_rests(nodes):
         states[0, first : end + 1] = nodes.q[first]
         states[1:, first : end + 1] = 0.0
-    return Nodes(nodes.t, states, nodes.notes)
+    return RecordedNodes(nodes.t, states, nodes.notes)
 
 
-def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:
+def split_at_rests(
+    nodes: RecordedNodes, rests: list[tuple[int, int]]
+) -> list[RecordedNodes]:
     """Return the parts between waits in which the motion moves."""
     edges = [0, *chain(*rests), len(nodes.t) - 1]
     moves = [slice(a, b + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [Nodes(nodes.t[move], nodes.states[:, move]) for move in moves]
+    return [RecordedNodes(nodes.t[move], nodes.states[:, move]) for move in moves]

@@ -111,8 +111,8 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
         if key is not None:
             columns[key] = (i, unit)
     kinds = dict.fromkeys(["q", *(kind for kind, joint in columns if joint)])
-    wanted = [("t", ""), *((kind, joint) for kind in kinds for joint in joints)]
-    missing = [key for key in wanted if key not in columns]
+    required = [("t", ""), *((kind, joint) for kind in kinds for joint in joints)]
+    missing = [key for key in required if key not in columns]
     problems += [f"{_describe(*key)} is missing" for key in missing]
     if problems:
         shown = [*header[:8], "..."] if len(header) > 8 else header
@@ -158,11 +158,11 @@ def _read_column(
     """
     i, stated = column
     name, factors = _UNITS[base]
-    asked = units.get(name)
+    user_unit = units.get(name)
     _, per = _QUANTITIES[kind]
     values = table.values[:, i]
     if stated is None:
-        stated = f"{asked or base}{per}"
+        stated = f"{user_unit or base}{per}"
     unit = stated.removesuffix(per)
     if unit not in factors or not stated.endswith(per):
         raise TaskError(
@@ -171,11 +171,11 @@ def _read_column(
             allowed=", ".join(f"{known}{per}" for known in factors),
             where=table.where,
         )
-    if asked is not None and factors[asked] != factors[unit]:
+    if user_unit is not None and factors[user_unit] != factors[unit]:
         raise TaskError(
             "the unit in the header is not the requested unit",
             found=f"{unit} for {table.header[i]}",
-            allowed=asked,
+            allowed=user_unit,
             where=table.where,
         )
     rounding = 0.0

@@ -10,8 +10,8 @@ import numpy as np
 from brachis.apps.bottleneck.saturation import THRESHOLD, knot_times
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
-    Curve,
     Panel,
+    PanelCurve,
     at_distinct_times,
     curves_of,
     joint_rows_of,
@@ -70,7 +70,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
 
 def _traces(
-    panel: Panel, curve: Curve, axis: str, *, is_named: bool
+    panel: Panel, curve: PanelCurve, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
     """Draw one curve, and its limits, which the page draws thin and dashed."""
     look = style.joint_style(curve.style)
@@ -111,8 +111,8 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     ratios = at_distinct_times(motion.ratios)
     used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
     entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
-    part = np.array([used[entry.label] for entry in entries])
-    colours = part.copy()
+    shares = np.array([used[entry.label] for entry in entries])
+    colours = shares.copy()
     for row, entry in zip(colours, entries, strict=True):
         for active in entry.active:  # ripple included
             inside = (ratios.t >= active.begin) & (ratios.t <= active.end)
@@ -121,7 +121,7 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
         "x": encode(ratios.t),
         "y": [str(entry.label) for entry in entries],
         "z": encode(colours),
-        "customdata": encode(100.0 * part),
+        "customdata": encode(100.0 * shares),
     }
     layout = _layout(motion.trajectory, 26 * max(len(entries), 1))
     return {"data": [heat] if entries else [], "layout": layout}

@@ -90,11 +90,11 @@ def reported_motion(
     ratios = limit_ratios(trajectory, limits)
     unknown = []
     try:
-        found = bottleneck.report(motion)
+        report = bottleneck.report(motion)
     except BrachisError as error:
-        found = bottleneck.report(motion, solve=False)
+        report = bottleneck.report(motion, solve=False)
         unknown = [f"What the limits cost is not known: {error}"]
-    held_back = (*found.text(degrees=degrees).splitlines(), *unknown)
+    held_back = (*report.text(degrees=degrees).splitlines(), *unknown)
     samples = dense_samples(trajectory)
     rows = joint_rows_of(trajectory)
     return ReportedMotion(
@@ -102,7 +102,7 @@ def reported_motion(
         samples=samples,
         panels=panels_of(trajectory, samples, *rows, degrees=degrees),
         ratios=ratios,
-        saturations=found.saturations,
+        saturations=report.saturations,
         held_back=held_back,
         guarantees=describe_guarantees(limits),
         degrees=degrees,

@@ -115,12 +115,12 @@ def make_report(
     template = _template()
     plotly = _plotly()
     reported = reported_motion(motion, degrees=degrees)
-    parts = {
+    sections = {
         "motion": motion_figure(reported),
         "timeline": timeline_figure(reported),
         "scene": scene(reported),
     }
-    data = json.dumps(parts, allow_nan=False, separators=(",", ":"))
+    data = json.dumps(sections, allow_nan=False, separators=(",", ":"))
     page = template.render(
         title=title or reported.trajectory.robot.name or "motion",
         motion=reported,

@@ -14,7 +14,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
-from brachis.apps.plots.panels import Curve, Panel, curves_of
+from brachis.apps.plots.panels import Panel, PanelCurve, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
 from brachis.robot.from_task import in_use
@@ -86,18 +86,18 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
 
 def describe_path(task: Task) -> str:
     """Name the segments of a path, each by its shape and its entries in the task."""
-    found = []
+    shapes = []
     for segment in task.path:
-        for shape, given in segment.model_dump(exclude_defaults=True).items():
-            if isinstance(given, dict):
+        for shape, values in segment.model_dump(exclude_defaults=True).items():
+            if isinstance(values, dict):
                 entries = [
                     f"{key.replace('_', ' ')} {_write_entry(value)}"
-                    for key, value in given.items()
+                    for key, value in values.items()
                 ]
-                found.append(f"{shape.replace('_', ' ')} ({', '.join(entries)})")
-    text = ", then ".join(found[:_LISTED])
-    rest = len(found) - _LISTED
-    return f"{text}, and {rest} more" if rest > 0 else text
+                shapes.append(f"{shape.replace('_', ' ')} ({', '.join(entries)})")
+    text = ", then ".join(shapes[:_LISTED])
+    omitted = len(shapes) - _LISTED
+    return f"{text}, and {omitted} more" if omitted > 0 else text
 
 
 def _write_entry(value: object) -> str:
@@ -107,7 +107,7 @@ def _write_entry(value: object) -> str:
         return f"{value:.4g}"
     if not isinstance(value, nested):
         return _file_name(str(value))
-    if len(value) > _LISTED or any(isinstance(each, nested) for each in value):
+    if len(value) > _LISTED or any(isinstance(item, nested) for item in value):
         return f"{len(value)} entries"
     return f"[{', '.join(map(_write_entry, value))}]"
 
@@ -120,9 +120,9 @@ def task_text(task: Task) -> str:
 def _without_folders(value: Any) -> Any:
     """Replace absolute paths of files, wherever they are, by the files' names."""
     if isinstance(value, dict):
-        return {key: _without_folders(each) for key, each in value.items()}
+        return {key: _without_folders(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_folders(each) for each in value]
+        return [_without_folders(item) for item in value]
     return _file_name(value) if isinstance(value, str) else value
 
 
@@ -152,7 +152,7 @@ def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
     rows = phase_rows(motion.trajectory.phases)
     if len(rows) == 1:
         return []
-    return [(*row, str(each)) for row, each in zip(rows, phases, strict=True)]
+    return [(*row, str(limits)) for row, limits in zip(rows, phases, strict=True)]
 
 
 def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
@@ -168,10 +168,10 @@ def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
     """
     trajectory = motion.trajectory
     tolerance = trajectory.task.refinement.tolerance
-    found = []
+    joints = []
     for name in trajectory.joint_names:
-        own = curves_of(motion.panels, name)
-        panel, position = own[0]
+        curves = curves_of(motion.panels, name)
+        panel, position = curves[0]
         q = position.values
         unit = panel.unit
         row = {
@@ -180,13 +180,13 @@ def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
             "start": f"{q[0]:z.4f} {unit}",
             "end": f"{q[-1]:z.4f} {unit}",
             "travel": f"{q.min():z.4f} to {q.max():z.4f} {unit}",
-            "peaks": [_find_peak(*each, tolerance) for each in own],
+            "peaks": [_find_peak(*curve, tolerance) for curve in curves],
         }
-        found.append(row)
-    return found
+        joints.append(row)
+    return joints
 
 
-def _find_peak(panel: Panel, curve: Curve, tolerance: float) -> dict[str, str]:
+def _find_peak(panel: Panel, curve: PanelCurve, tolerance: float) -> dict[str, str]:
     """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
     ratios = np.abs(curve.ratios if curve.is_limited else curve.values)
     worst = np.argmax(ratios)
@@ -217,27 +217,32 @@ def check_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
     """List the checks of the verification in words, those that failed first."""
     rows = []
     for check in sorted(motion.verification.checks, key=lambda check: check.passed):
-        found, allowed, unit = check.figures(degrees=motion.degrees)
+        figure, allowed, unit = check.figures(degrees=motion.degrees)
         after = "" if unit == "-" else f" {unit}"
         time = "" if check.time is None else f"{check.time:.4f} s"
         row = {
             "name": check.name,
-            "found": found + after,
+            "found": figure + after,
             "allowed": allowed + after,
             "where": " at ".join(filter(None, (check.subject, time))),
             "passed": check.passed,
             "remark": check.remark,
         }
         rows.append(row)
-    kept = {"allowed": "", "passed": True, "remark": ""}
+    passed_check = {"allowed": "", "passed": True, "remark": ""}
     for margin in motion.verification.margins:
-        found, where = margin.in_words().split(", ", 1)
-        rows.append({"name": margin.name, "found": found, "where": where, **kept})
+        figure, where = margin.in_words().split(", ", 1)
+        rows.append(
+            {"name": margin.name, "found": figure, "where": where, **passed_check}
+        )
     return rows
 
 
 def versions() -> dict[str, str]:
     """Name the versions of what made the report."""
-    own = {"brachis": brachis.__version__, "Python": platform.python_version()}
     libraries = ("pin", "numpy", "scipy", "plotly")
-    return own | {name: importlib.metadata.version(name) for name in libraries}
+    return {
+        "brachis": brachis.__version__,
+        "Python": platform.python_version(),
+        **{name: importlib.metadata.version(name) for name in libraries},
+    }

@@ -63,7 +63,7 @@ FAILED = "failed"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PlanOutcome:
     """What came of a plan.
 
     Attributes
@@ -80,7 +80,7 @@ class Outcome:
     @classmethod
     def of_error(
         cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
-    ) -> Outcome:
+    ) -> PlanOutcome:
         """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
         kind = type(error).__name__
         facts = {
@@ -92,7 +92,7 @@ class Outcome:
         return cls(facts)
 
 
-Row = tuple[Mapping[str, Any], Plan | BrachisError]
+SweepRow = tuple[Mapping[str, Any], Plan | BrachisError]
 """Values of the varied keys, and the plan, or an error if the task is refused: one row of the sweep's table."""
 
 
@@ -105,12 +105,12 @@ class SweepPlan:
     settings : SweepSettings
     base : mapping
         The task, not checked yet.
-    rows : tuple of Row
+    rows : tuple of SweepRow
     """
 
     settings: SweepSettings
     base: Mapping[str, Any]
-    rows: tuple[Row, ...]
+    rows: tuple[SweepRow, ...]
 
 
 def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
@@ -192,7 +192,7 @@ def _plan(
     return Plan(digest, task, urdf, brachis.__version__)
 
 
-def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None:
+def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) -> None:
     """Refuse keys that make every task wrong, and names that the robot does not have.
 
     Raises
@@ -233,7 +233,7 @@ def robot_of(plan: Plan) -> Robot:
     return robot_from_settings(plan.task.robot, urdf_text=plan.urdf)
 
 
-def run_plan(plan: Plan) -> Outcome:
+def run_plan(plan: Plan) -> PlanOutcome:
     """Make a plan; a worker calls this.
 
     Raises
@@ -261,9 +261,9 @@ def run_plan(plan: Plan) -> Outcome:
             result.save(path)
             motion = path.read_bytes()
     except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
-        return Outcome.of_error(error, time.perf_counter() - began)
-    remarks = [str(each) for each in result.warnings]
-    remarks += [f"not completed: {each}" for each in result.not_completed]
+        return PlanOutcome.of_error(error, time.perf_counter() - began)
+    remarks = [str(warning) for warning in result.warnings]
+    remarks += [f"not completed: {step}" for step in result.not_completed]
     facts = {
         "status": VERIFIED if result.verified else UNVERIFIED,
         "t_end_s": result.t_end,
@@ -276,4 +276,4 @@ def run_plan(plan: Plan) -> Outcome:
         "wall_time_s": wall_time,
         "remarks": "; ".join(remarks) or None,
     }
-    return Outcome(facts, motion)
+    return PlanOutcome(facts, motion)

@@ -14,13 +14,13 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from functools import partial
 
-from brachis.apps.sweeps.plans import Outcome, Plan, run_plan
+from brachis.apps.sweeps.plans import Plan, PlanOutcome, run_plan
 from brachis.common import interrupts
 from brachis.common.arguments import check_executor, count
 from brachis.errors import BrachisError, ClusterError, InputError
 from brachis.search.processes import process_count
 
-Outcomes = Generator[tuple[Plan, Outcome], None, None]
+Outcomes = Generator[tuple[Plan, PlanOutcome], None, None]
 Pool = Callable[[Sequence[Plan]], Outcomes]
 
 AHEAD = 2
@@ -60,8 +60,8 @@ def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
         Both are given, or one is wrong.
     """
     if executor is None:
-        wanted = None if jobs is None else count(jobs, "jobs")
-        return lambda plans: in_processes(plans, wanted)
+        workers = None if jobs is None else count(jobs, "jobs")
+        return lambda plans: in_processes(plans, workers)
     check_executor(executor)
     if jobs is not None:
         raise InputError(
@@ -74,8 +74,8 @@ def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
 
 
 def as_completed(
-    plans: Iterable[Plan], submit: Callable[[Plan], Future[Outcome]], width: int
-) -> Iterator[tuple[Plan, Outcome]]:
+    plans: Iterable[Plan], submit: Callable[[Plan], Future[PlanOutcome]], width: int
+) -> Iterator[tuple[Plan, PlanOutcome]]:
     """Hand out plans, up to `width` at a time, and yield what comes back.
 
     Plans that were under way when a process ended are made again, one at a time, so that the one that ends it is known.
@@ -84,7 +84,7 @@ def as_completed(
     waiting = iter(plans)
     suspects = deque[Plan]()
     tested: Plan | None = None
-    running: dict[Future[Outcome], Plan] = {}
+    running: dict[Future[PlanOutcome], Plan] = {}
     try:
         while True:
             if not suspects:
@@ -110,20 +110,20 @@ def as_completed(
             future.cancel()
 
 
-def _error_of(future: Future[Outcome]) -> BaseException | None:
+def _error_of(future: Future[PlanOutcome]) -> BaseException | None:
     try:
         return future.exception()
     except CancelledError as error:
         return error
 
 
-def _outcome_of(future: Future[Outcome]) -> Outcome:
+def _outcome_of(future: Future[PlanOutcome]) -> PlanOutcome:
     """Return what came of a plan; `run_plan` makes an outcome of every error but those of the worker itself."""
     error = _error_of(future)
     if error is None:
         return future.result()
     if isinstance(error, BrokenExecutor):
-        return Outcome.of_error(error, message=_ENDED)
+        return PlanOutcome.of_error(error, message=_ENDED)
     if isinstance(error, BrachisError) or not isinstance(error, Exception):
         raise error
     if isinstance(error, OSError | CancelledError | ImportError):
@@ -132,7 +132,7 @@ def _outcome_of(future: Future[Outcome]) -> Outcome:
             found=f"{type(error).__name__}: {error}",
             hint=_CONTINUES,
         ) from error
-    return Outcome.of_error(error)
+    return PlanOutcome.of_error(error)
 
 
 def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
@@ -140,7 +140,7 @@ def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
 
     Yields
     ------
-    Plan, Outcome
+    Plan, PlanOutcome
 
     Raises
     ------
@@ -170,7 +170,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
 
     Yields
     ------
-    Plan, Outcome
+    Plan, PlanOutcome
     """
     from joblib.externals.loky import ProcessPoolExecutor
 
@@ -184,7 +184,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
     )
     processes = executor()
 
-    def submit(plan: Plan) -> Future[Outcome]:
+    def submit(plan: Plan) -> Future[PlanOutcome]:
         """Hand out a plan, to new processes if the old ones ended."""
         nonlocal processes
         with interrupts.block_in_children():  # this may start processes

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brachis.apps.export.rows import require_library
-from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED, Outcome
+from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED, PlanOutcome
 from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.files import (
     atomic_write,
@@ -101,19 +101,19 @@ class Store:
         """Name a file of a plan, in one of 256 folders: a folder with thousands of files is slow to write to."""
         return self.folder / "plans" / digest[:2] / f"{digest}{suffix}"
 
-    def write(self, digest: str, outcome: Outcome) -> dict[str, Any]:
+    def write(self, digest: str, outcome: PlanOutcome) -> dict[str, Any]:
         """Store a finished plan; returns its columns."""
         motion = self._place(digest, ".npz")
-        part = self._place(digest, ".parquet")
-        with writing_errors(part):
-            part.parent.mkdir(parents=True, exist_ok=True)
+        columns_file = self._place(digest, ".parquet")
+        with writing_errors(columns_file):
+            columns_file.parent.mkdir(parents=True, exist_ok=True)
         facts = {**dict.fromkeys(COLUMNS), **outcome.facts}
         if outcome.motion is not None:
             with atomic_write(motion) as stream:
                 stream.write(outcome.motion)
             facts["motion"] = motion.relative_to(self.folder).as_posix()
         schema = self._arrow.schema(COLUMNS.items())
-        with atomic_write(part) as stream:
+        with atomic_write(columns_file) as stream:
             table = self._arrow.Table.from_pylist([facts], schema)
             self._parquet.write_table(table, stream)
         return facts
@@ -216,7 +216,7 @@ class SweepResult(Summary):
     --------
     >>> import tempfile
     >>> import brachis
-    >>> found = brachis.sweep(
+    >>> result = brachis.sweep(
     ...     {
     ...         "sweep": 1,
     ...         "task": "examples/01_scara_line.yaml",
@@ -226,9 +226,9 @@ class SweepResult(Summary):
     ...     tempfile.mkdtemp(),
     ...     jobs=1,
     ... )
-    >>> [row["spline.intervals"] for row in found.ranked()]
+    >>> [row["spline.intervals"] for row in result.ranked()]
     [7, 6]
-    >>> round(found.trajectory(1).t_end, 1)
+    >>> round(result.trajectory(1).t_end, 1)
     2.8
     """
 
@@ -329,20 +329,22 @@ class SweepResult(Summary):
         Of an even number of plans the median is the faster one of the two in the middle.
         """
         ranked = self.ranked()
-        found: dict[str, Any] = {"plans": len(self.table)}
+        summary: dict[str, Any] = {"plans": len(self.table)}
         for status in (VERIFIED, UNVERIFIED, FAILED):
-            found[status] = self.count(status)
+            summary[status] = self.count(status)
         if ranked:
             median = ranked[(len(ranked) - 1) // 2]
             shown = {"best": ranked[0], "median": median, "worst": ranked[-1]}
             for name, row in shown.items():
-                found[name] = {key: row[key] for key in ("plan", *self.keys, "t_end_s")}
-        found["failures"] = {
+                summary[name] = {
+                    key: row[key] for key in ("plan", *self.keys, "t_end_s")
+                }
+        summary["failures"] = {
             error: {"plans": count, "message": message}
             for error, (count, message) in self.failures().items()
         }
         times = self.table.column("wall_time_s").to_pylist()
-        return {**found, "wall_time_s": sum(filter(None, times))}
+        return {**summary, "wall_time_s": sum(filter(None, times))}
 
     def plot(self, keys: Sequence[str] | None = None) -> Figure:
         """Draw the end times of verified plans over one key, a line, or two, a heat map.

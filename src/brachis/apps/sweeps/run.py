@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import brachis
-from brachis.apps.sweeps.plans import FAILED, Outcome, Plan, SweepPlan, load_sweep
+from brachis.apps.sweeps.plans import FAILED, Plan, PlanOutcome, SweepPlan, load_sweep
 from brachis.apps.sweeps.pools import Outcomes, Pool, pool_for
 from brachis.apps.sweeps.result import TABLE, Store, SweepResult
 from brachis.common import interrupts
@@ -84,7 +84,7 @@ def sweep(
     --------
     >>> import tempfile
     >>> import brachis
-    >>> found = brachis.sweep(
+    >>> result = brachis.sweep(
     ...     {
     ...         "sweep": 1,
     ...         "task": "examples/01_scara_line.yaml",
@@ -94,7 +94,7 @@ def sweep(
     ...     tempfile.mkdtemp(),
     ...     jobs=1,
     ... )
-    >>> found.table.column("status").to_pylist()
+    >>> result.table.column("status").to_pylist()
     ['verified', 'verified']
     """
     check_callable(listener, "listener")
@@ -104,9 +104,9 @@ def sweep(
         numbers = range(len(planned.rows))
         table = TABLE
         if part is not None:
-            first, parts = _read_part(part, len(numbers))
-            numbers = numbers[first - 1 :: parts]
-            table = f"{TABLE}-{first}-of-{parts}"
+            first, part_count = _read_part(part, len(numbers))
+            numbers = numbers[first - 1 :: part_count]
+            table = f"{TABLE}-{first}-of-{part_count}"
         pool = pool_for(jobs, executor)
         if merge:
             pool = partial(_refuse_missing, planned)
@@ -118,31 +118,31 @@ def sweep(
         )
         selected = {number: planned.rows[number] for number in numbers}
         plans = [plan for _, plan in selected.values() if isinstance(plan, Plan)]
-        found = _run(plans, store, pool, retry=retry, tell=tell)
+        facts_by_digest = _run(plans, store, pool, retry=retry, tell=tell)
     rows = {}
     for number, (changes, plan) in selected.items():
         facts = (
-            found[plan.digest]
+            facts_by_digest[plan.digest]
             if isinstance(plan, Plan)
-            else Outcome.of_error(plan).facts
+            else PlanOutcome.of_error(plan).facts
         )
         rows[number] = (changes, facts)
     keys = planned.settings.keys
     return SweepResult(store.folder, keys, store.write_table(keys, rows, table), table)
 
 
-def _read_part(part: str, plans: int) -> tuple[int, int]:
+def _read_part(text: str, plans: int) -> tuple[int, int]:
     """Read ``i/n``, of no more parts than plans."""
-    numbers = re.fullmatch(r"([0-9]+)/([0-9]+)", part)
-    first, parts = map(int, numbers.groups()) if numbers else (0, 0)
-    if not 1 <= first <= parts <= plans:
+    numbers = re.fullmatch(r"([0-9]+)/([0-9]+)", text)
+    first, part_count = map(int, numbers.groups()) if numbers else (0, 0)
+    if not 1 <= first <= part_count <= plans:
         raise InputError(
             "this is not a part of the sweep",
             where="part",
-            found=part,
+            found=text,
             allowed=f"i/n, such as 2/8: part i of n, 1 <= i <= n <= {plans}",
         )
-    return first, parts
+    return first, part_count
 
 
 def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
@@ -168,29 +168,33 @@ def _run(
 ) -> dict[str, dict[str, Any]]:
     """Make the plans that are not stored yet, and return the columns of all, by digest."""
     plans = {plan.digest: plan for plan in selected}
-    found = {}
+    facts_by_digest = {}
     for digest in plans:
         facts = store.read(digest)
         if facts is not None and not (retry and facts["status"] == FAILED):
-            found[digest] = facts
-    stored = len(found)
+            facts_by_digest[digest] = facts
+    stored = len(facts_by_digest)
     began = time.monotonic()
     every = write_count(len(plans), "plan")
     tell(f"{stored} of {every}{' are stored already' if stored else ''}")
-    missing = [plan for digest, plan in plans.items() if digest not in found]
+    missing = [plan for digest, plan in plans.items() if digest not in facts_by_digest]
     try:
         # Workers end with this block, even if an outcome cannot be stored.
         with closing(pool(missing)) as outcomes:
             for plan, outcome in outcomes:
-                found[plan.digest] = store.write(plan.digest, outcome)
-                done = len(found)
-                failed = sum(facts["status"] == FAILED for facts in found.values())
+                facts_by_digest[plan.digest] = store.write(plan.digest, outcome)
+                done = len(facts_by_digest)
+                failed = sum(
+                    facts["status"] == FAILED for facts in facts_by_digest.values()
+                )
                 period = (time.monotonic() - began) / (done - stored)
                 remaining = timedelta(seconds=round(period * (len(plans) - done)))
                 failures = f", {failed} failed" if failed else ""
                 tell(f"{done} of {every}{failures}; {remaining} left")
     except KeyboardInterrupt as interrupt:
         interrupts.clear()
-        message = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
-        raise KeyboardInterrupt(message) from interrupt
-    return found
+        counts = f"{len(facts_by_digest)} of {len(plans)} plans"
+        raise KeyboardInterrupt(
+            f"{counts} are stored in {store.folder}; the same sweep goes on from there"
+        ) from interrupt
+    return facts_by_digest

@@ -172,17 +172,17 @@ class SweepSettings(Model):
     @model_validator(mode="after")
     def _check_places(self) -> SweepSettings:
         places = {"fixed": self.fixed, **self._varied}
-        found: dict[str, str] = {}
+        place_of: dict[str, str] = {}
         for place, keys in places.items():
             for key in keys:
-                if key in found:
+                if key in place_of:
                     raise refuse(
                         f"{key} is varied twice",
                         key=place,
-                        found=f"in {found[key]} and in {place}",
+                        found=f"in {place_of[key]} and in {place}",
                         allowed="once",
                     )
-                found[key] = place
+                place_of[key] = place
         return self
 
     @property
@@ -224,11 +224,17 @@ class SweepSettings(Model):
             dict(zip(self.grid, values, strict=True))
             for values in itertools.product(*columns)
         ]
-        parts = (grid, self.rows or ({},), self.random.draws() if self.random else [{}])
+        varied = (
+            grid,
+            self.rows or ({},),
+            self.random.draws() if self.random else [{}],
+        )
         changes = [
-            {**cell, **row, **draw} for cell, row, draw in itertools.product(*parts)
+            {**cell, **row, **draw} for cell, row, draw in itertools.product(*varied)
         ]
-        return list({_alike(each): each for each in reversed(changes)}.values())[::-1]
+        return list({_alike(change): change for change in reversed(changes)}.values())[
+            ::-1
+        ]
 
 
 def _alike(changes: dict[str, JsonValue]) -> str:

@@ -117,7 +117,7 @@ def _check_size(path: Path, room: int) -> int:
     size = path.stat().st_size
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
-            size = sum(each.file_size for each in archive.infolist())
+            size = sum(member.file_size for member in archive.infolist())
     if size > room:
         raise InputError(
             "the mesh is too large to be shown",
@@ -150,17 +150,17 @@ def _meshes(
         build_scene_graph=True,
         filename_handler=yourdfpy.filename_handler_null,
     )
-    found = []
+    meshes = []
     for mesh in read.scene.dump():
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
             bare = trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual)
-            found.append(_paint(bare))
-    if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
+            meshes.append(_paint(bare))
+    if not meshes or not all(np.isfinite(mesh.vertices).all() for mesh in meshes):
         raise InputError(
             "the mesh has no faces, or corners that are not finite",
             where=visual.xpath("string(geometry/mesh/@filename)"),
         )
-    return found
+    return meshes
 
 
 def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -170,8 +170,8 @@ def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
     if pictures != [None, None]:
         return mesh
-    own = tuple(map(int, look.main_color)) if mesh.visual.defined else None
-    return with_colour(mesh, own or _COLOURS["shape"])
+    colour = tuple(map(int, look.main_color)) if mesh.visual.defined else None
+    return with_colour(mesh, colour or _COLOURS["shape"])
 
 
 def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
@@ -258,9 +258,11 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
     moving = [positions[:, 1:].reshape(-1, 3)]
     still: list[np.ndarray] = []
     for joint, meshes in (links or skeleton).items():
-        own = np.concatenate([trimesh.bounds.corners(mesh.bounds) for mesh in meshes])
+        corners_of_link = np.concatenate(
+            [trimesh.bounds.corners(mesh.bounds) for mesh in meshes]
+        )
         turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True).as_matrix()
-        corners = positions[:, joint, None] + own @ turns.transpose(0, 2, 1)
+        corners = positions[:, joint, None] + corners_of_link @ turns.transpose(0, 2, 1)
         (moving if joint else still).append(corners.reshape(-1, 3))
     box, moving_box = (
         np.array([points.min(axis=0), points.max(axis=0)])
@@ -320,14 +322,16 @@ def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
 def scene_meshes(trajectory: Trajectory) -> Meshes:
     """Make the meshes of the bodies of a task's scene, without the robot's own, in the frames of their joints, m."""
     task = trajectory.task
-    found = scene_of(trajectory.robot, task)
+    scene = scene_of(trajectory.robot, task)
     meshes: Meshes = defaultdict(list)
-    if found is None:
+    if scene is None:
         return meshes
-    for number, solid in enumerate(found.solids[found.own :], found.own):
+    for number, solid in enumerate(
+        scene.solids[scene.robot_count :], scene.robot_count
+    ):
         mesh = _mesh_of(solid)
-        mesh.apply_transform(found.placements[number])
-        meshes[int(found.joints[number])].append(mesh)
+        mesh.apply_transform(scene.placements[number])
+        meshes[int(scene.joints[number])].append(mesh)
     return meshes
 
 

@@ -49,13 +49,13 @@ def shown_panels(
         Whether angles of joints without limits are in degrees.
     """
     ratios = at_distinct_times(limit_ratios(trajectory))
-    found = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
+    panels = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
     rows = ("torque", "velocity", "position")
     for panel in panels_of(trajectory, samples, *rows, degrees=degrees):
         free = tuple(curve for curve in panel.curves if not curve.is_limited)
         if free:
-            found.append(replace(panel, curves=free, unit=f"{panel.unit}, no limit"))
-    return [*found, *panels_of(trajectory, samples, *tool_rows_of(trajectory))]
+            panels.append(replace(panel, curves=free, unit=f"{panel.unit}, no limit"))
+    return [*panels, *panels_of(trajectory, samples, *tool_rows_of(trajectory))]
 
 
 def add_plot(gui: viser.GuiApi, panel: Panel) -> viser.GuiHtmlHandle:
@@ -104,18 +104,18 @@ def _series(
     }
 
 
-def line_at(part: float) -> str:
+def line_at(fraction: float) -> str:
     """Line over the plot above it, at a part of its width; a plot whose data are replaced so often would blink."""
     before = _PIXELS["outside left"] + _PIXELS["left"]
     around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
-    left = f"calc({before}px + {part:.5f} * (100% - {around}px))"
+    offset = f"calc({before}px + {fraction:.5f} * (100% - {around}px))"
     bottom = _PIXELS["below"] + _PIXELS["outside below"]
     height = _PIXELS["height"] - _PIXELS["above"] - _PIXELS["below"]
-    place = f"left:{left};bottom:{bottom}px;height:{height}px"
+    place = f"left:{offset};bottom:{bottom}px;height:{height}px"
     style_now = f"position:absolute;z-index:5;width:1.5px;background:#D00000;{place}"
     return (
         '<div style="position:relative;height:0;pointer-events:none">'
-        f'<div data-part="{part:.5f}" style="{style_now}"></div></div>'
+        f'<div data-part="{fraction:.5f}" style="{style_now}"></div></div>'
     )
 
 

@@ -11,14 +11,14 @@ from brachis.apps.plots.postures import plane_of
 from brachis.apps.view.bodies import bodies_of, placements, prescribed_path
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
-from brachis.scene.scene import Scene as BodyScene
+from brachis.scene.scene import Scene
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import viser
 
 
-class Scene:
+class ViewerScene:
     """A robot and its motion in the browser.
 
     Parameters
@@ -91,7 +91,7 @@ class Scene:
         if self._cell is not None and "closest pair" in self.layers:
             self._show_closest(self._cell, q)
 
-    def _show_closest(self, cell: BodyScene, q: np.ndarray) -> None:
+    def _show_closest(self, cell: Scene, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
         line, label = self.layers["closest pair"]
         if not line.visible:
@@ -102,9 +102,9 @@ class Scene:
         distance = 1e3 * closest.distance[0]
         label.text = f"{cell.names(closest.pair[0])}: {distance:.1f} mm"
 
-    def _frame(self, name: str, part: float) -> viser.FrameHandle:
+    def _frame(self, name: str, fraction: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
-        length = part * self._size
+        length = fraction * self._size
         return self._api.add_frame(
             name,
             axes_length=length,
@@ -133,7 +133,7 @@ class Scene:
         frames = placements(self._robot, self._trajectory.position(times))
         shades = np.linspace([190, 214, 235], [25, 75, 125], 6).astype(np.uint8)
         for joint, meshes in bodies.items():
-            positions, quaternions = (each[:, joint] for each in frames)
+            positions, quaternions = (components[:, joint] for components in frames)
             placed = np.hstack([positions, quaternions])
             if np.ptp(placed, axis=0).max() < 1e-9:  # it stands still
                 continue
@@ -141,11 +141,11 @@ class Scene:
                 mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
             ]
             bare = [trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse]
-            whole = trimesh.util.concatenate(bare)
+            mesh_of_body = trimesh.util.concatenate(bare)
             handle = self._api.add_batched_meshes_simple(
                 f"/ghosts/{joint}",
-                whole.vertices,
-                whole.faces,
+                mesh_of_body.vertices,
+                mesh_of_body.faces,
                 batched_positions=positions,
                 batched_wxyzs=quaternions,
                 batched_colors=shades,
@@ -168,8 +168,8 @@ class Scene:
     def _draw_trace(self) -> None:
         """Draw the way of the tool in 32 colours of its speed; viser shows colours of single points too light."""
         speed = self.samples.tool_speed
-        parts = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
-        shades = np.round(31.0 * parts).astype(int)
+        fractions = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
+        shades = np.round(31.0 * fractions).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, 32))
         points = self.samples.tool_position
         for shade in np.unique(shades).tolist():
@@ -236,8 +236,8 @@ class Scene:
         camera.position = camera.look_at + distance * away
 
 
-def speed_colours(parts: np.ndarray) -> np.ndarray:
+def speed_colours(fractions: np.ndarray) -> np.ndarray:
     """Colours (K, 3) from 0 to 255 of speeds (K,) as parts of the largest one: Matplotlib's plasma but its pale end."""
     from matplotlib import colormaps
 
-    return colormaps["plasma"](0.88 * parts, bytes=True)[:, :3]
+    return colormaps["plasma"](0.88 * fractions, bytes=True)[:, :3]

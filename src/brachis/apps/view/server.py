@@ -72,8 +72,8 @@ def require_viser() -> None:
 
 def is_local(host: str) -> bool:
     """Tell whether an address that was listened on is reached from this machine alone."""
-    found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    return all(ipaddress.ip_address(each[4][0]).is_loopback for each in found)
+    addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    return all(ipaddress.ip_address(address[4][0]).is_loopback for address in addresses)
 
 
 def _check(host: str, port: int) -> None:
@@ -83,8 +83,8 @@ def _check(host: str, port: int) -> None:
             "the port is out of range", where="--port", found=port, allowed="0 to 65535"
         )
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        socket.create_server(found[4], family=found[0]).close()
+        address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        socket.create_server(address[4], family=address[0]).close()
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(

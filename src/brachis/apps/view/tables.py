@@ -43,10 +43,10 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     titles = ("joint", "position", "velocity", "torque, force")
     rows = []
     for name in trajectory.joint_names:
-        own = zip(curves_of(panels, name), _STATE.values(), strict=False)
+        curves = zip(curves_of(panels, name), _STATE.values(), strict=False)
         cells = [
             f"{curve.values[0]:z.{digits}f} {panel.unit}"
-            for (panel, curve), digits in own
+            for (panel, curve), digits in curves
         ]
         rows.append([name, *cells])
     return head + _table(titles[: len(rows[0])], rows)
@@ -65,8 +65,8 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
             "The candidates of the search are not known: they are in result.json, in the folder of result.npz."
         )
     rows = candidate_rows(candidates)[:60]
-    left = len(candidates) - len(rows)
-    note = _paragraph(f"{left} more, slower ones") if left else ""
+    omitted = len(candidates) - len(rows)
+    note = _paragraph(f"{omitted} more, slower ones") if omitted else ""
     return _table((*WORDS, *TIMES, STATUS), rows, cell=_WRAPPED) + note
 
 
@@ -78,7 +78,8 @@ def paragraphs(lines: Sequence[str]) -> str:
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
     """Colour bar of the tool's speed from 0 to `fastest`, m/s; `stops` are CSS colours."""
     marks = "".join(
-        f"<span>{part * fastest:.3g}</span>" for part in (0.0, 0.25, 0.5, 0.75, 1.0)
+        f"<span>{fraction * fastest:.3g}</span>"
+        for fraction in (0.0, 0.25, 0.5, 0.75, 1.0)
     )
     return (
         '<div style="margin:0.3em 0.8em;font-size:0.8em">tool speed (m/s)'

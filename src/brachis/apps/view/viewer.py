@@ -24,7 +24,7 @@ from brachis.apps.view.panel import (
     line_at,
     shown_panels,
 )
-from brachis.apps.view.scene import Scene, speed_colours
+from brachis.apps.view.scene import ViewerScene, speed_colours
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.common import interrupts
 from brachis.errors import BrachisError
@@ -89,7 +89,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._server = start_server(host, port)
         self._gui = self._server.gui
         try:
-            self._scene = Scene(self._server, trajectory)
+            self._scene = ViewerScene(self._server, trajectory)
             self._add_panels(candidates, verified=verified)
             self.show()
         except BaseException:
@@ -263,10 +263,10 @@ class Viewer(AbstractContextManager["Viewer"]):
         with panel.add_tab("limits"):
             samples = self._scene.samples
             shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
-            self._lines = [add_plot(self._gui, each) for each in shown]
+            self._lines = [add_plot(self._gui, plotted) for plotted in shown]
         with panel.add_tab("bottlenecks"):
-            found = bottleneck.report(self._trajectory, solve=False)
-            lines = found.text(degrees=self._degrees).splitlines()
+            report = bottleneck.report(self._trajectory, solve=False)
+            lines = report.text(degrees=self._degrees).splitlines()
             self._gui.add_html(tables.paragraphs(lines))
         count = f" ({len(candidates)})" if candidates else ""
         with panel.add_tab(f"candidates{count}"):

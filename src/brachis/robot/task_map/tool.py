@@ -54,8 +54,8 @@ class Pose(RowsAndOrientation):
         """Return the translation and the rotation vector, (..., 6), in the frame of `second`."""
         moved = super().difference(first, second)
         rotation = second[..., 3:].reshape(*second.shape[:-1], 3, 3)
-        parts = moved.reshape(*moved.shape[:-1], 2, 3)
-        return (parts @ rotation).reshape(moved.shape)
+        vectors = moved.reshape(*moved.shape[:-1], 2, 3)
+        return (vectors @ rotation).reshape(moved.shape)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -91,13 +91,13 @@ def scatter_of(points: Points) -> Scatter:
     of_turning = 0.0
     if turning.shape[1]:
         # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
-        dimension, whole = (3, 2.0) if points.has_quaternions else (1, 1.0)
+        dimension, factor = (3, 2.0) if points.has_quaternions else (1, 1.0)
         residuals = _residuals(turning, chords)
-        of_turning = whole * _deviation(residuals, _MEDIANS[dimension])
+        of_turning = factor * _deviation(residuals, _MEDIANS[dimension])
     return Scatter(deviation, of_turning, spacing, decimals_of(position))
 
 
-def _deviation(residuals: Array, median_of_one: float) -> float:
+def _deviation(residuals: Array, unit_median: float) -> float:
     """Return the standard deviation of residuals, (n, c), if they look like noise; zero where they do not."""
     sizes = np.linalg.norm(residuals, axis=1)
     median = float(np.median(sizes))
@@ -108,7 +108,7 @@ def _deviation(residuals: Array, median_of_one: float) -> float:
     )
     correlation = float(np.sum(clipped[1:] * clipped[:-1]) / np.sum(clipped**2))
     # It is -0.8 for white noise and 1 for a smooth curve.
-    return median / median_of_one if correlation < -0.25 else 0.0
+    return median / unit_median if correlation < -0.25 else 0.0
 
 
 def decimals_of(position: Array) -> int | None:
@@ -155,8 +155,8 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
             allowed="rows with different positions",
             hint="Use separate segments for a turn on the spot: csv, turn, csv",
         )
-    kept = points.only(np.setdiff1d(np.arange(len(points)), again))
-    if len(kept) < 2:
+    remaining = points.only(np.setdiff1d(np.arange(len(points)), again))
+    if len(remaining) < 2:
         raise TaskError(
             "all rows have the same position",
             found=f"{len(points)} times the same",
@@ -166,9 +166,9 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
     if not again.size:
         return points
     count = write_count(len(again), "row")
-    rows = name_first([str(row) for row in points.rows[again]], ", ", most=5)
+    rows = name_first([str(row) for row in points.rows[again]], ", ", count=5)
     note = f"left out {count} at the place of the row before: {points.row}s {rows}"
-    return replace(kept, notes=(*kept.notes, note))
+    return replace(remaining, notes=(*remaining.notes, note))
 
 
 def refuse_repetitions(points: Points) -> None:

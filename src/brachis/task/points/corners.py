@@ -151,12 +151,14 @@ def _lines(position: Array, u: Array, first: Indices, last: Indices) -> _Lines:
     at = u[:, None]
     moment = np.hstack([np.ones_like(at), at, at**2, position, at * position])
     sums = np.cumsum(np.pad(moment, ((1, 0), (0, 0))), axis=0)
-    part = sums[last + 1] - sums[first]
+    sums_within = sums[last + 1] - sums[first]
     dimension = position.shape[1]
-    count = part[:, :1]
-    mean = part[:, 1:2] / count
-    spread = np.maximum(part[:, 2:3] - count * mean**2, 1e-24)
-    slope = (part[:, 3 + dimension :] - mean * part[:, 3 : 3 + dimension]) / spread
+    count = sums_within[:, :1]
+    mean = sums_within[:, 1:2] / count
+    spread = np.maximum(sums_within[:, 2:3] - count * mean**2, 1e-24)
+    slope = (
+        sums_within[:, 3 + dimension :] - mean * sums_within[:, 3 : 3 + dimension]
+    ) / spread
     sizes = np.maximum(np.linalg.norm(slope, axis=1), 1e-24)
     uncertainty = 1.0 / np.sqrt(spread[:, 0])
     return _Lines(slope / sizes[:, None], uncertainty, mean[:, 0], sizes)
@@ -166,14 +168,14 @@ def _peaks(
     angle: Array, sharp: np.ndarray, u: Array, width: float, least: int
 ) -> list[int]:
     """Return the indices of the largest angles, one in every run of sharp ones as wide as the lines that fit."""
-    found: list[int] = []
+    peaks: list[int] = []
     for i in np.flatnonzero(sharp).tolist():
-        near = bool(found) and (u[i] - u[found[-1]] < width or i - found[-1] < least)
+        near = bool(peaks) and (u[i] - u[peaks[-1]] < width or i - peaks[-1] < least)
         if not near:
-            found.append(i)
-        elif angle[i] > angle[found[-1]]:
-            found[-1] = i
-    return found
+            peaks.append(i)
+        elif angle[i] > angle[peaks[-1]]:
+            peaks[-1] = i
+    return peaks
 
 
 def _locate(
@@ -200,9 +202,11 @@ def _locate(
         if np.ptp(u[side]):
             along = np.polyfit(u[side], position[side], 1)[0]
         sides.append((position[side].mean(axis=0), along / np.linalg.norm(along)))
-    (one, a), (other, b) = sides
-    steps, *_ = np.linalg.lstsq(np.stack([a, -b], axis=1), other - one, rcond=None)
-    place = (one + steps[0] * a + other + steps[1] * b) / 2.0
+    (centre_before, a), (centre_after, b) = sides
+    steps, *_ = np.linalg.lstsq(
+        np.stack([a, -b], axis=1), centre_after - centre_before, rcond=None
+    )
+    place = (centre_before + steps[0] * a + centre_after + steps[1] * b) / 2.0
     gap = u[i + 1] - u[i - 1]  # a corner is not at an end
     after = float((position[i] - place) @ (a + b)) > 0.0
     far = np.linalg.norm(place - position[i]) > max(width, gap)
@@ -235,15 +239,15 @@ def fill_gaps(points: Points) -> Points:
     long = chords > times * usual
     if len(points) < 20 or not np.any(long):
         return points
-    parts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
+    counts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
     index = np.arange(len(points))
-    at = spread(index, np.where(long, parts, 1).astype(int))
+    at = spread(index, np.where(long, counts, 1).astype(int))
     columns = interpolate_columns(at, index, points.columns)
     position, turning = np.hsplit(columns, [points.dimension])
     if points.has_quaternions:
         turning = with_like_signs(turning)
-    ways = write_count(int(np.count_nonzero(long)), "way")
-    note = f"taken as straight: {ways} longer than {times:g} times the usual spacing"
+    gaps = write_count(int(np.count_nonzero(long)), "way")
+    note = f"taken as straight: {gaps} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
     notes = (*points.notes, note)
     return replace(rows, position=position, turning=turning, notes=notes)

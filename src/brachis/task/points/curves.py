@@ -89,14 +89,14 @@ def _fit_between(
         first = start.after if start else 0
         rows = range(first, end.before if end else len(points))
         of_user = slice(len(before), len(before) + len(rows))
-        whole = points.only([*before, *rows, *after])  # copies
+        section = points.only([*before, *rows, *after])  # copies
         if start is not None:
-            whole.position[0] = start.place
+            section.position[0] = start.place
         if end is not None:
-            whole.position[-1] = end.place
-        fit = _fit_one(whole, tolerance, scatter, note)
-        speeds = speed_runs(fit.sigma, whole.speed)
-        curves.append(FittedCurve(whole, fit.only(of_user), speeds))
+            section.position[-1] = end.place
+        fit = _fit_one(section, tolerance, scatter, note)
+        speeds = speed_runs(fit.sigma, section.speed)
+        curves.append(FittedCurve(section, fit.only(of_user), speeds))
     return curves
 
 
@@ -118,8 +118,8 @@ def _blend_between(
         float(first.fit.position_errors[is_last].max(initial=0.0)),
         float(second.fit.position_errors[is_first].max(initial=0.0)),
     )
-    left = tolerance.at_corners - taken
-    if left < 0.05 * tolerance.at_corners:
+    remaining = tolerance.at_corners - taken
+    if remaining < 0.05 * tolerance.at_corners:
         raise first.points.wrong(
             -1,
             f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
@@ -127,7 +127,7 @@ def _blend_between(
             allowed=f"{1e3 * tolerance.at_corners:.3g} mm",
             hint="Give a larger tolerance.corner, or set corner: stop",
         )
-    return blend_size(corner.angle, left, shortest)
+    return blend_size(corner.angle, remaining, shortest)
 
 
 def _fit_one(
@@ -145,15 +145,15 @@ def _fit_one(
     if ratios[i] <= 1.0 + 1e-6:
         return fit
     kind = "position"
-    found = f"{1e3 * fit.position_errors[i]:.3g} mm"
+    miss = f"{1e3 * fit.position_errors[i]:.3g} mm"
     allowed = f"{1e3 * tolerance.position:.3g} mm"
     looks = str(scatter) if scatter.deviation else ""
-    wanted = 6.0 * scatter.deviation
-    if looks and wanted > tolerance.position:
-        looks += f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
+    advised = 6.0 * scatter.deviation
+    if looks and advised > tolerance.position:
+        looks += f"; give a tolerance of {1e3 * advised:.2g} mm or more"
     if fit.position_errors[i] <= tolerance.position:
         kind = "orientation"
-        found = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
+        miss = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
         allowed = f"{np.rad2deg(tolerance.orientation):.3g} deg"
         scattered = f"{np.rad2deg(scatter.turning):.2g} deg (standard deviation)"
         looks = f"orientations that scatter by {scattered}" if scatter.turning else ""
@@ -161,7 +161,7 @@ def _fit_one(
     raise points.wrong(
         i,
         f"no smooth curve is within the tolerance of {kind}",
-        found=f"{found} at {points.describe(i)}",
+        found=f"{miss} at {points.describe(i)}",
         allowed=allowed,
         hint=note or hint,
     )
@@ -183,16 +183,18 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     if speed is None or len(sigma) < 2:
         return ()
     sigma = np.maximum.accumulate(sigma)
-    ways = speed[1:]
+    step_speeds = speed[1:]
     runs = []
     # The stubs do not say what it returns: slices, in order.
-    for run in np.ma.clump_unmasked(np.ma.masked_invalid(ways)):  # type: ignore[no-untyped-call]
-        of_way = ways[run]
-        values = np.minimum(np.append(of_way[0], of_way), np.append(of_way, of_way[-1]))
+    for run in np.ma.clump_unmasked(np.ma.masked_invalid(step_speeds)):  # type: ignore[no-untyped-call]
+        speeds = step_speeds[run]
+        values = np.minimum(np.append(speeds[0], speeds), np.append(speeds, speeds[-1]))
         changes = np.diff(values) != 0.0
-        kept = np.append(True, changes) | np.append(changes, True)
+        is_needed = np.append(True, changes) | np.append(changes, True)
         at = sigma[run.start : run.stop + 1]
-        runs.append(tuple(zip(at[kept].tolist(), values[kept].tolist(), strict=True)))
+        runs.append(
+            tuple(zip(at[is_needed].tolist(), values[is_needed].tolist(), strict=True))
+        )
     return tuple(runs)
 
 
@@ -234,13 +236,13 @@ def fit_curves(
     note = plausibility_note(points)
     curves = _fit_between(points, corners, tolerance, scatter, note)
     starts = sum_up([curve.length for curve in curves]).tolist()
-    found = []
+    reports = []
     for i, corner in enumerate(corners):
         blend = 0.0
         if not stops:
             blend = _blend_between(curves[i], curves[i + 1], corner, tolerance)
             curves[i] = replace(curves[i], blend=blend)
-        found.append(_report_corner(points, corner, starts[i + 1], blend))
+        reports.append(_report_corner(points, corner, starts[i + 1], blend))
     sigmas = [
         start + curve.fit.sigma for start, curve in zip(starts, curves, strict=False)
     ]
@@ -257,7 +259,7 @@ def fit_curves(
         orientation_error=float(angles.max()),
         orientation_tolerance=tolerance.orientation,
         intervals=sum(len(curve.fit.breaks) - 1 for curve in curves),
-        corners=tuple(found),
+        corners=tuple(reports),
         told=(*points.notes, *[str(scatter)] * (scatter.deviation > 0.0)),
         doubt=note,
         profile=_profile(along, distances, angles),
@@ -328,5 +330,5 @@ def cut_at_corners(
         told=points.notes,
         doubt=plausibility_note(points),
     )
-    parts = (points.only(slice(first, last + 1)) for first, last in pairwise(cuts))
-    return tuple(parts), report
+    sections = (points.only(slice(first, last + 1)) for first, last in pairwise(cuts))
+    return tuple(sections), report

@@ -112,8 +112,8 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
     TaskError
         The program has words that are not understood, or an invalid arc; the message names the line.
     """
-    is_given = isinstance(rows, tuple)
-    names = tuple(row for row in rows if row != "axis") if is_given else POSITION
+    has_rows = isinstance(rows, tuple)
+    names = tuple(row for row in rows if row != "axis") if has_rows else POSITION
     if not set(names) <= set(POSITION):
         raise TaskError(
             "G-code contains only positions",
@@ -183,11 +183,11 @@ def _obey(machine: _Machine, code: str) -> None:
 
 def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[str]]:
     """Return the numbers of a line by their letters, and its codes, such as G1 or M30."""
-    rest = _WORD.sub("", code).strip()
-    if rest:
+    unread = _WORD.sub("", code).strip()
+    if unread:
         raise machine.wrong(
             "this is not understood",
-            repr(rest[:40]),
+            repr(unread[:40]),
             "G-code words, such as G1 X10 F600, without exponents; no / at the start of a line",
         )
     values: dict[str, float] = {}
@@ -298,16 +298,16 @@ def _arc(
 ) -> Array:
     """Return places on an arc, (k, 3); in its plane, points are complex numbers."""
     *plane, normal = machine.plane
-    one = complex(*start[plane])
-    other = complex(*end[plane])
+    begin = complex(*start[plane])
+    finish = complex(*end[plane])
     if "R" in values:
-        centre = _centre(machine, one, other, values["R"] * machine.unit)
+        centre = _centre(machine, begin, finish, values["R"] * machine.unit)
     else:
         stated = complex(*(values.get("IJK"[axis], 0.0) for axis in plane))
-        origin = 0.0 if machine.absolute_centres else one
+        origin = 0.0 if machine.absolute_centres else begin
         centre = origin + stated * machine.unit
-    radius = abs(one - centre)
-    at_end = abs(other - centre)
+    radius = abs(begin - centre)
+    at_end = abs(finish - centre)
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
         raise machine.wrong(
             "invalid arc: its start and end are at different radii",
@@ -315,7 +315,9 @@ def _arc(
             "one radius; I, J, K from the start",
         )
     turn = -2.0 * pi if machine.motion == "G2" else 2.0 * pi
-    swept = (phase(other - centre) - phase(one - centre)) % turn  # of the sign of turn
+    swept = (
+        phase(finish - centre) - phase(begin - centre)
+    ) % turn  # of the sign of turn
     if min(abs(swept), abs(swept - turn)) < 1e-9:
         swept = turn
     turns = values.get("P", 1.0)
@@ -329,16 +331,18 @@ def _arc(
     count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
     shares = _shares(count)
     growth = 1.0 + (at_end / radius - 1.0) * shares
-    points = centre + (one - centre) * growth * np.exp(1j * swept * shares)
+    points = centre + (begin - centre) * growth * np.exp(1j * swept * shares)
     places = np.empty((count, 3))
     places[:, plane] = np.hstack([points.real, points.imag])
     places[:, [normal]] = start[normal] + (end[normal] - start[normal]) * shares
     return places
 
 
-def _centre(machine: _Machine, one: complex, other: complex, radius: float) -> complex:
+def _centre(
+    machine: _Machine, begin: complex, finish: complex, radius: float
+) -> complex:
     """Return the centre of an arc of given radius; a negative one is that of more than half a turn."""
-    chord = other - one
+    chord = finish - begin
     length = abs(chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
         raise machine.wrong(
@@ -348,4 +352,4 @@ def _centre(machine: _Machine, one: complex, other: complex, radius: float) -> c
         )
     away = sqrt(max(radius**2 - length**2 / 4.0, 0.0))
     side = -1.0 if (machine.motion == "G2") != (radius < 0.0) else 1.0
-    return (one + other) / 2.0 + side * away * 1j * chord / length
+    return (begin + finish) / 2.0 + side * away * 1j * chord / length

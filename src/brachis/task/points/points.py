@@ -137,13 +137,13 @@ def project_on_sides(points: Array, begin: Array, side: Array) -> tuple[Array, A
     return shares, np.linalg.norm(away - shares[:, None] * side, axis=1)
 
 
-def angles_between(one: Array, other: Array) -> Array:
+def angles_between(first: Array, second: Array) -> Array:
     """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
-    if one.shape[1] != QUATERNION:
-        return np.abs(one - other).sum(axis=1)
-    unit = one / np.linalg.norm(one, axis=1)[:, None]
+    if first.shape[1] != QUATERNION:
+        return np.abs(first - second).sum(axis=1)
+    unit = first / np.linalg.norm(first, axis=1)[:, None]
     apart = np.minimum(
-        np.linalg.norm(unit - other, axis=1), np.linalg.norm(unit + other, axis=1)
+        np.linalg.norm(unit - second, axis=1), np.linalg.norm(unit + second, axis=1)
     )
     return 4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0))
 
@@ -194,11 +194,11 @@ def points_from(
     if orientations is not None:
         turning = _turning(orientations, units, source)
     speeds = None if speed is None else _speeds(speed, units, source)
-    for name, one in (("orientations", turning), ("speed", speeds)):
-        if one is not None and len(one) != len(values):
+    for name, column in (("orientations", turning), ("speed", speeds)):
+        if column is not None and len(column) != len(values):
             raise TaskError(
                 f"the numbers of points and of rows of {name} differ",
-                found=len(one),
+                found=len(column),
                 allowed=len(values),
             )
     rows = np.arange(len(values))
@@ -209,10 +209,10 @@ def points_from(
 def _matrices(points: Any) -> Any:
     """Return the homogeneous matrices of transforms; anything else as it is."""
     if isinstance(points, list | tuple) and points:
-        if all(hasattr(one, "homogeneous") for one in points):
-            return [one.homogeneous for one in points]
+        if all(hasattr(transform, "homogeneous") for transform in points):
+            return [transform.homogeneous for transform in points]
         if hasattr(points[0], "as_matrix"):
-            return [one.as_matrix() for one in points]
+            return [transform.as_matrix() for transform in points]
     return points.as_matrix() if hasattr(points, "as_matrix") else points
 
 
@@ -234,8 +234,12 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     problem = "the orientations have the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"
-    allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
-    raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
+    raise TaskError(
+        problem,
+        found=values.shape,
+        allowed="SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw",
+        where=where,
+    )
 
 
 def _speeds(speed: Any, units: FileUnits, source: str) -> Array:
@@ -273,5 +277,8 @@ def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> 
     """Refuse the first of the rows of which anything is bad."""
     rows = np.flatnonzero(bad.any(axis=tuple(range(1, bad.ndim))))
     if rows.size:
-        found = np.atleast_1d(values)[rows[0]].tolist()
-        raise TaskError(problem, found=found, where=f"{source}: row {rows[0]}")
+        raise TaskError(
+            problem,
+            found=np.atleast_1d(values)[rows[0]].tolist(),
+            where=f"{source}: row {rows[0]}",
+        )

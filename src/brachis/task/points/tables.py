@@ -109,7 +109,7 @@ def read_table(text: str, source: str, allowed: str) -> Table:
     number = next(iter(body))
     first = body.pop(number)
     where = f"{source}: line {number}"
-    delimiter = next((one for one in _DELIMITERS if one in first), ",")
+    delimiter = next((mark for mark in _DELIMITERS if mark in first), ",")
     if delimiter != ",":
         notes.append(f"columns separated by {_DELIMITERS[delimiter]}")
         if any("," in line for line in body.values()):
@@ -247,7 +247,9 @@ def _read_columns(
         name, unit = _heading(text)
         places[name] = (column, unit)
     names = sorted(name for name in places if name != _SPEED)
-    choice = next((one for one in _choices(rows) if sorted(one) == names), None)
+    choice = next(
+        (columns for columns in _choices(rows) if sorted(columns) == names), None
+    )
     if choice is None or len(places) != len(table.header):
         raise TaskError(
             "the columns are wrong",
@@ -283,8 +285,8 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
         )
     if stated is not None and stated not in possible:
         usual = [
-            ", ".join(each)
-            for each, conventions in _ORIENTATIONS.items()
+            ", ".join(column_names)
+            for column_names, conventions in _ORIENTATIONS.items()
             if stated in conventions
         ]
         hint = "Remove csv.orientation"
@@ -301,7 +303,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
 
 
 def _factor_of(
-    name: str, kind: str, unit: str | None, asked: str | None, where: str
+    name: str, kind: str, unit: str | None, task_unit: str | None, where: str
 ) -> float:
     """Return the factor to SI units of a column's unit, which may not differ from the one that the task asks for.
 
@@ -318,16 +320,15 @@ def _factor_of(
             where=where,
             hint=f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task",
         )
-    problem = None
     if unit not in factors:
         problem = f"unknown unit of {kind}"
-        asked = ", ".join(factors)
-    elif asked is not None and factors[asked] != factors[unit]:
+        allowed = ", ".join(factors)
+    elif task_unit is None or factors[task_unit] == factors[unit]:
+        return factors[unit]
+    else:
         problem = "the header contradicts the task's units"
-    if problem:
-        found = f"{unit} for {name}"
-        raise TaskError(problem, found=found, allowed=asked, where=where)
-    return factors[unit]
+        allowed = task_unit
+    raise TaskError(problem, found=f"{unit} for {name}", allowed=allowed, where=where)
 
 
 def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Points:
@@ -359,10 +360,10 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
     def read(names: Sequence[str], kind: str) -> Array:
         """Read columns of one kind of quantity in SI units."""
         chosen = [places[name] for name in names]
-        asked = getattr(settings.units, kind)
-        usual = asked or defaults.get(kind)
+        task_unit = getattr(settings.units, kind)
+        usual = task_unit or defaults.get(kind)
         factors = [
-            _factor_of(name, kind, unit or usual, asked, table.where)
+            _factor_of(name, kind, unit or usual, task_unit, table.where)
             for name, (_, unit) in zip(names, chosen, strict=True)
         ]
         stated = dict.fromkeys(unit for _, unit in chosen if unit is not None)
@@ -371,14 +372,14 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
         return table.values[:, [place for place, _ in chosen]] * np.array(factors)
 
     position = [name for name in names if name in POSITION]
-    others = names[len(position) :]
+    turning_names = names[len(position) :]
     lengths = read(position, "length")
     speed = read([_SPEED], "speed")[:, 0] if _SPEED in places else None
-    has_axis = others == ("i", "j", "k")
+    has_axis = turning_names == ("i", "j", "k")
     if has_axis or (convention and convention.startswith("quaternion")):
-        turning = table.values[:, [places[name][0] for name in others]]
+        turning = table.values[:, [places[name][0] for name in turning_names]]
     else:
-        turning = read(others, "angle")
+        turning = read(turning_names, "angle")
     points = Points(lengths, turning, speed, table.lines, source)
     if convention:
         points = _with_quaternions(points, convention)

@@ -21,7 +21,7 @@ from brachis.verify.limits.joint import JOINT_CHECKS
 from brachis.verify.limits.margins import MARGIN_CHECKS
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.limits.tool import TOOL_CHECKS
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.report import Check
 
 TABLE: dict[str, LimitCheck] = {
@@ -33,12 +33,14 @@ TABLE: dict[str, LimitCheck] = {
 """By kind, in the order of the checks."""
 
 
-def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:
+def check_limits(
+    motion: CheckedMotion, user_limits: Sequence[LimitModel]
+) -> list[Check]:
     """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the user's."""
-    found = [(kind.replace("_", " "), find(given)) for kind, find in TABLE.items()]
-    models = list_models(given.task, user_limits)
-    found += [_check_model(where, model, given) for where, model in models.items()]
-    allowed = 1.0 + given.options.ratio_tolerance
+    results = [(kind.replace("_", " "), find(motion)) for kind, find in TABLE.items()]
+    models = list_models(motion.task, user_limits)
+    results += [_check_model(where, model, motion) for where, model in models.items()]
+    allowed = 1.0 + motion.options.ratio_tolerance
     return [
         Check(
             f"{name} ratio",
@@ -51,30 +53,32 @@ def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]
             of_limit=True,
             is_kept=worst.is_kept,
         )
-        for name, worst in found
+        for name, worst in results
         if worst is not None
     ]
 
 
-def _check_model(where: str, model: LimitModel, given: Given) -> tuple[str, Worst]:
+def _check_model(
+    where: str, model: LimitModel, motion: CheckedMotion
+) -> tuple[str, Worst]:
     """Find the worst ratio to a limit of the user's, and its name.
 
     A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), by a formula other
     than the limit's. Without one, the limit's own values are checked densely.
     """
-    limit = bind_model(where, model, given.robot)
+    limit = bind_model(where, model, motion.robot)
     subjects = [label.subject for label in limit.labels]
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the sizes of the ratios, (K, c)."""
         if not has_check(model):
             return np.abs(limit.ratios(states, states.t))
-        motion = (states.q, states.qdot, states.qddot, states.tau)
-        return check_ratios(where, model, given.robot, motion, len(subjects))
+        arguments = (states.q, states.qdot, states.qddot, states.tau)
+        return check_ratios(where, model, motion.robot, arguments, len(subjects))
 
-    worst = worst_between(given, ratios, subjects)
+    worst = worst_between(motion, ratios, subjects)
     if has_check(model):
         return limit.name, worst
     if limit.guarantee.is_mean:
-        worst = worst._replace(time=given.states.t[-1])
+        worst = worst._replace(time=motion.states.t[-1])
     return limit.name, worst._replace(remark="checked by its own formula")

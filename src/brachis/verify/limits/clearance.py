@@ -15,7 +15,7 @@ import numpy as np
 from brachis.scene import UNIT, Scene, scene_of
 from brachis.verify.limits.protocol import Worst
 from brachis.verify.mechanics import joint_placements
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.motion import CheckedMotion, MotionStates
 
 _LOOK = 0.05
 """Distances up to so much above the clearance are computed, m."""
@@ -29,26 +29,26 @@ _STATES = 2_000
 """States that are looked at in one go."""
 
 
-def worst_clearance(given: Given) -> Worst | None:
+def worst_clearance(motion: CheckedMotion) -> Worst | None:
     """Find the smallest distance between solids, as a ratio: 1 at the clearance, above it where it is less."""
-    wanted = given.task.collisions.clearance
-    scene = scene_of(given.robot, given.task)
+    clearance = motion.task.collisions.clearance
+    scene = scene_of(motion.robot, motion.task)
     if scene is None or not len(scene.pairs):
         return None
-    search = _Search(given, scene, wanted)
+    search = _Search(motion, scene, clearance)
     search.run()
     least = search.least
-    found = f"smallest distance {1e3 * least:.2f} mm"
+    remark = f"smallest distance {1e3 * least:.2f} mm"
     subject = scene.names(search.pair)
-    if least >= wanted + _LOOK:
-        found = f"nothing is closer than {1e3 * least:.0f} mm"
+    if least >= clearance + _LOOK:
+        remark = f"nothing is closer than {1e3 * least:.0f} mm"
         subject = "scene"
-    if search.proven < min(wanted, least) - 2.0 * _ROUNDING:
+    if search.proven < min(clearance, least) - 2.0 * _ROUNDING:
         least = search.proven
-        found = f"search stopped early: {found}, the proven lower bound is {1e3 * least:.2f} mm"
-    ratio = max(1.0 + (wanted - least) / UNIT, 0.0)
-    is_kept = given.task.collision_mode == "avoid"
-    return Worst(ratio, subject, search.time, found, is_kept)
+        remark = f"search stopped early: {remark}, the proven lower bound is {1e3 * least:.2f} mm"
+    ratio = max(1.0 + (clearance - least) / UNIT, 0.0)
+    is_kept = motion.task.collision_mode == "avoid"
+    return Worst(ratio, subject, search.time, remark, is_kept)
 
 
 class _Search:
@@ -62,58 +62,60 @@ class _Search:
         No distance is smaller than this and `least`, but for the gaps that are allowed, m.
     """
 
-    def __init__(self, given: Given, scene: Scene, wanted: float) -> None:
-        self._given = given
+    def __init__(self, motion: CheckedMotion, scene: Scene, clearance: float) -> None:
+        self._motion = motion
         self._scene = scene
-        self._wanted = wanted
-        self._reach = _reaches(given, scene)
-        self._fastest = np.abs(given.pieces.velocity).max(axis=0)[:, : len(self._reach)]
-        self.least = wanted + _LOOK
-        self.time = given.states.t[0]
+        self._clearance = clearance
+        self._reach = _reaches(motion, scene)
+        self._fastest = np.abs(motion.pieces.velocity).max(axis=0)[
+            :, : len(self._reach)
+        ]
+        self.least = clearance + _LOOK
+        self.time = motion.states.t[0]
         self.pair = 0
         self.proven = np.inf
         self._halved = 0
 
     def run(self) -> None:
         """Search the whole motion."""
-        states = self._given.states
+        states = self._motion.states
         for first in range(0, max(len(states.t) - 1, 1), _STATES):
             self._search(states.only(slice(first, first + _STATES + 1)))
 
     def _search(self, states: MotionStates) -> None:
         """Search the states, and between them."""
-        placed = joint_placements(self._given.robot, states.q)
-        far = self._wanted + _LOOK
+        placed = joint_placements(self._motion.robot, states.q)
+        far = self._clearance + _LOOK
         distance = np.maximum(self._scene.bounds(placed), far)
         close = self._scene.find_close(placed, far)
         distance[close.posture, close.pair] = close.distance
         self._record(close.distance, states.t[close.posture], close.pair)
         # Both sides of a node are one instant: nothing moves between them.
-        inside = states.piece[1:] == states.piece[:-1]
+        inside = states.index[1:] == states.index[:-1]
         step = np.where(inside, np.diff(states.u), 0.0)
-        piece = states.piece[:-1]
-        travel = step[:, None] * self._given.pieces.lengths[piece, None]
-        moved = (travel * self._fastest[piece]) @ self._reach
+        piece_of_step = states.index[:-1]
+        travel = step[:, None] * self._motion.pieces.lengths[piece_of_step, None]
+        moved = (travel * self._fastest[piece_of_step]) @ self._reach
         lower = 0.5 * (distance[1:] + distance[:-1] - moved)
         index, pair = np.nonzero(lower < self._goal)
         ends = states.u[index], states.u[index + 1]
         values = distance[index, pair], distance[index + 1, pair]
-        self._halve(piece[index], pair, ends, values)
+        self._halve(piece_of_step[index], pair, ends, values)
 
     def _halve(
         self,
-        piece: np.ndarray,
+        index: np.ndarray,
         pair: np.ndarray,
         ends: tuple[np.ndarray, np.ndarray],
         values: tuple[np.ndarray, np.ndarray],
     ) -> None:
         """Halve steps of pairs, (M,), until enough is known of each."""
-        pieces = self._given.pieces
+        pieces = self._motion.pieces
         u = np.array(ends)
         d = np.array(values)
-        while len(piece):
-            travel = ((u[1] - u[0]) * pieces.lengths[piece])[:, None]
-            moved = travel * self._fastest[piece]
+        while len(index):
+            travel = ((u[1] - u[0]) * pieces.lengths[index])[:, None]
+            moved = travel * self._fastest[index]
             approach = np.einsum("mj,jm->m", moved, self._reach[:, pair])
             lower = 0.5 * (d.sum(axis=0) - approach)
             is_open = lower < self._goal
@@ -121,24 +123,24 @@ class _Search:
             if self._halved > _MOST:
                 self.proven = min(self.proven, lower.min())
                 return
-            piece = piece[is_open]
+            index = index[is_open]
             pair = pair[is_open]
             u = u[:, is_open]
             d = d[:, is_open]
             middle = 0.5 * (u[0] + u[1])
-            states = pieces.positions(piece, middle)
-            placed = joint_placements(self._given.robot, states)
-            found = self._scene.measure(placed, np.arange(len(piece)), pair).distance
-            self._record(found, pieces.time(piece, middle), pair)
+            states = pieces.positions(index, middle)
+            placed = joint_placements(self._motion.robot, states)
+            distance = self._scene.measure(placed, np.arange(len(index)), pair).distance
+            self._record(distance, pieces.time(index, middle), pair)
             u = np.hstack([[u[0], middle], [middle, u[1]]])
-            d = np.hstack([[d[0], found], [found, d[1]]])
-            piece = np.tile(piece, 2)
+            d = np.hstack([[d[0], distance], [distance, d[1]]])
+            index = np.tile(index, 2)
             pair = np.tile(pair, 2)
 
     @property
     def _goal(self) -> float:
         """What has to be proven of a step, m."""
-        near = min(self.least, self._wanted) - _ROUNDING
+        near = min(self.least, self._clearance) - _ROUNDING
         return max(near, self.least - _FINE)
 
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
@@ -150,13 +152,13 @@ class _Search:
             self.pair = int(pair[best])
 
 
-def _reaches(given: Given, scene: Scene) -> np.ndarray:
+def _reaches(motion: CheckedMotion, scene: Scene) -> np.ndarray:
     """Distances that points of pairs can have from the axes of the joints between them, (n, P), m; 1 where they slide.
 
     Joints that move both solids of a pair, or none, have no part in it.
     """
-    bodies = given.robot.urdf_dynamics.bodies
-    farthest = np.abs(given.pieces.nodes + given.pieces.position).max(axis=(0, 1))
+    bodies = motion.robot.urdf_dynamics.bodies
+    farthest = np.abs(motion.pieces.nodes + motion.pieces.position).max(axis=(0, 1))
     slides = [farthest[j] if body.sliding else 0.0 for j, body in enumerate(bodies)]
     lengths = [np.linalg.norm(body.placement[:3, 3]) for body in bodies]
     along = np.cumsum(np.array(lengths) + slides)

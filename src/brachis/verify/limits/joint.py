@@ -19,57 +19,61 @@ from brachis.verify.limits.protocol import (
     worst_size,
 )
 from brachis.verify.mechanics import torque_rates
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.report import POSITION_SCALE
 
 
-def _worst_derivative(kind: str, given: Given) -> Worst | None:
+def _worst_derivative(kind: str, motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of a derivative of the positions, anywhere; the kind names it in `Pieces`."""
-    lower, upper = given.robot.limits.both_ways(kind)
+    lower, upper = motion.robot.limits.both_ways(kind)
     if not np.isfinite(upper).any():
         return None
-    rates = getattr(given.pieces, kind)
-    return largest(given, lambda part: (rates[:, part] / upper, rates[:, part] / lower))
+    rates = getattr(motion.pieces, kind)
+    return largest(
+        motion, lambda index: (rates[:, index] / upper, rates[:, index] / lower)
+    )
 
 
-def _worst_position(given: Given) -> Worst | None:
+def _worst_position(motion: CheckedMotion) -> Worst | None:
     """Find the position that is nearest to an end of its range, or furthest beyond, anywhere.
 
     Inside, the ratio is the place in the range: 0 in its middle, 1 at its ends. Of a range with one end it is
     1 minus the distance from it, rad or m, and 0 farther away. Beyond an end, a ratio of 2 is half the range away, but
     from 1e-5 to 1 rad or m.
     """
-    lower, upper = given.robot.limits.both_ways("position")
+    lower, upper = motion.robot.limits.both_ways("position")
     if np.isinf(lower).all() and np.isinf(upper).all():
         return None
     half = 0.5 * upper - 0.5 * lower
-    beyond = _worst_in_range(given, np.clip(half, 1e-5, 1.0))
+    beyond = _worst_in_range(motion, np.clip(half, 1e-5, 1.0))
     if beyond.ratio > 1.0:
         return beyond
     scale = np.where(np.isfinite(half), np.maximum(half, 1e-5), 1.0)
-    inside = _worst_in_range(given, scale)
+    inside = _worst_in_range(motion, scale)
     return inside._replace(ratio=max(inside.ratio, 0.0), remark=POSITION_SCALE)
 
 
-def _worst_in_range(given: Given, scale: np.ndarray) -> Worst:
+def _worst_in_range(motion: CheckedMotion, scale: np.ndarray) -> Worst:
     """Find the largest ratio, where a distance of `scale`, (n,), from an end changes it by 1."""
-    lower, upper = given.robot.limits.both_ways("position")
-    pieces = given.pieces
+    lower, upper = motion.robot.limits.both_ways("position")
+    pieces = motion.pieces
 
-    def ratios(part: slice) -> tuple[np.ndarray, np.ndarray]:
+    def ratios(index: slice) -> tuple[np.ndarray, np.ndarray]:
         """Return the ratios to the upper and to the lower ends."""
-        positions = pieces.nodes[part] + pieces.position[:, part]
+        positions = pieces.nodes[index] + pieces.position[:, index]
         above = 1.0 + (positions - upper) / scale
         return above, 1.0 + (lower - positions) / scale
 
-    return largest(given, ratios)
+    return largest(motion, ratios)
 
 
 def _worst_quantity(
-    kind: str, quantity: Callable[[Robot, MotionStates], np.ndarray], given: Given
+    kind: str,
+    quantity: Callable[[Robot, MotionStates], np.ndarray],
+    motion: CheckedMotion,
 ) -> Worst | None:
     """Find the largest ratio of a quantity of the joints, (K, n), at the states and between them."""
-    robot = given.robot
+    robot = motion.robot
     lower, upper = robot.limits.both_ways(kind)
     if not np.isfinite(upper).any():
         return None
@@ -79,43 +83,43 @@ def _worst_quantity(
         values = quantity(robot, states)
         return np.maximum(values / upper, values / lower)
 
-    return worst_between(given, ratios, robot.joint_names)
+    return worst_between(motion, ratios, robot.joint_names)
 
 
-def _worst_rms_torque(given: Given) -> Worst | None:
+def _worst_rms_torque(motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of a root mean square of torques, by Simpson's rule between all states of each piece."""
-    limit = given.robot.limits.rms_torque
-    states = given.states
+    limit = motion.robot.limits.rms_torque
+    states = motion.states
     if not np.isfinite(limit).any():
         return None
-    steps = np.flatnonzero((np.diff(states.piece) == 0) & (np.diff(states.u) > 1e-8))
+    steps = np.flatnonzero((np.diff(states.index) == 0) & (np.diff(states.u) > 1e-8))
     middle = 0.5 * (states.u[steps] + states.u[steps + 1])
-    between = MotionStates.at(given.pieces, states.piece[steps], middle)
+    between = MotionStates.at(motion.pieces, states.index[steps], middle)
     lengths = states.t[steps + 1] - states.t[steps]
     ends = states.tau[steps] ** 2 + states.tau[steps + 1] ** 2
     mean = lengths @ ((ends + 4.0 * between.tau**2) / 6.0) / lengths.sum()
     ratios = np.sqrt(mean) / limit
     joint = np.argmax(ratios)
-    name = given.robot.joint_names[joint]
+    name = motion.robot.joint_names[joint]
     return Worst(ratios[joint], name, states.t[-1])
 
 
-def _worst_total_power(given: Given) -> Worst | None:
+def _worst_total_power(motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of the sum of all joints' powers."""
 
     def powers(states: MotionStates) -> np.ndarray:
         """Return the sizes of the total power, (K,)."""
         return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))
 
-    return worst_size(given, given.robot.limits.total_power, powers, "all joints")
+    return worst_size(motion, motion.robot.limits.total_power, powers, "all joints")
 
 
-def _worst_torque_at_speed(given: Given) -> Worst | None:
+def _worst_torque_at_speed(motion: CheckedMotion) -> Worst | None:
     """Find the torque that is furthest beyond what its joint's curve allows at its speed.
 
     The ratio is 1 on the curve; differences count as parts of the torque at rest.
     """
-    robot = given.robot
+    robot = motion.robot
     curves = robot.limits.torque_speed
     joints = [joint for joint, curve in enumerate(curves) if curve]
     if not joints:
@@ -133,7 +137,7 @@ def _worst_torque_at_speed(given: Given) -> Worst | None:
             columns.append(1.0 + (np.abs(states.tau[:, joint]) - limit) / torque[0])
         return np.column_stack(columns)
 
-    return worst_between(given, ratios, [robot.joint_names[joint] for joint in joints])
+    return worst_between(motion, ratios, [robot.joint_names[joint] for joint in joints])
 
 
 JOINT_CHECKS: dict[str, LimitCheck] = {

@@ -12,87 +12,87 @@ from brachis.common.arrays import cross
 from brachis.robot.task_map import JointSpace
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.report import Margin
 
 
-def find_margins(given: Given, states: MotionStates) -> tuple[Margin, ...]:
+def find_margins(motion: CheckedMotion, states: MotionStates) -> tuple[Margin, ...]:
     """Find the smallest singular value of the arm's Jacobian, and the smallest distance from the end of a range."""
     margins: list[Margin] = []
     if not np.isfinite(states.q).all():
         return ()
-    if not isinstance(given.task_map, JointSpace):
-        singular = _singular_values(given, states)
+    if not isinstance(motion.task_map, JointSpace):
+        singular = _singular_values(motion, states)
         k = np.argmin(singular)
         time = float(states.t[k])
         name = "smallest singular value"
         margins.append(Margin(name, float(singular[k]), "-", "arm", time))
-    used, names = _parts_of_ranges(given, states)
+    used, names = _parts_of_ranges(motion, states)
     if names:
         place, joint = np.unravel_index(np.argmax(used), used.shape)
-        left = 50.0 * (1.0 - float(used[place, joint]))
+        distance = 50.0 * (1.0 - float(used[place, joint]))
         time = float(states.t[place])
         name = "smallest distance from the end of a range"
-        margins.append(Margin(name, left, "%", names[joint], time))
+        margins.append(Margin(name, distance, "%", names[joint], time))
     return tuple(margins)
 
 
-def _singular_values(given: Given, states: MotionStates) -> np.ndarray:
+def _singular_values(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
     """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints.
 
     They are the roots of the least eigenvalues of J J^T, right to 1e-8 of the largest one.
     """
     rotations, origins = states.joints
-    tool = tool_placements(given.robot, states.q, states.joints)[0].T
+    tool = tool_placements(motion.robot, states.q, states.joints)[0].T
     columns = []
-    for number, body in enumerate(given.robot.urdf_dynamics.bodies, 1):
+    for number, body in enumerate(motion.robot.urdf_dynamics.bodies, 1):
         axis = (rotations[:, number] @ body.axis).T
         arm = cross(axis, tool - origins[:, number].T)
         columns.append((axis, 0.0 * axis) if body.sliding else (arm, axis))
     every = np.array(columns).reshape(len(columns), 6, -1).T
-    jacobian = every[:, given.task_map.prescribed.parts]
+    jacobian = every[:, motion.task_map.prescribed.parts]
     squares = np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(1, 2))[:, 0]
     return np.sqrt(squares.clip(min=0.0))
 
 
 def _parts_of_ranges(
-    given: Given, states: MotionStates
+    motion: CheckedMotion, states: MotionStates
 ) -> tuple[np.ndarray, list[str]]:
     """Distances from the middle of joint ranges, (K, c), 1 at their ends, and the names of these joints."""
-    count = len(given.robot.urdf_joints)
-    ends = given.robot.limits.both_ways("position")[:, :count]
+    count = len(motion.robot.urdf_joints)
+    ends = motion.robot.limits.both_ways("position")[:, :count]
     joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
     lower, upper = ends[:, joints]
     away = np.abs(states.q.take(joints, axis=1) - 0.5 * (lower + upper))
-    names = [given.robot.joint_names[joint] for joint in joints]
+    names = [motion.robot.joint_names[joint] for joint in joints]
     return away / (0.5 * (upper - lower)), names
 
 
-def _worst_singularity(given: Given) -> Worst | None:
+def _worst_singularity(motion: CheckedMotion) -> Worst | None:
     """Find the largest of 2 - value / wanted: 1 at the margin, 2 in a singular posture."""
-    wanted = given.task.margins.singularity
-    if wanted is None:
+    margin = motion.task.margins.singularity
+    if margin is None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return 2 - value / wanted, (K, 1)."""
-        return 2.0 - _singular_values(given, states)[:, None] / wanted
+        return 2.0 - _singular_values(motion, states)[:, None] / margin
 
-    return worst_between(given, ratios, ("arm",))
+    return worst_between(motion, ratios, ("arm",))
 
 
-def _worst_joint_end(given: Given) -> Worst | None:
+def _worst_joint_end(motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of how far a joint is from the middle of its range to what is wanted."""
-    share = given.task.margins.joint_ends
-    _, names = _parts_of_ranges(given, given.states.only([0]))
+    share = motion.task.margins.joint_ends
+    _, names = _parts_of_ranges(motion, motion.states.only([0]))
     if share is None or not names:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the distances from the middles over what is wanted, (K, c)."""
-        return _parts_of_ranges(given, states)[0] / (1.0 - 2.0 * share)
+        return _parts_of_ranges(motion, states)[0] / (1.0 - 2.0 * share)
 
-    return worst_between(given, ratios, names)
+    return worst_between(motion, ratios, names)
 
 
 MARGIN_CHECKS: dict[str, LimitCheck] = {

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brachis.verify.motion import Given, MotionStates, turns
+from brachis.verify.motion import CheckedMotion, MotionStates, turns
 
 _AT_ONCE = 5000
 """Steps that are looked at together: they stay in the processor's cache."""
@@ -36,12 +36,12 @@ class Worst(NamedTuple):
     is_kept: bool = True
 
 
-LimitCheck = Callable[[Given], Worst | None]
+LimitCheck = Callable[[CheckedMotion], Worst | None]
 """Finds the worst ratio to a kind of limit; None without such a limit."""
 
 
 def worst_between(
-    given: Given,
+    motion: CheckedMotion,
     ratio_at: Callable[[MotionStates], np.ndarray],
     subjects: Sequence[str],
     states: MotionStates | None = None,
@@ -54,7 +54,7 @@ def worst_between(
 
     Parameters
     ----------
-    given : Given
+    motion : CheckedMotion
     ratio_at : callable
         ``ratio_at(states)`` returns the ratios, (K, c).
     subjects : sequence of str
@@ -67,21 +67,21 @@ def worst_between(
     Worst
         If 100,000 more states are not enough, it is the largest ratio that is possible, with a remark.
     """
-    states = given.states if states is None else states
+    states = motion.states if states is None else states
     most_states = len(states.t) + 100_000
-    ratio = np.concatenate([ratio_at(part) for part in states.split()])
+    ratio = np.concatenate([ratio_at(chunk) for chunk in states.split()])
     for _ in range(40):
-        steps, most = _may_hold_more(states, given.pieces.lengths, ratio)
+        steps, bounds = _may_hold_more(states, motion.pieces.lengths, ratio)
         if not len(steps):
             break
         if len(states.t) + len(steps) > most_states:
-            k = int(np.argmax(most))
+            k = int(np.argmax(bounds))
             column = int(np.argmax(ratio[steps[k]]))
             remark = f"not searched to the end: {ratio.max():.6g} was found, and more than this is not possible"
             time = states.t[steps[k]]
-            return Worst(most[k], subjects[column], time, remark)
+            return Worst(bounds[k], subjects[column], time, remark)
         middle = 0.5 * (states.u[steps] + states.u[steps + 1])
-        new = MotionStates.at(given.pieces, states.piece[steps], middle)
+        new = MotionStates.at(motion.pieces, states.index[steps], middle)
         states, order = states.merge(new)
         ratio = np.concatenate([ratio, ratio_at(new)])[order]
     k, column = map(int, np.unravel_index(np.argmax(ratio), ratio.shape))
@@ -89,7 +89,7 @@ def worst_between(
 
 
 def worst_size(
-    given: Given,
+    motion: CheckedMotion,
     largest: float | None,
     sizes: Callable[[MotionStates], np.ndarray],
     subject: str = "tool",
@@ -102,7 +102,7 @@ def worst_size(
         """Return the sizes over the largest one, (K, 1)."""
         return sizes(states)[:, None] / largest
 
-    return worst_between(given, ratios, (subject,))
+    return worst_between(motion, ratios, (subject,))
 
 
 def _may_hold_more(
@@ -110,26 +110,26 @@ def _may_hold_more(
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
     highest = ratio.max()
-    found = []
+    candidates = []
     for begin in range(0, len(ratio), _AT_ONCE):
         # The bend at an end of a step takes the step beside it.
         first = max(begin - 1, 0)
         rows = slice(first, begin + _AT_ONCE + 2)
-        step, most = _open_steps(states.only(rows), lengths, ratio[rows], highest)
+        step, bounds = _open_steps(states.only(rows), lengths, ratio[rows], highest)
         number = first + step
-        is_own = (number >= begin) & (number < begin + _AT_ONCE)
-        found.append((number[is_own], most[is_own]))
-    steps, most = (np.concatenate(part) for part in zip(*found, strict=True))
-    return steps, most
+        is_in_chunk = (number >= begin) & (number < begin + _AT_ONCE)
+        candidates.append((number[is_in_chunk], bounds[is_in_chunk]))
+    steps, bounds = (np.concatenate(arrays) for arrays in zip(*candidates, strict=True))
+    return steps, bounds
 
 
 def _open_steps(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray, highest: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the steps within which a ratio above the highest one that is known may lie; see `_may_hold_more`."""
-    inside = states.piece[1:] == states.piece[:-1]
-    part = np.where(inside, np.diff(states.u), 1.0)
-    length = (part * lengths[states.piece[:-1]])[:, None]
+    inside = states.index[1:] == states.index[:-1]
+    width = np.where(inside, np.diff(states.u), 1.0)
+    length = (width * lengths[states.index[:-1]])[:, None]
     slope = np.diff(ratio, axis=0) / length
     bend = np.zeros_like(ratio)
     both = (inside[1:] & inside[:-1])[:, None]
@@ -138,15 +138,15 @@ def _open_steps(
     bend = 4.0 * np.maximum(bend[1:], bend[:-1])
     climb = np.maximum(bend * length - np.abs(slope), 0.0)
     rise = climb**2 / np.maximum(4.0 * bend, np.finfo(float).tiny)
-    most = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
+    bounds = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
     # Steps of a millionth of a piece are not halved, nor searched for an excess of 5e-6.
-    open_steps = inside & (part > 1e-6) & (most > highest + 5e-6)
+    open_steps = inside & (width > 1e-6) & (bounds > highest + 5e-6)
     steps = np.flatnonzero(open_steps)
-    return steps, most[steps]
+    return steps, bounds[steps]
 
 
 def largest(
-    given: Given, ratios: Callable[[slice], tuple[np.ndarray, np.ndarray]]
+    motion: CheckedMotion, ratios: Callable[[slice], tuple[np.ndarray, np.ndarray]]
 ) -> Worst:
     """Find the largest value of polynomials in Bernstein form, two for every piece and joint.
 
@@ -154,13 +154,13 @@ def largest(
 
     Parameters
     ----------
-    given : Given
+    motion : CheckedMotion
     ratios : callable
-        ``ratios(part)`` returns the coefficients of both in some pieces, (m + 1, l, n) each.
+        ``ratios(index)`` returns the coefficients of both in some pieces, (m + 1, l, n) each.
     """
-    found: list[tuple[float, int, float, int]] = []
+    peaks: list[tuple[float, int, float, int]] = []
     highest = -np.inf
-    count = len(given.pieces.lengths)
+    count = len(motion.pieces.lengths)
     for begin in range(0, count, _AT_ONCE):
         coefficients = np.stack(ratios(slice(begin, begin + _AT_ONCE)), axis=1)
         _, _, pieces, joints = coefficients.shape
@@ -177,7 +177,7 @@ def largest(
             value = float(values[k])
             column = int(higher[turning[k]])
             u = float(at[k])
-        found.append((value, begin + column // joints % pieces, u, column % joints))
-    value, piece, u, joint = found[int(np.argmax([row[0] for row in found]))]
-    time = given.pieces.time(np.array([piece]), np.array([u]))[0]
-    return Worst(value, given.robot.joint_names[joint], time)
+        peaks.append((value, begin + column // joints % pieces, u, column % joints))
+    value, index, u, joint = peaks[int(np.argmax([row[0] for row in peaks]))]
+    time = motion.pieces.time(np.array([index]), np.array([u]))[0]
+    return Worst(value, motion.robot.joint_names[joint], time)

@@ -20,7 +20,7 @@ from brachis.verify.mechanics import (
     real_tool_placements,
     tool_accelerations,
 )
-from brachis.verify.motion import Given, MotionStates, list_speed_tables
+from brachis.verify.motion import CheckedMotion, MotionStates, list_speed_tables
 
 _ANGLES = ("lead", "side", "roll")
 _SAME_S = 1e-12
@@ -37,20 +37,20 @@ def tool_sizes(robot: Robot, states: MotionStates, quantity: str) -> np.ndarray:
     return np.linalg.norm(vectors, axis=0)
 
 
-def _worst_motion(quantity: str, given: Given) -> Worst | None:
+def _worst_motion(quantity: str, motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio to one of the task's tool limits, at the states and between them."""
-    largest = getattr(given.task.tool_limits, quantity)
+    largest = getattr(motion.task.tool_limits, quantity)
     return worst_size(
-        given, largest, lambda states: tool_sizes(given.robot, states, quantity)
+        motion, largest, lambda states: tool_sizes(motion.robot, states, quantity)
     )
 
 
-def _worst_speed(given: Given) -> Worst | None:
+def _worst_speed(motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of the tool's speed, at the states and between them."""
-    limits = given.task.tool_limits
-    tables = list_speed_tables(given.task)
+    limits = motion.task.tool_limits
+    tables = list_speed_tables(motion.task)
     if not tables:
-        return _worst_motion("speed", given)
+        return _worst_motion("speed", motion)
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the speeds over the lowest limit at each s, (K,)."""
@@ -66,55 +66,65 @@ def _worst_speed(given: Given) -> Worst | None:
             within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
             holds = within | (table is limits.speed)
             limit = np.minimum(limit, np.where(holds, np.minimum(*sides), np.inf))
-        return tool_sizes(given.robot, states, "speed") / limit
+        return tool_sizes(motion.robot, states, "speed") / limit
 
-    return worst_size(given, 1.0, ratios)
+    return worst_size(motion, 1.0, ratios)
 
 
-def _worst_deviation(name: str, given: Given) -> Worst | None:
+def _worst_deviation(name: str, motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of a tilt, or of a distance from the path, to the largest that is allowed."""
-    tolerances = given.task.tolerances
+    tolerances = motion.task.tolerances
     is_tilt = name == "tilt"
     largest = tolerances.orientation.tilt if is_tilt else tolerances.position.sphere
-    return worst_size(given, largest, lambda states: _deviations(given, states)[name])
+    return worst_size(motion, largest, lambda states: _deviations(motion, states)[name])
 
 
-def _worst_range(given: Given) -> Worst | None:
+def _worst_range(motion: CheckedMotion) -> Worst | None:
     """Find the largest part of a range that the tool uses; None without ranges."""
-    tolerances = given.task.tolerances
-    angles = {way: getattr(tolerances.orientation, way) for way in _ANGLES}
-    lengths = {way: getattr(tolerances.position, way) for way in "xyz"}
+    tolerances = motion.task.tolerances
+    angles = {
+        direction: getattr(tolerances.orientation, direction) for direction in _ANGLES
+    }
+    lengths = {
+        direction: getattr(tolerances.position, direction) for direction in "xyz"
+    }
     every = angles | lengths
-    ranges = {way: ends for way, ends in every.items() if ends not in (None, "free")}
+    ranges = {
+        direction: ends
+        for direction, ends in every.items()
+        if ends not in (None, "free")
+    }
     if not ranges:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the used parts of the ranges, (K, c)."""
-        found = _deviations(given, states)
+        used = _deviations(motion, states)
         columns = []
-        for way, (low, high) in ranges.items():
-            away = found[way] - 0.5 * (low + high)
-            if way in _ANGLES:
+        for direction, (low, high) in ranges.items():
+            away = used[direction] - 0.5 * (low + high)
+            if direction in _ANGLES:
                 away = np.remainder(away + 180.0, 360.0) - 180.0
             columns.append(np.abs(away) / (0.5 * (high - low)))
         return np.stack(columns, axis=1)
 
-    return worst_between(given, ratios, [f"tool {way}" for way in ranges])
+    return worst_between(motion, ratios, [f"tool {direction}" for direction in ranges])
 
 
-def _deviations(given: Given, states: MotionStates) -> dict[str, np.ndarray]:
+def _deviations(motion: CheckedMotion, states: MotionStates) -> dict[str, np.ndarray]:
     """Angles, degrees, and displacements, m, by which the tool is not where the path wants it, (K,) each."""
-    joints = joint_placements(given.robot, states.q)
-    origin, rotation = real_tool_placements(given.robot, *joints)
-    target = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
+    joints = joint_placements(motion.robot, states.q)
+    origin, rotation = real_tool_placements(motion.robot, *joints)
+    target = motion.path.sample(np.clip(states.s, 0.0, 1.0)).target
     shift = np.zeros_like(origin)
-    axes = list(given.task_map.axes)
+    axes = list(motion.task_map.axes)
     shift[:, axes] = origin[:, axes] - target[:, : len(axes)]
-    wanted = target[:, -9:].reshape(-1, 3, 3) if given.task.of_poses else rotation
-    back = np.swapaxes(wanted, 1, 2)
+    target_rotation = (
+        target[:, -9:].reshape(-1, 3, 3) if motion.task.of_poses else rotation
+    )
+    back = np.swapaxes(target_rotation, 1, 2)
     turned = back @ rotation
-    if given.task.tolerances.position.axes == "tool":
+    if motion.task.tolerances.position.axes == "tool":
         shift = apply_each(back, shift)
     x, y, z = turned[:, :, 2].T
     radians = {
@@ -123,9 +133,9 @@ def _deviations(given: Given, states: MotionStates) -> dict[str, np.ndarray]:
         "side": np.arctan2(y, z),
         "roll": np.arctan2(-turned[:, 0, 1], turned[:, 0, 0]),
     }
-    found = {way: np.degrees(angle) for way, angle in radians.items()}
-    found |= zip("xyz", shift.T, strict=True)
-    return {**found, "distance": np.linalg.norm(shift, axis=1)}
+    deviations = {direction: np.degrees(angle) for direction, angle in radians.items()}
+    deviations |= zip("xyz", shift.T, strict=True)
+    return {**deviations, "distance": np.linalg.norm(shift, axis=1)}
 
 
 TOOL_CHECKS: dict[str, LimitCheck] = {
