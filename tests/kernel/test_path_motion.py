@@ -40,7 +40,7 @@ def motion_in(chain, asked, q, path, tables, curves):
     given = dict(zip(("xi", "xi_ds", "xi_dds"), path, strict=True))
     given |= dict(zip(("ydot", "yddot"), curves, strict=True))
     given["y"] = np.zeros_like(curves[0])
-    given |= dict(zip(("rows", "turning"), tables, strict=False))
+    given |= dict(zip(("rows", "row_derivatives"), tables, strict=False))
     motion = PathMotion.prepare(chain, asked, given)
     motion.q[:] = q
     motion.evaluate()
@@ -228,7 +228,7 @@ def test_what_is_not_finite_is_no_posture():
 def test_conditions_of_other_shapes_are_refused():
     chain = chain_of(*random_model(3, 1))
     ones = np.ones((1, 2))
-    given = {"y": ones, "rows": np.zeros((1, 1, 4)), "turning": np.zeros((2, 1, 1, 4))}
+    given = {"y": ones, "rows": np.zeros((1, 1, 4)), "row_derivatives": np.zeros((2, 1, 1, 4))}
     with pytest.raises(ValueError, match="needed"):
         PathMotion.prepare(chain, Prescribed((0, 1)), given)
 

@@ -227,7 +227,7 @@ class _Formula(ctypes.Structure):
     """`formula` of motion.h."""
 
     _fields_ = declare_fields(
-        "l first_count second_count constants; p constant; l steps; p step_of; l outputs; p wanted; l together"
+        "l first_count second_count constant_count; p constants; l step_count; p steps; l output_count; p outputs; l row_length"
     )
 
 

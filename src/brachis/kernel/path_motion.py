@@ -34,7 +34,7 @@ _GIVEN = {
     "xi_ds": "Km",
     "xi_dds": "Km",
     "rows": "Krw",
-    "turning": "3Krw",
+    "row_derivatives": "3Krw",
     "reference": "Kg",
     "t": "K",
     "near": "Kn",
@@ -73,7 +73,7 @@ class _PathMotion(ctypes.Structure):
     """`path_motion` of motion.h."""
 
     _fields_ = declare_fields(
-        f"p arm asked by; l count rows_step; d side;p {' '.join((*_GIVEN, *_FOUND))}"
+        f"p arm task branch; l count rows_step; d side;p {' '.join((*_GIVEN, *_FOUND))}"
     )
 
 
@@ -111,7 +111,7 @@ class PathMotion(Structured):
         The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) where all points share them.
         For a closed form or a chart ``targets``, (K, coordinates), and in a chart its ``reference``, (K, n + r + n
         r): posture, sigma and dq/dsigma. For `evaluate` ``ydot`` and ``yddot``, and the path's ``xi``, ``xi_ds`` and
-        ``xi_dds``, (K, m). Where rows change along the path, three derivatives of them, ``turning``, (3, K, r, n +
+        ``xi_dds``, (K, m). Where rows change along the path, three derivatives of them, ``row_derivatives``, (3, K, r, n +
         1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known to be so.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.

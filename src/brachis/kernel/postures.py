@@ -15,7 +15,7 @@ class _Branch(ctypes.Structure):
     """`branch` of motion.h."""
 
     _fields_ = declare_fields(
-        "p answers_of; l alternatives; p redundant others turns ranged start"
+        "p answers_of; l alternatives; p redundant nonredundant turns ranged start"
     )
 
 

@@ -204,6 +204,6 @@ class Basis:
         # Shapes are known here, and this is called most often.
         values = np.empty((orders, count, curves))
         points = as_contiguous(control_points, (curves, many))
-        arrays = (self._values, self._first, points, values)
-        call("brachis_curves", orders, count, width, curves, many, *arrays)
+        basis = (orders, count, width, self._values, self._first)
+        call("brachis_curves", *basis, curves, many, points, values)
         return values

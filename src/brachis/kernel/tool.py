@@ -25,10 +25,10 @@ def tool_derivatives(
     tuple of (6, K, n) ndarray
         dV/dq, da/dq and da/dqdot.
     """
-    velocity_q, acceleration_q, acceleration_qdot = compute(
+    V_q, a_q, a_qdot = compute(
         "brachis_tool_derivatives", twists, qdot, qddot, in_tool_axes
     )
-    return velocity_q, acceleration_q, acceleration_qdot
+    return V_q, a_q, a_qdot
 
 
 def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
