@@ -55,7 +55,7 @@ FUNCTIONS = {
     "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
     "brachis_spline_orders": "- o K {g L c [k] [Lc]} [K] d >[oKc]",
     "brachis_bernstein": "- K w L n [wLn] l[K] [K] >[Kn]",
-    "brachis_curves": "- {l l l p p} l l p p",
+    "brachis_curves": "- p l l p p",
     "brachis_formula": "- p l p l p l p",
 }
 """What functions return and take: pointer, long, double, int, or nothing.
@@ -93,7 +93,9 @@ def _lay_out_structure(name: str) -> tuple[slice, struct.Struct]:
     return fields, struct.Struct(layout)
 
 
-_STRUCTURES = {name: _lay_out_structure(name) for name in FUNCTIONS if "{" in FUNCTIONS[name]}
+_STRUCTURES = {
+    name: _lay_out_structure(name) for name in FUNCTIONS if "{" in FUNCTIONS[name]
+}
 
 
 def declare_fields(declaration: str) -> list[tuple[str, Any]]:
@@ -173,8 +175,8 @@ def call(name: str, *arguments: Any) -> Any:
     return getattr(load(), name)(*plain)
 
 
-def compute(name: str, *arguments: Any, **sizes: int) -> Any:
-    """Call a function of the library with arrays of the shapes that are declared, and make room for what it writes.
+def call_checked(name: str, *arguments: Any, **sizes: int) -> Any:
+    """Call a function of the library after a check of the shapes of arrays, and make room for what it writes.
 
     Parameters
     ----------
@@ -195,11 +197,13 @@ def compute(name: str, *arguments: Any, **sizes: int) -> Any:
         See `as_contiguous`.
     """
     shapes = tuple([getattr(value, "shape", None) for value in arguments])
-    found = _find_shapes(name, shapes, tuple(sizes.items()))
-    pairs = zip(arguments, found.taken, strict=True)
-    taken = iter([as_contiguous(value, *own) if own else value for value, own in pairs])
-    written = [np.empty(shape) for shape in found.written]
-    values = [next(taken) if size is None else size for size in found.sizes]
+    call_shapes = _resolve_shapes(name, shapes, tuple(sizes.items()))
+    pairs = zip(arguments, call_shapes.taken, strict=True)
+    taken = iter(
+        [as_contiguous(value, *form) if form else value for value, form in pairs]
+    )
+    written = [np.empty(shape) for shape in call_shapes.written]
+    values = [next(taken) if size is None else size for size in call_shapes.sizes]
     returned = call(name, *values, *written)
     results = written if FUNCTIONS[name][0] == "-" else [returned, *written]
     return results[0] if len(results) == 1 else results
@@ -224,12 +228,12 @@ class _CallShapes(NamedTuple):
 
 
 @lru_cache(maxsize=4096)
-def _find_shapes(
+def _resolve_shapes(
     name: str,
     shapes: tuple[tuple[int, ...] | None, ...],
     sizes: tuple[tuple[str, int], ...],
 ) -> _CallShapes:
-    """Find what the shapes of arguments say of a function's sizes and of what it writes."""
+    """Derive a function's sizes, and the shapes of what it writes, from the shapes of its arguments."""
     known = _DIGITS | dict(sizes)
     words = _ARGUMENTS[name]
     inputs = [word for word in words if word[0] in ("", *_KINDS)]
@@ -252,7 +256,9 @@ def _find_shapes(
 
 def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
     """Return the shape that letters and digits stand for."""
-    return tuple(sizes[own] if own in sizes else int(own) for own in letters)
+    return tuple(
+        sizes[letter] if letter in sizes else int(letter) for letter in letters
+    )
 
 
 class Structured:
@@ -267,11 +273,11 @@ class Structured:
     @property
     def structure(self) -> Any:
         """What the library reads."""
-        kept = vars(self)
-        if "_structure" not in kept:
+        attributes = vars(self)
+        if "_structure" not in attributes:
             # Threads that ask together get the same one.
-            kept.setdefault("_structure", self._make_structure())
-        return kept["_structure"]
+            attributes.setdefault("_structure", self._make_structure())
+        return attributes["_structure"]
 
     @property
     def address(self) -> int:
@@ -300,10 +306,10 @@ def as_contiguous(
             return values
     elif np.iscomplexobj(values):
         raise TypeError("an array is complex; needed: real numbers")
-    found = np.ascontiguousarray(values, dtype=dtype)
-    if found.shape != shape:
-        raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")
-    return found
+    array = np.ascontiguousarray(values, dtype=dtype)
+    if array.shape != shape:
+        raise ValueError(f"an array has the shape {array.shape}; needed: {shape}")
+    return array
 
 
 def as_doubles_at_points(

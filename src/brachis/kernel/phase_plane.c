@@ -42,10 +42,10 @@ void brachis_bounds_of_pairs(
     }
 }
 
-/* Steps between P stations: the next x is `factor x + least` to `factor x + most` by each row, (P - 1, c). */
+/* Steps between P stations: the next x is `factor x + lower` to `factor x + upper` by each row, (P - 1, c). */
 typedef struct {
     long stations, rows;
-    const double *factor, *least, *most;
+    const double *factor, *lower, *upper;
 } steps;
 
 /* Intervals of x, (P), from which the end can be reached with x = `last`, where x is `floor` to `ceiling`. Returns 0 if an
@@ -63,13 +63,13 @@ int brachis_go_backwards(
         double from = floor[k];
         double to = ceiling[k];
         const double *factor = steps->factor + k * rows;
-        const double *least = steps->least + k * rows;
-        const double *most = steps->most + k * rows;
+        const double *lower = steps->lower + k * rows;
+        const double *upper = steps->upper + k * rows;
         for (long i = 0; i < rows; i++) {
             /* Where the next x does not rise with this one a row is left out. */
             if (factor[i] > flat) {
-                to = smaller(to, (high[k + 1] - least[i]) / factor[i]);
-                from = larger(from, (low[k + 1] - most[i]) / factor[i]);
+                to = smaller(to, (high[k + 1] - lower[i]) / factor[i]);
+                from = larger(from, (low[k + 1] - upper[i]) / factor[i]);
             }
         }
         if (!(from <= to * (1.0 + rounding)) || to < 0.0) {
@@ -83,7 +83,7 @@ int brachis_go_backwards(
 
 /* The largest x, (P), from the `first` one on, within the intervals. */
 void brachis_go_forwards(
-    long stations, long rows, const double *factor, const double *most, const double *low, const double *high,
+    long stations, long rows, const double *factor, const double *upper, const double *low, const double *high,
     double first, double *x
 )
 {
@@ -91,7 +91,7 @@ void brachis_go_forwards(
     for (long k = 0; k + 1 < stations; k++) {
         double next = high[k + 1];
         for (long i = 0; i < rows; i++) {
-            next = smaller(next, factor[k * rows + i] * x[k] + most[k * rows + i]);
+            next = smaller(next, factor[k * rows + i] * x[k] + upper[k * rows + i]);
         }
         x[k + 1] = larger(next, low[k + 1]);
     }
