@@ -19,13 +19,18 @@ static pack invert(long n, pack *A)
     for (long i = 0; i < n; i++) {
         for (int lane = 0; lane < LANES; lane++) {
             long pivot = i;
+            double largest = fabs(A[i * n + i][lane]);
             for (long row = i + 1; row < n; row++) {
-                pivot = fabs(A[row * n + i][lane]) > fabs(A[pivot * n + i][lane]) ? row : pivot;
+                double size = fabs(A[row * n + i][lane]);
+                pivot = size > largest ? row : pivot;
+                largest = size > largest ? size : largest;
             }
             swaps[i * LANES + lane] = pivot;
-            determinants[lane] *= pivot == i ? 1.0 : -1.0;
-            for (long j = 0; j < n && pivot != i; j++) {
-                swap_lane(&A[i * n + j], &A[pivot * n + j], lane);
+            if (pivot != i) {
+                determinants[lane] = -determinants[lane];
+                for (long j = 0; j < n; j++) {
+                    swap_lane(&A[i * n + j], &A[pivot * n + j], lane);
+                }
             }
         }
         determinants *= A[i * n + i];
@@ -35,9 +40,13 @@ static pack invert(long n, pack *A)
             A[i * n + j] *= inverse;
         }
         for (long row = 0; row < n; row++) {
+            if (row == i) {
+                continue;
+            }
             pack factor = A[row * n + i];
-            for (long j = 0; j < n && row != i; j++) {
-                A[row * n + j] = (j == i ? all(0.0) : A[row * n + j]) - factor * A[i * n + j];
+            A[row * n + i] = all(0.0);
+            for (long j = 0; j < n; j++) {
+                A[row * n + j] -= factor * A[i * n + j];
             }
         }
     }
@@ -259,11 +268,15 @@ static void find_right_qddot_y(const terms *of, const pack *qdot_y, pack *right)
     for (long i = 0; i < of->changing; i++) {
         const pack *C_s = of->C_s + i * n;
         const pack *C_ss = of->C_ss + i * n;
+        pack C_t[n], C_tt[n];
+        for (long l = 0; l < n; l++) {
+            C_t[l] = 2.0 * sdot * C_s[l];
+            C_tt[l] = C_ss[l] * sdot * sdot + C_s[l] * sddot;
+        }
         for (long j = 0; j < c; j++) {
             pack sum = all(0.0);
             for (long l = 0; l < n; l++) {
-                pack C_tt = C_ss[l] * sdot * sdot + C_s[l] * sddot;
-                sum += 2.0 * sdot * C_s[l] * qdot_y[l * c + j] + C_tt * of->G[l * c + j];
+                sum += C_t[l] * qdot_y[l * c + j] + C_tt[l] * of->G[l * c + j];
             }
             right[(m + i) * c + j] = -sum;
         }
