@@ -62,7 +62,7 @@ FUNCTIONS = {
 
 An array has its shape in brackets: a letter is a size, a digit a number. Arrays behind ``>`` are written to; arrays
 behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size. What is in braces are fields
-of a structure, of which the function gets the address.
+of a structure, of which the function gets the address; an ``i`` cannot be a field.
 """
 _DOUBLE = np.dtype(np.float64)
 WHOLE = np.dtype("l")
@@ -164,7 +164,7 @@ def address(values: np.ndarray) -> int:
 
 
 def call(name: str, *arguments: Any) -> Any:
-    """Call a function of the library; of contiguous arrays it gets the addresses."""
+    """Call a function of the library; of contiguous arrays, and of a structure, it gets the addresses."""
     plain = [
         address(value) if isinstance(value, np.ndarray) else value
         for value in arguments
