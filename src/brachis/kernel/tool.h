@@ -154,9 +154,9 @@ static inline twist bias_of(long n, const twist *columns, const pack *qdot, int 
     return a;
 }
 
-/* Derivatives of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian, qdot and qddot. Joints after joint i carry its axis relative to the tool: in the tool's axes dJ_i/dq_k = [J_i, J_k] for i < k,
-else 0 (Murray, Li, Sastry 1994, chapter 3). With S_k and s_k the parts of V and a that come from the joints before
-joint k,
+/* Derivatives of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian, qdot and qddot. Joints after
+joint i carry its axis relative to the tool: in the tool's axes dJ_i/dq_k = [J_i, J_k] for i < k, else 0 (Murray, Li, Sastry 1994,
+chapter 3). With S_k and s_k the parts of V and a that come from the joints before joint k,
     dV/dq_k = [S_k, J_k],    da/dq_k = [s_k, J_k] + [[S_k, J_k], V - S_k],    da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
 In the world's axes the tool's turn with each joint, and a point of it has the acceleration a_v + w x v. */
 static inline void differentiate_tool(
