@@ -57,7 +57,7 @@ def test_slopes(points):
 
 def test_a_part_has_fewer_steps_and_the_same_values(points):
     whole = Formula.of(everything, 2, 1)
-    part = whole.part(np.s_[:2])
+    part = whole.select(np.s_[:2])
     assert len(part.steps) < len(whole.steps)
     np.testing.assert_array_equal(part(*points), whole(*points)[:, :2])
 

@@ -60,7 +60,12 @@ def test_intervals(seed, tolerance, shortest, most):
     jumps = np.abs(np.diff(values, axis=0)).max(axis=1)
     timing = (t, values, 0.1 + t, np.where(jumps > 1.0, jumps, 0.0), jumps / 24.0)
     found = kernel.halve_intervals(
-        *timing, few=FEW, pieces=8, tolerance=tolerance, shortest=shortest, most=most
+        *timing,
+        least_times=FEW,
+        begin_count=8,
+        tolerance=tolerance,
+        shortest=shortest,
+        max_count=most,
     )
     np.testing.assert_allclose(
         found, halve(timing, 8, tolerance, shortest, most), atol=1e-12

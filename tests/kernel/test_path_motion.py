@@ -11,8 +11,8 @@ from brachis.kernel import (
     Fault,
     PathMotion,
     Prescribed,
+    find_largest_products,
     find_least_singular,
-    largest_parts,
     tool_derivatives,
 )
 from brachis.robot.chain import chain_of
@@ -40,7 +40,7 @@ def motion_in(chain, asked, q, path, tables, curves):
     given = dict(zip(("xi", "xi_ds", "xi_dds"), path, strict=True))
     given |= dict(zip(("ydot", "yddot"), curves, strict=True))
     given["y"] = np.zeros_like(curves[0])
-    given |= dict(zip(("rows", "turning"), tables, strict=False))
+    given |= dict(zip(("rows", "row_derivatives"), tables, strict=False))
     motion = PathMotion.prepare(chain, asked, given)
     motion.q[:] = q
     motion.evaluate()
@@ -228,7 +228,11 @@ def test_what_is_not_finite_is_no_posture():
 def test_conditions_of_other_shapes_are_refused():
     chain = chain_of(*random_model(3, 1))
     ones = np.ones((1, 2))
-    given = {"y": ones, "rows": np.zeros((1, 1, 4)), "turning": np.zeros((2, 1, 1, 4))}
+    given = {
+        "y": ones,
+        "rows": np.zeros((1, 1, 4)),
+        "row_derivatives": np.zeros((2, 1, 1, 4)),
+    }
     with pytest.raises(ValueError, match="needed"):
         PathMotion.prepare(chain, Prescribed((0, 1)), given)
 
@@ -298,12 +302,14 @@ def test_least_singular_values():
     np.testing.assert_allclose(along, 1.0, atol=1e-12)
 
 
-def test_largest_parts_of_steps():
+def test_largest_products_of_steps():
     rng = np.random.default_rng(9)
     rows = rng.normal(size=(6, 4, 5))
     step = rng.normal(size=(POINTS, 5))
     origin = rng.integers(0, 6, POINTS)
     known = np.abs(np.einsum("eij,ej->ei", rows[origin], step)).max(axis=1)
-    np.testing.assert_allclose(largest_parts(rows, step, origin), known, atol=1e-14)
+    np.testing.assert_allclose(
+        find_largest_products(rows, step, origin), known, atol=1e-14
+    )
     with pytest.raises(ValueError, match="nowhere"):
-        largest_parts(rows, step, origin + 6)
+        find_largest_products(rows, step, origin + 6)

@@ -134,7 +134,7 @@ def test_a_branch_comes_back_from_another_process():
     branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
     assert branch.address
     again = pickle.loads(pickle.dumps(branch))  # noqa: S301  (our own)
-    np.testing.assert_array_equal(again.others, OTHERS)
+    np.testing.assert_array_equal(again.nonredundant, OTHERS)
 
 
 def test_what_does_not_fit_is_refused():

@@ -163,7 +163,7 @@ class FormulaSolver(FormulaMargins):
 
     def _of_branch(self, branch: int, *counts: int) -> Formula:
         key = ("branch", branch, *counts)
-        return self._formula(key, self._of_all(*counts).part, branch)
+        return self._formula(key, self._of_all(*counts).select, branch)
 
     def branch_formula(self, branch: int, *counts: int) -> Formula | None:
         """Return the part of a branch of the answers; None where a subclass has a `solve_branch` of its own."""

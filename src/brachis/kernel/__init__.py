@@ -13,7 +13,7 @@ from brachis.kernel.chain_rule import (
 )
 from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
-from brachis.kernel.lattice import largest_parts
+from brachis.kernel.lattice import find_largest_products
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Fault, PathMotion, find_least_singular
@@ -51,12 +51,12 @@ __all__ = [
     "bounds_of_pairs",
     "collocation",
     "differentiate",
+    "find_largest_products",
     "find_least_singular",
     "find_postures",
     "go_backwards",
     "go_forwards",
     "halve_intervals",
-    "largest_parts",
     "rotation_derivatives",
     "rotation_vectors",
     "tool_derivatives",

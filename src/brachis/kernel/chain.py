@@ -12,7 +12,7 @@ from brachis.kernel.library import (
     Structured,
     address,
     as_contiguous,
-    compute,
+    call_checked,
     declare_fields,
     shape_of,
 )
@@ -102,12 +102,12 @@ class Chain(Structured):
 
     def _make_structure(self) -> _Chain:
         sizes = {"n": self.n}
-        numbers = [
+        arrays = [
             as_contiguous(getattr(self, name), shape_of(letters, sizes))
             for name, letters in _SHAPES.items()
         ]
-        structure = _Chain(self.n, *map(address, numbers))
-        structure.kept = numbers
+        structure = _Chain(self.n, *map(address, arrays))
+        structure.arrays = arrays
         return structure
 
     def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
@@ -183,4 +183,4 @@ class Chain(Structured):
 
     def _call(self, name: str, *arguments: np.ndarray | int | None) -> Any:
         """Call a function of the library for this chain."""
-        return compute(name, self.address, *arguments, n=self.n)
+        return call_checked(name, self.address, *arguments, n=self.n)

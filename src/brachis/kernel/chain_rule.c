@@ -15,41 +15,48 @@
     }
 #define UNROLLED static inline __attribute__((always_inline)) void
 
-/* found += factor * partial (values, n) times slopes (n, width); most partials are of one joint each. */
+/* table += factor * partial (values, n) times slopes (n, width); most partials are of one joint each. */
 UNROLLED add_product(
-    long width, const partial *by, long k, long values, long n, double factor, const double *slopes, double *found
+    long width, const partial *by, long k, long values, long n, double factor, const double *slopes, double *table
 )
 {
     const double *numbers = by->numbers + k * by->step;
     for (long i = 0; i < values; i++) {
         for (long j = 0; j < n; j++) {
-            double own = factor * numbers[i * n + j];
-            if (own == 0.0) {
+            double number = factor * numbers[i * n + j];
+            if (number == 0.0) {
                 continue;
             }
             for (long l = 0; l < width; l++) {
-                found[i * width + l] += own * slopes[j * width + l];
+                table[i * width + l] += number * slopes[j * width + l];
             }
         }
     }
 }
 
-/* found += factor times the slopes of single joints, (values, width). */
-UNROLLED add_rows(long width, const group *own, double factor, const double *slopes, double *found)
+/* table += factor times the slopes of single joints, (values, width). */
+UNROLLED add_rows(long width, const value_group *group, double factor, const double *slopes, double *table)
 {
-    for (long i = 0; i < own->values; i++) {
+    for (long i = 0; i < group->values; i++) {
         for (long l = 0; l < width; l++) {
-            found[i * width + l] += factor * own->factors[i] * slopes[own->joints[i] * width + l];
+            table[i * width + l] += factor * group->factors[i] * slopes[group->joints[i] * width + l];
         }
     }
 }
 
+/* Sizes of a table of slopes, (orders, K, columns, width), of groups of values of n joints. */
+typedef struct {
+    long count, n, width, groups, orders, columns;
+} table_sizes;
+
 UNROLLED chain_rule(
-    long width, long count, long n, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
-    double *table
+    long width, const table_sizes *sizes, const value_group *groups, const motion_slopes *motion, double *table
 )
 {
-    for (long i = 0; i < orders * count * columns * width; i++) {
+    long count = sizes->count;
+    long n = sizes->n;
+    long columns = sizes->columns;
+    for (long i = 0; i < sizes->orders * count * columns * width; i++) {
         table[i] = 0.0;
     }
     /* Slopes of q, its derivatives and the torque by y, ydot, ...; those of the jerk follow Leibniz' rule. */
@@ -65,24 +72,24 @@ UNROLLED chain_rule(
     for (long k = 0; k < count; k++) {
         long at = k * n * width;
         long column = 0;
-        for (const group *own = of; own < of + groups; own++) {
-            long values = own->values;
-            for (long i = 0; i < values && own->by_s; i++) {
-                table[(k * columns + column + i) * width] = own->by_s[k * values + i];
+        for (const value_group *group = groups; group < groups + sizes->groups; group++) {
+            long values = group->values;
+            for (long i = 0; i < values && group->by_s; i++) {
+                table[(k * columns + column + i) * width] = group->by_s[k * values + i];
             }
             for (int quantity = 0; quantity <= TORQUE; quantity++) {
-                const partial *by = quantity < TORQUE ? &own->by[quantity] : NULL;
-                int is_own = own->quantity == quantity;
-                if (!is_own && !(by && by->numbers)) {
+                const partial *by = quantity < TORQUE ? &group->by[quantity] : NULL;
+                int is_quantity = group->quantity == quantity;
+                if (!is_quantity && !(by && by->numbers)) {
                     continue;
                 }
                 for (int order = 0; order < 4 && slopes[quantity][order]; order++) {
                     double factor = quantity == 3 && (order == 1 || order == 2) ? 3.0 : 1.0;
-                    double *found = table + ((order * count + k) * columns + column) * width;
-                    if (is_own) {
-                        add_rows(width, own, factor, slopes[quantity][order] + at, found);
+                    double *rows = table + ((order * count + k) * columns + column) * width;
+                    if (is_quantity) {
+                        add_rows(width, group, factor, slopes[quantity][order] + at, rows);
                     } else {
-                        add_product(width, by, k, values, n, factor, slopes[quantity][order] + at, found);
+                        add_product(width, by, k, values, n, factor, slopes[quantity][order] + at, rows);
                     }
                 }
             }
@@ -104,12 +111,12 @@ typedef struct {
 } variables;
 
 UNROLLED entries_of(
-    long width, long count, long columns, const double *table, const variables *by, double *found
+    long width, long count, long columns, const double *table, const variables *by, double *entries
 )
 {
-    double *of_one = found + by->shared_count * count * columns;
-    for (double *own = found; own < of_one + by->entries * columns; own++) {
-        *own = 0.0;
+    double *of_one = entries + by->shared_count * count * columns;
+    for (double *entry = entries; entry < of_one + by->entries * columns; entry++) {
+        *entry = 0.0;
     }
     for (long order = 0; order < by->orders; order++) {
         for (long row = 0; row < by->shared_count * count; row++) {
@@ -117,7 +124,7 @@ UNROLLED entries_of(
             const double *factors = by->shared + ((row / count * by->orders + order) * count + row % count) * width;
             for (long i = 0; i < columns; i++) {
                 for (long j = 0; j < width; j++) {
-                    found[row * columns + i] += slopes[i * width + j] * factors[j];
+                    entries[row * columns + i] += slopes[i * width + j] * factors[j];
                 }
             }
         }
@@ -133,57 +140,59 @@ UNROLLED entries_of(
 
 /* Entries of a Jacobian, (shared_count K + z, columns), from slopes by the curves. */
 void brachis_entries(
-    long count, long columns, long width, const double *table, const variables *by, double *found
+    long count, long columns, long width, const double *table, const variables *by, double *entries
 )
 {
-    WITH_WIDTH(entries_of, count, columns, table, by, found)
+    WITH_WIDTH(entries_of, count, columns, table, by, entries)
 }
 
-/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width); and entries
-by variables, if they are asked for. With an arm the slopes of its torques are found in `motion`; `states` are q, qdot and qddot. */
+/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table; and entries by variables, if they are asked
+for. With an arm the slopes of its torques are found in `motion`; `states` are q, qdot and qddot. */
 void brachis_differentiate(
-    long count, long n, long width, const chain *arm, const double **states,
-    const motion_slopes *motion, long groups, const group *of, long orders, long columns, double *table,
-    const variables *by, double *found
+    const table_sizes *sizes, const chain *arm, const double **states, const motion_slopes *motion,
+    const value_group *groups, double *table, const variables *by, double *entries
 )
 {
-    for (const group *each = of; each < of + groups; each++) {
-        double *slopes = each->by[0].numbers;
-        if (each->quantity == FORMULA) {
-            brachis_formula(each->slopes_of, count, states[0], n, NULL, 0, slopes);
+    long count = sizes->count;
+    long n = sizes->n;
+    long width = sizes->width;
+    for (const value_group *group = groups; group < groups + sizes->groups; group++) {
+        double *slopes = group->by[0].numbers;
+        if (group->quantity == FORMULA) {
+            brachis_formula(group->slopes_of, count, states[0], n, NULL, 0, slopes);
         }
-        for (long i = 0; i < count * each->values * n && each->quantity == FORMULA; i++) {
-            slopes[i] *= each->factors[i / n % each->values];
+        for (long i = 0; i < count * group->values * n && group->quantity == FORMULA; i++) {
+            slopes[i] *= group->factors[i / n % group->values];
         }
     }
     if (arm) {
         brachis_torque_slopes(arm, count, width, states, motion);
     }
-    WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
+    WITH_WIDTH(chain_rule, sizes, groups, motion, table)
     if (by) {
-        brachis_entries(count, columns, width, table, by, found);
+        brachis_entries(count, sizes->columns, width, table, by, entries);
     }
 }
 
 /* Values of the groups that are quantities of joints or formulas, each (K, values), one behind the other; `quantities` are q and
 its three derivatives and the torque, (K, n). */
 void brachis_values(
-    long count, long n, const double **quantities, long groups, const group *of, double *found
+    long count, long n, const double **quantities, long group_count, const value_group *groups, double *values
 )
 {
-    for (const group *own = of; own < of + groups; own++) {
-        if (own->quantity == FORMULA) {
-            brachis_formula(own->values_of, count, quantities[0], n, NULL, 0, found);
+    for (const value_group *group = groups; group < groups + group_count; group++) {
+        if (group->quantity == FORMULA) {
+            brachis_formula(group->values_of, count, quantities[0], n, NULL, 0, values);
         }
-        for (long i = 0; i < count * own->values && own->quantity == FORMULA; i++) {
-            found[i] *= own->factors[i % own->values];
+        for (long i = 0; i < count * group->values && group->quantity == FORMULA; i++) {
+            values[i] *= group->factors[i % group->values];
         }
-        for (long k = 0; k < count && own->quantity >= 0 && own->quantity <= TORQUE; k++) {
-            const double *quantity = quantities[own->quantity] + k * n;
-            for (long i = 0; i < own->values; i++) {
-                found[k * own->values + i] = (quantity[own->joints[i]] - own->offsets[i]) * own->factors[i];
+        for (long k = 0; k < count && group->quantity >= 0 && group->quantity <= TORQUE; k++) {
+            const double *quantity = quantities[group->quantity] + k * n;
+            for (long i = 0; i < group->values; i++) {
+                values[k * group->values + i] = (quantity[group->joints[i]] - group->offsets[i]) * group->factors[i];
             }
         }
-        found += count * own->values;
+        values += count * group->values;
     }
 }

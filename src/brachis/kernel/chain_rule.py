@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel.library import address, call, compute, declare_fields
-from brachis.kernel.value_groups import Partial, ValueGroups, keep_address
+from brachis.kernel.library import address, call, call_checked, declare_fields
+from brachis.kernel.value_groups import Partial, ValueGroups, hold_and_address
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +56,20 @@ class CurvePattern:
     ) -> None:
         if points.shape != curves.shape:
             raise ValueError("points and curves are not as many")
-        for numbers, most, name in (points, count, "point"), (curves, width, "curve"):
-            if len(numbers) and not 0 <= numbers.min() <= numbers.max() < most:
-                raise ValueError(f"a {name} does not exist; there are {most}")
+        for indices, size, name in (points, count, "point"), (curves, width, "curve"):
+            if len(indices) and not 0 <= indices.min() <= indices.max() < size:
+                raise ValueError(f"a {name} does not exist; there are {size}")
         self.size = len(points)
         self.shape = count, width
-        self._kept = [
-            own.astype("l", order="C", casting="same_kind") for own in (points, curves)
+        self._indices = [
+            indices.astype("l", order="C", casting="same_kind")
+            for indices in (points, curves)
         ]
 
     @property
     def addresses(self) -> list[int]:
         """Where the library finds points and curves."""
-        return [address(own) for own in self._kept]
+        return [address(indices) for indices in self._indices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +97,14 @@ class VariableSlopes:
         """How many entries a value has in the Jacobian, b K + z."""
         return len(self.shared) * self.pattern.shape[0] + self.pattern.size
 
-    def structure(self, orders: int, kept: list[np.ndarray]) -> _Variables:
-        """Return what the library reads; what is added to `kept` has to stay alive."""
+    def structure(self, orders: int, arrays: list[np.ndarray]) -> _Variables:
+        """Return what the library reads; what is added to `arrays` has to stay alive."""
         orders = min(orders, len(self.basis))
         count = len(self.shared)
         size = self.pattern.size
-        whole = (count, orders, *self.pattern.shape)
-        shared = keep_address(self.shared[:, :orders], whole, kept)
-        basis = keep_address(self.basis[:orders], (orders, size), kept)
+        shape = (count, orders, *self.pattern.shape)
+        shared = hold_and_address(self.shared[:, :orders], shape, arrays)
+        basis = hold_and_address(self.basis[:orders], (orders, size), arrays)
         return _Variables(orders, count, shared, size, *self.pattern.addresses, basis)
 
     def find_entries(self, slopes: np.ndarray) -> np.ndarray:
@@ -111,9 +112,9 @@ class VariableSlopes:
         orders, count, _, width = slopes.shape
         if (count, width) != self.pattern.shape:
             raise ValueError("slopes are of other points or curves")
-        kept: list[np.ndarray] = []
-        structure = ctypes.byref(self.structure(orders, kept))
-        entries: np.ndarray = compute(
+        arrays: list[np.ndarray] = []
+        structure = ctypes.byref(self.structure(orders, arrays))
+        entries: np.ndarray = call_checked(
             "brachis_entries", slopes, structure, e=self.entries
         )
         return entries
@@ -148,49 +149,49 @@ def differentiate(
     """
     count, n, width = motion.gradient.shape
     groups.check_joints(n)
-    kept: list[np.ndarray] = []
-    table = groups.table_with(partials, (count, n), kept)
-    has_jerk = groups.has_jerk or any(own[-1] is not None for own, _ in partials)
+    arrays: list[np.ndarray] = []
+    table = groups.table_with(partials, (count, n), arrays)
+    has_jerk = groups.has_jerk or any(by_q[-1] is not None for by_q, _ in partials)
     if has_jerk and motion.qdddot_y is None:
         raise ValueError("values that depend on qdddot need qdddot_y")
     shape = count, n, width
-    parts = (
+    derivatives = (
         motion.gradient,
         motion.qdot_y,
         motion.qddot_y,
         motion.qddot_ydot,
         motion.qdddot_y,
     )
-    slopes = [keep_address(own, shape, kept) for own in parts]
-    of_states = [keep_address(own, (count, n), kept) for own in states[:3]]
+    slopes = [hold_and_address(values, shape, arrays) for values in derivatives]
+    of_states = [hold_and_address(q, (count, n), arrays) for q in states[:3]]
     arm = None
     if groups.chain is not None:
-        slopes.append(keep_address(np.empty((3, *shape)), (3, *shape), kept))
+        slopes.append(hold_and_address(np.empty((3, *shape)), (3, *shape), arrays))
         arm = groups.chain.address
     columns = groups.size
     orders = 3 if motion.qdddot_y is None else 4
-    found = np.empty((orders, count, columns, width))
+    by_curves = np.empty((orders, count, columns, width))
     entries = np.empty((0, columns))
     by = None
     if variables is not None:
         if variables.pattern.shape != (count, width):
             raise ValueError("variables are of other points or curves")
         entries = np.empty((variables.entries, columns))
-        by = ctypes.byref(variables.structure(orders, kept))
+        by = ctypes.byref(variables.structure(orders, arrays))
     call(
         "brachis_differentiate",
         count,
         n,
         width,
+        len(table),
+        orders,
+        columns,
         arm,
         (ctypes.c_void_p * 3)(*of_states),
         (ctypes.c_void_p * 6)(*slopes),
-        len(table),
         table,
-        orders,
-        columns,
-        found,
+        by_curves,
         by,
         entries,
     )
-    return found, entries
+    return by_curves, entries

@@ -93,13 +93,20 @@ def compile_kernel() -> list[Path]:
     digest = source_digest()
     sources = [str(file) for file in sorted(FOLDER.glob("*.c"))]
     made = []
-    for variant, own in VARIANTS.items():
-        if own and platform.machine().lower() not in ("x86_64", "amd64"):
+    for variant, flags in VARIANTS.items():
+        if flags and platform.machine().lower() not in ("x86_64", "amd64"):
             continue
         library = library_path(variant)
         # Made aside and moved: who loads it meanwhile finds the old one or the new one.
         aside = library.with_suffix(f".{os.getpid()}.tmp")
-        command = [*compiler, *_FLAGS, *own, *_QUIET, f'-DSOURCE="{digest}"', *sources]
+        command = [
+            *compiler,
+            *_FLAGS,
+            *flags,
+            *_QUIET,
+            f'-DSOURCE="{digest}"',
+            *sources,
+        ]
         command += ["-o", str(aside), "-lm"]
         try:
             run = _run(command)

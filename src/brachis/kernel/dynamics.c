@@ -39,6 +39,11 @@ typedef struct {
     vec torque, force;
 } bodies;
 
+/* Momentum, or force, of a body: angular part about the world's origin, and linear part. */
+typedef struct {
+    vec torque, force;
+} wrench;
+
 static inline vec times(const inertia *J, vec a)
 {
     return (vec){
@@ -64,10 +69,20 @@ static inline twist move_axis(const chain *arm, long i, pack q, displacement *pl
     return (twist){axis, cross(point, axis)};
 }
 
-/* S . (torque, force) */
-static inline pack pair(twist S, vec torque, vec force)
+/* S . f */
+static inline pack pair(twist S, wrench f)
 {
-    return dot(S.w, torque) + dot(S.v, force);
+    return dot(S.w, f.torque) + dot(S.v, f.force);
+}
+
+/* I a */
+static inline wrench apply_inertia(const bodies *body, twist a)
+{
+    vec h = body->moment;
+    return (wrench){
+        add(times(&body->J, a.w), cross(h, a.v)),
+        subtract(scale(a.v, body->mass), cross(h, a.w)),
+    };
 }
 
 /* R J R' about the center of mass. */
@@ -92,34 +107,33 @@ static inline bodies place_body(const chain *arm, long i, const displacement *pl
     pack mass = all(arm->masses[i]);
     vec c = move_point(placed, arm->centers + 3 * i);
     vec h = scale(c, mass);
-    bodies own = {.mass = mass, .moment = h, .J = turn_inertia(placed, arm->inertias + 6 * i)};
-    own.J.xx += h.y * c.y + h.z * c.z;
-    own.J.yy += h.x * c.x + h.z * c.z;
-    own.J.zz += h.x * c.x + h.y * c.y;
-    own.J.xy -= h.x * c.y;
-    own.J.xz -= h.x * c.z;
-    own.J.yz -= h.y * c.z;
-    return own;
+    bodies body = {.mass = mass, .moment = h, .J = turn_inertia(placed, arm->inertias + 6 * i)};
+    body.J.xx += h.y * c.y + h.z * c.z;
+    body.J.yy += h.x * c.x + h.z * c.z;
+    body.J.zz += h.x * c.x + h.y * c.y;
+    body.J.xy -= h.x * c.y;
+    body.J.xz -= h.x * c.z;
+    body.J.yz -= h.y * c.z;
+    return body;
 }
 
 /* Momentum, and torque and force, of a body that moves with v and accelerates with a. */
-static inline void move_body(bodies *own, twist v, twist a)
+static inline void move_body(bodies *body, twist v, twist a)
 {
-    vec l = subtract(scale(v.v, own->mass), cross(own->moment, v.w));
-    vec k = add(times(&own->J, v.w), cross(own->moment, v.v));
-    vec force = subtract(scale(a.v, own->mass), cross(own->moment, a.w));
-    vec torque = add(times(&own->J, a.w), cross(own->moment, a.v));
-    own->momentum = l;
-    own->force = add(force, cross(v.w, l));
-    own->torque = add(torque, add(cross(v.w, k), cross(v.v, l)));
+    wrench momentum = apply_inertia(body, v);
+    wrench rate = apply_inertia(body, a);
+    vec l = momentum.force;
+    body->momentum = l;
+    body->force = add(rate.force, cross(v.w, l));
+    body->torque = add(rate.torque, add(cross(v.w, momentum.torque), cross(v.v, l)));
 }
 
 /* The matrix E of a body. */
-static inline matrix coriolis(const bodies *own, twist v)
+static inline matrix coriolis(const bodies *body, twist v)
 {
-    const inertia *J = &own->J;
+    const inertia *J = &body->J;
     vec w = v.w;
-    vec h = own->moment;
+    vec h = body->moment;
     pack trace = J->xx + J->yy + J->zz;
     pack hv = 2.0 * dot(h, v.v);
     vec x = scale(cross(w, (vec){J->xx, J->xy, J->xz}), all(2.0));
@@ -142,43 +156,41 @@ static inline matrix coriolis(const bodies *own, twist v)
 
 _Static_assert(sizeof(bodies) == 28 * sizeof(pack), "bodies are made of packs alone");
 
-static inline void add_bodies(bodies *sum, const bodies *own)
+static inline void add_bodies(bodies *sum, const bodies *body)
 {
     pack *numbers = (pack *)sum; /* all that a body is made of */
     for (unsigned long i = 0; i < sizeof(bodies) / sizeof(pack); i++) {
-        numbers[i] += ((const pack *)own)[i];
+        numbers[i] += ((const pack *)body)[i];
     }
 }
 
+/* Acceleration of the base, against gravity. */
 static inline twist gravity_upwards(const chain *arm)
 {
     vec none = constant((double[3]){0.0, 0.0, 0.0});
     return (twist){none, subtract(none, constant(arm->gravity))};
 }
 
-/* Take the motion (v, a) past joint i with axis S, psi = v x S, rate and acceleration, to the body behind it. */
-static inline void pass_joint(
-    const chain *arm, long i, const displacement *placed, twist S, twist psi, pack rate, pack acceleration, twist *v,
-    twist *a, bodies *own
-)
+/* Take the motion (v, a) past a joint with axis S and psi = v x S. */
+static inline void pass_joint(twist S, twist psi, pack qdot, pack qddot, twist *v, twist *a)
 {
-    *v = add_twists(*v, scale_twist(S, rate));
-    *a = add_twists(*a, scale_twist(psi, rate));
-    *a = add_twists(*a, scale_twist(S, acceleration));
-    *own = place_body(arm, i, placed);
-    move_body(own, *v, *a);
+    *v = add_twists(*v, scale_twist(S, qdot));
+    *a = add_twists(*a, scale_twist(psi, qdot));
+    *a = add_twists(*a, scale_twist(S, qddot));
 }
 
 /* Torque for rotor inertia and friction of joint i, and its slope by the joint's velocity. */
-static inline pack resist(const chain *arm, long i, pack rate, pack acceleration, pack *slope)
+static inline pack resist(const chain *arm, long i, pack qdot, pack qddot, pack *slope)
 {
-    const double *own = arm->friction + 4 * i;
-    pack torque = own[0] * acceleration + own[1] * rate;
-    *slope = all(own[1]);
-    if (own[2] != 0.0) {
-        pack part = tanhs(rate / own[3]);
-        torque += own[2] * part;
-        *slope += own[2] / own[3] * (1.0 - part * part);
+    const double *friction = arm->friction + 4 * i;
+    double viscous = friction[1];
+    double coulomb = friction[2];
+    pack torque = friction[0] * qddot + viscous * qdot;
+    *slope = all(viscous);
+    if (coulomb != 0.0) {
+        pack share = tanhs(qdot / friction[3]);
+        torque += coulomb * share;
+        *slope += coulomb / friction[3] * (1.0 - share * share);
     }
     return torque;
 }
@@ -190,9 +202,9 @@ void brachis_torques(
 {
     long n = arm->joints;
     for (long k = 0; k < count; k += LANES) {
-        twist axes[n];
-        bodies moved[n];
-        pack resisted[n];
+        twist S[n];
+        bodies body[n];
+        pack resistance[n];
         displacement placed = at_zero();
         twist v = {0};
         twist a = gravity_upwards(arm);
@@ -200,98 +212,133 @@ void brachis_torques(
             pack rate = gather(qdot, count, n, k, i);
             pack acceleration = gather(qddot, count, n, k, i);
             pack slope;
-            resisted[i] = resist(arm, i, rate, acceleration, &slope);
-            axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
-            twist psi = cross_twists(v, axes[i]);
-            pass_joint(arm, i, &placed, axes[i], psi, rate, acceleration, &v, &a, &moved[i]);
+            resistance[i] = resist(arm, i, rate, acceleration, &slope);
+            S[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
+            twist psi = cross_twists(v, S[i]);
+            pass_joint(S[i], psi, rate, acceleration, &v, &a);
+            body[i] = place_body(arm, i, &placed);
+            move_body(&body[i], v, a);
         }
-        vec torque = {0};
-        vec force = {0};
+        wrench f = {0};
         for (long i = n - 1; i >= 0; i--) {
-            torque = add(torque, moved[i].torque);
-            force = add(force, moved[i].force);
-            scatter(pair(axes[i], torque, force) + resisted[i], torques, count, n, k, i);
+            f.torque = add(f.torque, body[i].torque);
+            f.force = add(f.force, body[i].force);
+            scatter(pair(S[i], f) + resistance[i], torques, count, n, k, i);
         }
     }
 }
 
+/* Of the joints of LANES states, (n): axes S, psi and phi, the bodies behind each as one, and slopes of its friction. */
+typedef struct {
+    twist *S, *psi, *phi;
+    bodies *behind;
+    pack *friction_qdot;
+} joint_terms;
+
 /* Derivatives of the torques of LANES states by q, qdot and qddot, (n, n) each: row joint torque, column joint. */
-static void differentiate(
-    const chain *arm, long count, long k, const double **states, pack *by_q, pack *by_qdot, pack *by_qddot
-)
+typedef struct {
+    pack *tau_q, *tau_qdot, *M;
+} torque_partials;
+
+/* From the base to the tool: motion of every joint and body by itself. */
+static void find_joint_terms(const chain *arm, long count, long k, const double **states, const joint_terms *of)
 {
     long n = arm->joints;
-    twist axes[n], psi[n], phi[n];
-    bodies moved[n];
-    pack slopes[n];
     displacement placed = at_zero();
     twist v = {0};
     twist a = gravity_upwards(arm);
     for (long i = 0; i < n; i++) {
-        pack rate = gather(states[1], count, n, k, i);
-        pack acceleration = gather(states[2], count, n, k, i);
-        resist(arm, i, rate, acceleration, &slopes[i]);
-        axes[i] = move_axis(arm, i, gather(states[0], count, n, k, i), &placed);
-        psi[i] = cross_twists(v, axes[i]);
-        phi[i] = add_twists(cross_twists(a, axes[i]), cross_twists(v, psi[i]));
-        pass_joint(arm, i, &placed, axes[i], psi[i], rate, acceleration, &v, &a, &moved[i]);
-        moved[i].E = coriolis(&moved[i], v);
+        pack qdot = gather(states[1], count, n, k, i);
+        pack qddot = gather(states[2], count, n, k, i);
+        resist(arm, i, qdot, qddot, &of->friction_qdot[i]);
+        twist S = move_axis(arm, i, gather(states[0], count, n, k, i), &placed);
+        twist psi = cross_twists(v, S);
+        of->S[i] = S;
+        of->psi[i] = psi;
+        of->phi[i] = add_twists(cross_twists(a, S), cross_twists(v, psi));
+        pass_joint(S, psi, qdot, qddot, &v, &a);
+        of->behind[i] = place_body(arm, i, &placed);
+        move_body(&of->behind[i], v, a);
+        of->behind[i].E = coriolis(&of->behind[i], v);
     }
+}
+
+/* Row i up to the diagonal: what joint i feels of joints j <= i. */
+static void write_row(const chain *arm, long i, const joint_terms *of, const torque_partials *by)
+{
+    long n = arm->joints;
+    const bodies *body = &of->behind[i];
+    twist S = of->S[i];
+    wrench I_S = apply_inertia(body, S);
+    vec B_S = {dot(body->E.x, S.w), dot(body->E.y, S.w), dot(body->E.z, S.w)}; /* angular part of 2 B' S */
+    B_S = add(B_S, cross(scale(body->momentum, all(2.0)), S.v));
+    for (long j = 0; j <= i; j++) {
+        long at = i * n + j;
+        by->tau_q[at] = pair(of->phi[j], I_S) + dot(B_S, of->psi[j].w);
+        by->tau_qdot[at] = 2.0 * pair(of->psi[j], I_S) + dot(B_S, of->S[j].w);
+        by->M[at] = pair(of->S[j], I_S);
+        if (j == i) {
+            by->tau_qdot[at] += of->friction_qdot[i];
+            by->M[at] += arm->friction[4 * i];
+        }
+        by->M[j * n + i] = by->M[at];
+    }
+}
+
+/* Column i above the diagonal: what joints j < i feel of joint i. */
+static void write_column(long n, long i, const joint_terms *of, const torque_partials *by)
+{
+    const bodies *body = &of->behind[i];
+    twist S = of->S[i];
+    twist psi = of->psi[i];
+    vec l = scale(body->momentum, all(2.0));
+    wrench f_q = apply_inertia(body, of->phi[i]); /* I phi + 2 B psi + S x* f */
+    f_q.torque = add(f_q.torque, apply(&body->E, psi.w));
+    f_q.torque = add(f_q.torque, add(cross(S.w, body->torque), cross(S.v, body->force)));
+    f_q.force = add(f_q.force, add(cross(psi.w, l), cross(S.w, body->force)));
+    wrench I_psi = apply_inertia(body, psi);
+    wrench f_qdot = { /* 2 I psi + 2 B S */
+        add(scale(I_psi.torque, all(2.0)), apply(&body->E, S.w)),
+        add(scale(I_psi.force, all(2.0)), cross(S.w, l)),
+    };
+    for (long j = 0; j < i; j++) {
+        by->tau_q[j * n + i] = pair(of->S[j], f_q);
+        by->tau_qdot[j * n + i] = pair(of->S[j], f_qdot);
+    }
+}
+
+static void differentiate(const chain *arm, long count, long k, const double **states, const torque_partials *by)
+{
+    long n = arm->joints;
+    twist S[n], psi[n], phi[n];
+    bodies behind[n];
+    pack friction_qdot[n];
+    const joint_terms of = {S, psi, phi, behind, friction_qdot};
+    find_joint_terms(arm, count, k, states, &of);
     for (long i = n - 1; i >= 0; i--) {
         if (i < n - 1) {
-            add_bodies(&moved[i], &moved[i + 1]);
+            add_bodies(&behind[i], &behind[i + 1]);
         }
-        bodies *own = &moved[i];
-        twist S = axes[i];
-        vec h = own->moment;
-        vec l = scale(own->momentum, all(2.0));
-        /* Rows: joints before this one, and itself. */
-        vec turning = add(times(&own->J, S.w), cross(h, S.v));
-        vec pushing = subtract(scale(S.v, own->mass), cross(h, S.w));
-        vec bent = {dot(own->E.x, S.w), dot(own->E.y, S.w), dot(own->E.z, S.w)};
-        bent = add(bent, cross(l, S.v));
-        for (long j = 0; j <= i; j++) {
-            long place = i * n + j;
-            by_q[place] = pair(phi[j], turning, pushing) + dot(bent, psi[j].w);
-            by_qdot[place] = 2.0 * pair(psi[j], turning, pushing) + dot(bent, axes[j].w);
-            by_qddot[place] = pair(axes[j], turning, pushing);
-            if (j == i) {
-                by_qdot[place] += slopes[i];
-                by_qddot[place] += arm->friction[4 * i];
-            }
-            by_qddot[j * n + i] = by_qddot[place];
-        }
-        /* Columns: what this joint does to those before it. */
-        vec torque = add(times(&own->J, phi[i].w), cross(h, phi[i].v));
-        torque = add(torque, apply(&own->E, psi[i].w));
-        torque = add(torque, add(cross(S.w, own->torque), cross(S.v, own->force)));
-        vec force = subtract(scale(phi[i].v, own->mass), cross(h, phi[i].w));
-        force = add(force, add(cross(psi[i].w, l), cross(S.w, own->force)));
-        vec rate_torque = scale(add(times(&own->J, psi[i].w), cross(h, psi[i].v)), all(2.0));
-        rate_torque = add(rate_torque, apply(&own->E, S.w));
-        vec rate_force = scale(subtract(scale(psi[i].v, own->mass), cross(h, psi[i].w)), all(2.0));
-        rate_force = add(rate_force, cross(S.w, l));
-        for (long j = 0; j < i; j++) {
-            by_q[j * n + i] = pair(axes[j], torque, force);
-            by_qdot[j * n + i] = pair(axes[j], rate_torque, rate_force);
-        }
+        write_row(arm, i, &of, by);
+        write_column(n, i, &of, by);
     }
 }
 
 /* Derivatives of the torques by q, qdot and qddot, (K, n, n) each. */
 void brachis_torque_derivatives(
-    const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *by_q,
-    double *by_qdot, double *by_qddot
+    const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *tau_q,
+    double *tau_qdot, double *M
 )
 {
     long size = arm->joints * arm->joints;
     const double *states[3] = {q, qdot, qddot};
     for (long k = 0; k < count; k += LANES) {
-        pack parts[3 * size];
-        differentiate(arm, count, k, states, parts, parts + size, parts + 2 * size);
-        write_block(parts, by_q, count, size, k);
-        write_block(parts + size, by_qdot, count, size, k);
-        write_block(parts + 2 * size, by_qddot, count, size, k);
+        pack numbers[3 * size];
+        const torque_partials by = {numbers, numbers + size, numbers + 2 * size};
+        differentiate(arm, count, k, states, &by);
+        write_block(by.tau_q, tau_q, count, size, k);
+        write_block(by.tau_qdot, tau_qdot, count, size, k);
+        write_block(by.M, M, count, size, k);
     }
 }
 
@@ -303,22 +350,23 @@ void brachis_torque_slopes(
     long n = arm->joints;
     long size = n * width;
     for (long k = 0; k < count; k += LANES) {
-        pack by_q[n * n], by_qdot[n * n], by_qddot[n * n];
-        pack G[size], rates[size], accelerations[size], found[size];
-        differentiate(arm, count, k, states, by_q, by_qdot, by_qddot);
+        pack tau_q[n * n], tau_qdot[n * n], M[n * n];
+        pack G[size], qdot_y[size], qddot_y[size], qddot_ydot[size], slopes[size];
+        const torque_partials by = {tau_q, tau_qdot, M};
+        differentiate(arm, count, k, states, &by);
         read_block(motion->gradient, count, size, k, G);
-        read_block(motion->qdot_y, count, size, k, rates);
-        read_block(motion->qddot_y, count, size, k, accelerations);
-        multiply(by_q, n, G, n, n, width, SET, found);
-        multiply(by_qdot, n, rates, n, n, width, ADD, found);
-        multiply(by_qddot, n, accelerations, n, n, width, ADD, found);
-        write_block(found, motion->torque, count, size, k);
-        read_block(motion->qddot_ydot, count, size, k, accelerations);
-        multiply(by_qdot, n, G, n, n, width, SET, found);
-        multiply(by_qddot, n, accelerations, n, n, width, ADD, found);
-        write_block(found, motion->torque + count * size, count, size, k);
-        multiply(by_qddot, n, G, n, n, width, SET, found);
-        write_block(found, motion->torque + 2 * count * size, count, size, k);
+        read_block(motion->qdot_y, count, size, k, qdot_y);
+        read_block(motion->qddot_y, count, size, k, qddot_y);
+        read_block(motion->qddot_ydot, count, size, k, qddot_ydot);
+        multiply(tau_q, n, G, n, n, width, SET, slopes);
+        multiply(tau_qdot, n, qdot_y, n, n, width, ADD, slopes);
+        multiply(M, n, qddot_y, n, n, width, ADD, slopes);
+        write_block(slopes, motion->torque, count, size, k);
+        multiply(tau_qdot, n, G, n, n, width, SET, slopes);
+        multiply(M, n, qddot_ydot, n, n, width, ADD, slopes);
+        write_block(slopes, motion->torque + count * size, count, size, k);
+        multiply(M, n, G, n, n, width, SET, slopes);
+        write_block(slopes, motion->torque + 2 * count * size, count, size, k);
     }
 }
 
@@ -327,26 +375,23 @@ void brachis_mass_matrices(const chain *arm, long count, const double *q, double
 {
     long n = arm->joints;
     for (long k = 0; k < count; k += LANES) {
-        twist axes[n];
-        bodies placed_bodies[n];
+        twist S[n];
+        bodies behind[n];
         displacement placed = at_zero();
         for (long i = 0; i < n; i++) {
-            axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
-            placed_bodies[i] = place_body(arm, i, &placed);
+            S[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
+            behind[i] = place_body(arm, i, &placed);
         }
         for (long i = n - 1; i >= 0; i--) {
-            bodies *own = &placed_bodies[i];
             if (i < n - 1) {
-                add_bodies(own, own + 1);
+                add_bodies(&behind[i], &behind[i + 1]);
             }
-            twist S = axes[i];
-            vec turning = add(times(&own->J, S.w), cross(own->moment, S.v));
-            vec pushing = subtract(scale(S.v, own->mass), cross(own->moment, S.w));
+            wrench I_S = apply_inertia(&behind[i], S[i]);
             for (long j = 0; j <= i; j++) {
-                pack part = pair(axes[j], turning, pushing);
-                part += j == i ? arm->friction[4 * i] : 0.0;
-                scatter(part, matrices, count, n * n, k, i * n + j);
-                scatter(part, matrices, count, n * n, k, j * n + i);
+                pack M_ij = pair(S[j], I_S);
+                M_ij += j == i ? arm->friction[4 * i] : 0.0;
+                scatter(M_ij, matrices, count, n * n, k, i * n + j);
+                scatter(M_ij, matrices, count, n * n, k, j * n + i);
             }
         }
     }

@@ -7,72 +7,90 @@
 enum { SIDE_BY_SIDE = 16 };
 enum { PLUS, MINUS, TIMES, OVER, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2, CEIL };
 
+typedef double numbers[SIDE_BY_SIDE];
+
 #define FOR_EACH(formula)                               \
     for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {   \
         c[lane] = formula;                              \
     }                                                   \
     break
 
-/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. Found
-are (K, outputs), NaN without memory. */
+/* Take a step: c = a + b, or another operation of the numbers a and b of each point. */
+static inline void take_step(int operation, const double *a, const double *b, double *c)
+{
+    switch (operation) {
+    case PLUS: FOR_EACH(a[lane] + b[lane]);
+    case MINUS: FOR_EACH(a[lane] - b[lane]);
+    case TIMES: FOR_EACH(a[lane] * b[lane]);
+    case OVER: FOR_EACH(a[lane] / b[lane]);
+    case NEGATE: FOR_EACH(-a[lane]);
+    case SQRT: FOR_EACH(sqrt(a[lane]));
+    case SIN: FOR_EACH(sin(a[lane]));
+    case COS: FOR_EACH(cos(a[lane]));
+    case ARCCOS: FOR_EACH(acos(a[lane]));
+    case ARCTAN2: FOR_EACH(atan2(a[lane], b[lane]));
+    case CEIL: FOR_EACH(ceil(a[lane]));
+    }
+}
+
+static void set_constants(const formula *formula, numbers *constants)
+{
+    for (long i = 0; i < formula->constant_count; i++) {
+        for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
+            constants[i][lane] = formula->constants[i];
+        }
+    }
+}
+
+/* Make rows of results NaN that are not complete. */
+static void discard_incomplete(const formula *formula, long count, double *results)
+{
+    long length = formula->row_length;
+    for (long i = 0; length && i < count * formula->output_count; i += length) {
+        int complete = all_finite(results + i, length);
+        for (long j = i; j < i + length && !complete; j++) {
+            results[j] = NAN;
+        }
+    }
+}
+
+/* Evaluate at K points: the arguments of successive ones are `first_step` and `second_step` apart. Results are (K, outputs), NaN
+without memory. */
 void brachis_formula(
-    const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
-    double *found
+    const formula *formula, long count, const double *first, long first_step, const double *second, long second_step,
+    double *results
 )
 {
-    long inputs = own->counts[0] + own->counts[1];
-    long outputs = own->outputs;
-    const step *step_of = own->step_of;
-    double (*numbers)[SIDE_BY_SIDE] = malloc((inputs + own->constants + own->steps) * sizeof *numbers);
-    for (long i = 0; !numbers && i < count * outputs; i++) {
-        found[i] = NAN;
+    long first_count = formula->input_counts[0];
+    long inputs = first_count + formula->input_counts[1];
+    long outputs = formula->output_count;
+    long begin = inputs + formula->constant_count;
+    numbers *table = malloc((begin + formula->step_count) * sizeof *table);
+    for (long i = 0; !table && i < count * outputs; i++) {
+        results[i] = NAN;
     }
-    if (!numbers) {
+    if (!table) {
         return;
     }
-    for (long i = 0; i < own->constants; i++) {
-        for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
-            numbers[inputs + i][lane] = own->constant[i];
-        }
-    }
+    set_constants(formula, table + inputs);
     for (long k = 0; k < count; k += SIDE_BY_SIDE) {
         for (int lane = 0; lane < SIDE_BY_SIDE; lane++) {
-            long at = k + lane < count ? k + lane : count - 1;
+            long point = k + lane < count ? k + lane : count - 1;
             for (long i = 0; i < inputs; i++) {
-                long other = i - own->counts[0];
-                numbers[i][lane] = other < 0 ? first[at * first_step + i] : second[at * second_step + other];
+                long at = i - first_count;
+                table[i][lane] = at < 0 ? first[point * first_step + i] : second[point * second_step + at];
             }
         }
-        for (long i = 0; i < own->steps; i++) {
-            const double *a = numbers[step_of[i].first];
-            const double *b = numbers[step_of[i].second];
-            double *c = numbers[inputs + own->constants + i];
-            switch (step_of[i].operation) {
-            case PLUS: FOR_EACH(a[lane] + b[lane]);
-            case MINUS: FOR_EACH(a[lane] - b[lane]);
-            case TIMES: FOR_EACH(a[lane] * b[lane]);
-            case OVER: FOR_EACH(a[lane] / b[lane]);
-            case NEGATE: FOR_EACH(-a[lane]);
-            case SQRT: FOR_EACH(sqrt(a[lane]));
-            case SIN: FOR_EACH(sin(a[lane]));
-            case COS: FOR_EACH(cos(a[lane]));
-            case ARCCOS: FOR_EACH(acos(a[lane]));
-            case ARCTAN2: FOR_EACH(atan2(a[lane], b[lane]));
-            case CEIL: FOR_EACH(ceil(a[lane]));
-            }
+        for (long i = 0; i < formula->step_count; i++) {
+            const step *step = &formula->steps[i];
+            take_step(step->operation, table[step->first], table[step->second], table[begin + i]);
         }
         for (int lane = 0; lane < SIDE_BY_SIDE && k + lane < count; lane++) {
             for (long i = 0; i < outputs; i++) {
-                found[(k + lane) * outputs + i] = numbers[own->wanted[i]][lane];
+                results[(k + lane) * outputs + i] = table[formula->outputs[i]][lane];
             }
         }
     }
-    free(numbers);
-    long together = own->together;
-    for (long i = 0; together && i < count * outputs; i += together) {
-        int complete = all_finite(found + i, together);
-        for (long j = i; j < i + together && !complete; j++) {
-            found[j] = NAN;
-        }
-    }
+    free(table);
+    discard_incomplete(formula, count, results);
 }

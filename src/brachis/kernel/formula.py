@@ -34,10 +34,10 @@ _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
 def _make_operator(
     apply: Callable[[Record, Number, Number], Number],
 ) -> Callable[[Number, Any], Number]:
-    """Return a method that applies an operation to a number and another one, which may be plain."""
+    """Return a method that applies an operation to a number and a second one, which may be plain."""
 
-    def operate(self: Number, other: Any) -> Number:
-        return apply(self.record, self, self.record.number(other))
+    def operate(self: Number, operand: Any) -> Number:
+        return apply(self.record, self, self.record.number(operand))
 
     return operate
 
@@ -89,7 +89,7 @@ class Record:
     numbers: list[Number] = field(default_factory=list)
     _known: dict[tuple[Any, ...], Number] = field(default_factory=dict)
 
-    def _keep(self, operation: str, *operands: Any) -> Number:
+    def _add_number(self, operation: str, *operands: Any) -> Number:
         """Return the number, which is made if it is not known."""
         key = (operation, *operands)  # numbers are known by their identity
         known = self._known.get(key)
@@ -101,21 +101,23 @@ class Record:
 
     def inputs(self, count: int) -> np.ndarray:
         """Make the next inputs, (1, count)."""
-        begin = sum(own.operation == "input" for own in self.numbers)
-        made = [self._keep("input", begin + i) for i in range(count)]
+        begin = sum(number.operation == "input" for number in self.numbers)
+        made = [self._add_number("input", begin + i) for i in range(count)]
         return np.array(made, dtype=object).reshape(1, count)
 
     def number(self, value: Any) -> Number:
         """Return a number as it is, anything else as a constant."""
         return (
-            value if isinstance(value, Number) else self._keep("constant", float(value))
+            value
+            if isinstance(value, Number)
+            else self._add_number("constant", float(value))
         )
 
     def apply(self, function: str, *operands: Number) -> Number:
         """Apply a function of one number or two."""
-        values = [own.value for own in operands]
+        values = [operand.value for operand in operands]
         if None in values:
-            return self._keep(function, *operands)
+            return self._add_number(function, *operands)
         return self.number(getattr(np, function)(*values))
 
     def add(self, a: Number, b: Number) -> Number:
@@ -127,16 +129,18 @@ class Record:
         if b.value == 0.0:
             return a
         if b.operation == "negate":
-            return self._keep("subtract", a, b.operands[0])
+            return self._add_number("subtract", a, b.operands[0])
         if a.operation == "negate":
-            return self._keep("subtract", b, a.operands[0])
-        return self._keep("add", *sorted((a, b), key=_place))
+            return self._add_number("subtract", b, a.operands[0])
+        return self._add_number("add", *sorted((a, b), key=_place))
 
     def negate(self, a: Number) -> Number:
         """Change the sign of a number."""
         if a.value is not None:
             return self.number(-a.value)
-        return a.operands[0] if a.operation == "negate" else self._keep("negate", a)
+        return (
+            a.operands[0] if a.operation == "negate" else self._add_number("negate", a)
+        )
 
     def multiply(self, a: Number, b: Number) -> Number:
         """Multiply two numbers."""
@@ -152,7 +156,7 @@ class Record:
             return -self.multiply(a.operands[0], b)
         if b.operation == "negate":
             return -self.multiply(a, b.operands[0])
-        return self._keep("multiply", *sorted((a, b), key=_place))
+        return self._add_number("multiply", *sorted((a, b), key=_place))
 
     def divide(self, a: Number, b: Number) -> Number:
         """Divide a number by another one."""
@@ -160,7 +164,7 @@ class Record:
             return a
         if a.value is not None and b.value:
             return self.number(a.value / b.value)
-        return self._keep("divide", a, b)
+        return self._add_number("divide", a, b)
 
     def gradient(self, output: Number, inputs: np.ndarray) -> list[Number]:
         """Differentiate a number by inputs."""
@@ -169,12 +173,12 @@ class Record:
             slope = slopes.get(number)
             if slope is None or number.operation in ("input", "constant"):
                 continue
-            own = _SLOPES[number.operation](number, *number.operands)
-            for operand, by_operand in zip(number.operands, own, strict=True):
+            partials = _SLOPES[number.operation](number, *number.operands)
+            for operand, by_operand in zip(number.operands, partials, strict=True):
                 term = slope * by_operand
                 slopes[operand] = slopes[operand] + term if operand in slopes else term
-        none = self.number(0.0)
-        return [slopes.get(own, none) for own in inputs.ravel()]
+        zero = self.number(0.0)
+        return [slopes.get(number, zero) for number in inputs.ravel()]
 
 
 _SLOPES: dict[str, Callable[..., tuple[Any, ...]]] = {
@@ -202,13 +206,13 @@ def _make_recordable(function: np.ufunc) -> Callable[..., Any]:
 
     def apply_to_one(*values: Any) -> Any:
         """Record the step if one of the values belongs to a formula, else compute it."""
-        known = [own.record for own in values if isinstance(own, Number)]
-        if not known:
+        records = [value.record for value in values if isinstance(value, Number)]
+        if not records:
             return function(*values)
-        return known[0].apply(function.__name__, *map(known[0].number, values))
+        return records[0].apply(function.__name__, *map(records[0].number, values))
 
     def apply(*values: Any) -> Any:
-        if all(np.asarray(own).dtype != object for own in values):
+        if all(np.asarray(value).dtype != object for value in values):
             return function(*values)
         return np.frompyfunc(apply_to_one, len(values), 1)(*values)
 
@@ -227,7 +231,8 @@ class _Formula(ctypes.Structure):
     """`formula` of motion.h."""
 
     _fields_ = declare_fields(
-        "l first_count second_count constants; p constant; l steps; p step_of; l outputs; p wanted; l together"
+        "l first_count second_count constant_count; p constants; l step_count; p steps; "
+        "l output_count; p outputs; l row_length"
     )
 
 
@@ -240,12 +245,12 @@ class Formula(Structured):
     counts : tuple of int
         Numbers of the inputs, in each argument.
     shape : tuple of int
-        Of what is found at a point.
+        Of the results at a point.
     constants : (c,) ndarray
     steps : (s, 3) int32 ndarray
         Operation and operands, which are counted over inputs, constants and steps.
-    wanted : (o,) int32 ndarray
-        What is found, counted likewise.
+    outputs : (o,) int32 ndarray
+        Indices of the results, counted likewise.
     discards_incomplete : bool
         Whether a row of the last axis becomes NaN throughout if one of its numbers is not finite.
     """
@@ -254,7 +259,7 @@ class Formula(Structured):
     shape: tuple[int, ...]
     constants: np.ndarray
     steps: np.ndarray
-    wanted: np.ndarray
+    outputs: np.ndarray
     discards_incomplete: bool = False
 
     @classmethod
@@ -268,15 +273,17 @@ class Formula(Structured):
         record = Record()
         with np.errstate(all="ignore"):
             results = function(*(record.inputs(count) for count in counts))[0]
-        wanted = [record.number(own) for own in results.flat]
-        own = record.numbers
-        constants = [number for number in own if number.operation == "constant"]
-        done = [number for number in own if number.operation in _CODES]
+        outputs = [record.number(result) for result in results.flat]
+        numbers = record.numbers
+        constants = [number for number in numbers if number.operation == "constant"]
+        computed = [number for number in numbers if number.operation in _CODES]
         place = {
-            number: number.operands[0] for number in own if number.operation == "input"
+            number: number.operands[0]
+            for number in numbers
+            if number.operation == "input"
         }
         place |= {
-            number: sum(counts) + i for i, number in enumerate((*constants, *done))
+            number: sum(counts) + i for i, number in enumerate((*constants, *computed))
         }
         steps = [
             (
@@ -284,17 +291,17 @@ class Formula(Structured):
                 place[number.operands[0]],
                 place[number.operands[-1]],
             )
-            for number in done
+            for number in computed
         ]
-        whole = cls(
+        formula = cls(
             counts,
             results.shape,
             np.array([number.value for number in constants], dtype=float),
             np.array(steps, dtype=np.int32).reshape(-1, 3),
-            np.array([place[number] for number in wanted], dtype=np.int32),
+            np.array([place[number] for number in outputs], dtype=np.int32),
             discards_incomplete,
         )
-        return whole.part(...)
+        return formula.select(...)
 
     @classmethod
     def gradient(
@@ -305,19 +312,19 @@ class Formula(Structured):
         def differentiate(inputs: np.ndarray) -> np.ndarray:
             """Return the slopes at one point, (1, c, count)."""
             record = inputs[0, 0].record
-            values = [record.number(own) for own in function(inputs)[0]]
-            slopes = [record.gradient(own, inputs) for own in values]
+            values = [record.number(value) for value in function(inputs)[0]]
+            slopes = [record.gradient(value, inputs) for value in values]
             return np.array(slopes, dtype=object).reshape(1, len(values), count)
 
         return cls.of(differentiate, count)
 
-    def part(self, index: Any) -> Formula:
-        """Return the formula of a part of what is found at a point; `index` as NumPy takes it."""
-        wanted = np.reshape(self.wanted, self.shape)[index]
+    def select(self, index: Any) -> Formula:
+        """Return the formula of some of the results at a point; `index` as NumPy takes it."""
+        outputs = np.reshape(self.outputs, self.shape)[index]
         inputs = sum(self.counts)
         begin = inputs + len(self.constants)
         needed = np.zeros(begin + len(self.steps), dtype=bool)
-        needed[wanted] = True
+        needed[outputs] = True
         needed[:inputs] = True
         operands = self.steps[:, 1:].tolist()
         for step in range(len(operands) - 1, -1, -1):
@@ -329,28 +336,37 @@ class Formula(Structured):
         constants = self.constants[needed[inputs:begin]]
         return replace(
             self,
-            shape=wanted.shape,
+            shape=outputs.shape,
             constants=constants,
             steps=steps,
-            wanted=place[wanted].ravel(),
+            outputs=place[outputs].ravel(),
         )
 
     def __call__(self, *points: np.ndarray) -> np.ndarray:
         """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
-        given = [as_contiguous(own, (count, size)) for own, size in pairs]
-        found = np.empty((count, *self.shape))
-        first = given[0]
-        second = given[-1]
+        arrays = [as_contiguous(values, (count, size)) for values, size in pairs]
+        results = np.empty((count, *self.shape))
+        first = arrays[0]
+        second = arrays[-1]
         sizes = self.counts
-        name = "brachis_formula"
-        call(name, self.address, count, first, sizes[0], second, sizes[-1], found)
-        return found
+        call(
+            "brachis_formula",
+            self.address,
+            count,
+            first,
+            sizes[0],
+            second,
+            sizes[-1],
+            results,
+        )
+        return results
 
     def _make_structure(self) -> _Formula:
         counts = (*self.counts, 0)[:2]
-        parts = (self.constants, self.steps, self.wanted)
-        sized = [part for own in parts for part in (len(own), address(own))]
-        together = self.shape[-1] if self.discards_incomplete else 0
-        return _Formula(*counts, *sized, together)
+        fields: list[int] = []
+        for array in (self.constants, self.steps, self.outputs):
+            fields += [len(array), address(array)]
+        row_length = self.shape[-1] if self.discards_incomplete else 0
+        return _Formula(*counts, *fields, row_length)

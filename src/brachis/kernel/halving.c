@@ -8,7 +8,7 @@ acceleration jumps, and what a ramp in place of a jump costs, (M - 1). */
 typedef struct {
     long times, joints;
     const double *t, *accelerations, *rate, *jumps, *ramps;
-    long few; /* Times within an interval that are needed to tell whether it is smooth. */
+    long least_times; /* within an interval, to tell whether it is smooth */
 } timing;
 
 typedef struct {
@@ -16,13 +16,13 @@ typedef struct {
 } interval;
 
 /* Number of the first time that is not below a value. */
-static long place(const timing *own, double value)
+static long find_place(const timing *timing, double value)
 {
     long low = 0;
-    long high = own->times;
+    long high = timing->times;
     while (low < high) {
         long middle = low + (high - low) / 2;
-        if (own->t[middle] < value) {
+        if (timing->t[middle] < value) {
             low = middle + 1;
         } else {
             high = middle;
@@ -32,38 +32,38 @@ static long place(const timing *own, double value)
 }
 
 /* What an interval loses: its length times how far accelerations are from linear within it. */
-static double loss(const timing *own, double low, double high)
+static double find_loss(const timing *timing, double low, double high)
 {
-    long first = place(own, low) - 1;
-    long last = place(own, high);
+    long first = find_place(timing, low) - 1;
+    long last = find_place(timing, high);
     first = first < 0 ? 0 : first;
-    last = last < own->times ? last : own->times - 1;
+    last = last < timing->times ? last : timing->times - 1;
     if (last - first < 2) {
         return 0.0;
     }
-    const double *begin = own->accelerations + first * own->joints;
-    const double *end = own->accelerations + last * own->joints;
+    const double *begin = timing->accelerations + first * timing->joints;
+    const double *end = timing->accelerations + last * timing->joints;
     double off = 0.0;
     double slowest = INFINITY;
     double jump = 0.0;
     double late = 0.0;
     for (long k = first; k <= last; k++) {
-        double part = (own->t[k] - own->t[first]) / (own->t[last] - own->t[first]);
-        const double *values = own->accelerations + k * own->joints;
-        for (long i = 0; i < own->joints; i++) {
-            off = fmax(off, fabs(values[i] - (begin[i] + part * (end[i] - begin[i]))));
+        double share = (timing->t[k] - timing->t[first]) / (timing->t[last] - timing->t[first]);
+        const double *values = timing->accelerations + k * timing->joints;
+        for (long i = 0; i < timing->joints; i++) {
+            off = fmax(off, fabs(values[i] - (begin[i] + share * (end[i] - begin[i]))));
         }
-        slowest = fmin(slowest, own->rate[k]);
+        slowest = fmin(slowest, timing->rate[k]);
         if (k < last) {
-            jump = fmax(jump, own->jumps[k]);
-            late = fmax(late, own->ramps[k]);
+            jump = fmax(jump, timing->jumps[k]);
+            late = fmax(late, timing->ramps[k]);
         }
     }
     double length = high - low;
     late *= length;
-    double part_lost = late < slowest ? late / slowest : 1.0;
-    double smooth = last - first + 1 >= own->few ? off - jump : 0.0;
-    return length * fmax(smooth, off * part_lost);
+    double share_lost = late < slowest ? late / slowest : 1.0;
+    double smooth = last - first + 1 >= timing->least_times ? off - jump : 0.0;
+    return length * fmax(smooth, off * share_lost);
 }
 
 static int comes_before(const interval *a, const interval *b)
@@ -76,9 +76,9 @@ static void rise(interval *heap, long count)
 {
     long i = count - 1;
     while (i > 0 && comes_before(&heap[i], &heap[(i - 1) / 2])) {
-        interval own = heap[i];
+        interval risen = heap[i];
         heap[i] = heap[(i - 1) / 2];
-        heap[(i - 1) / 2] = own;
+        heap[(i - 1) / 2] = risen;
         i = (i - 1) / 2;
     }
 }
@@ -98,22 +98,20 @@ static void sink(interval *heap, long count)
         if (!comes_before(&heap[next], &heap[i])) {
             return;
         }
-        interval own = heap[i];
+        interval sunk = heap[i];
         heap[i] = heap[next];
-        heap[next] = own;
+        heap[next] = sunk;
         i = next;
     }
 }
 
-/* Halve `pieces` equal intervals of 0 to 1 until they lose less than `tolerance` together, or are `most`. Those shorter than
-`shortest` stay as they are. For the others see `timing`. `begins` has `room` for two more than the larger of both numbers.
-Returns how many there are, 0 without memory; `begins` is where they begin, in any order. */
+/* Halve `begin_count` equal intervals of 0 to 1 until they lose less than `tolerance` together, or are `max_count`. Those shorter
+than `shortest` stay as they are. `begins` has `room` for two more than the larger of both numbers. Returns how many there are, 0
+without memory; `begins` is where they begin, in any order. */
 long brachis_halve(
-    long times, long joints, const double *t, const double *accelerations, const double *rate, const double *jumps,
-    const double *ramps, long few, long pieces, double tolerance, double shortest, long most, long room, double *begins
+    const timing *timing, long begin_count, double tolerance, double shortest, long max_count, long room, double *begins
 )
 {
-    const timing own = {times, joints, t, accelerations, rate, jumps, ramps, few};
     interval *heap = malloc(room * sizeof(interval));
     if (!heap) {
         return 0;
@@ -121,14 +119,14 @@ long brachis_halve(
     long open = 0;
     long done = 0;
     double lost = 0.0;
-    for (long i = 0; i < pieces; i++) {
-        double low = (double)i / (double)pieces;
-        double high = (double)(i + 1) / (double)pieces;
-        heap[open++] = (interval){loss(&own, low, high), low, high};
+    for (long i = 0; i < begin_count; i++) {
+        double low = (double)i / (double)begin_count;
+        double high = (double)(i + 1) / (double)begin_count;
+        heap[open++] = (interval){find_loss(timing, low, high), low, high};
         lost += heap[open - 1].loss;
         rise(heap, open);
     }
-    while (lost > tolerance && open > 0 && open + done < most) {
+    while (lost > tolerance && open > 0 && open + done < max_count) {
         interval worst = heap[0];
         lost -= worst.loss;
         heap[0] = heap[--open];
@@ -139,8 +137,8 @@ long brachis_halve(
         }
         double middle = 0.5 * (worst.low + worst.high);
         double ends[3] = {worst.low, middle, worst.high};
-        for (int part = 0; part < 2; part++) {
-            heap[open++] = (interval){loss(&own, ends[part], ends[part + 1]), ends[part], ends[part + 1]};
+        for (int half = 0; half < 2; half++) {
+            heap[open++] = (interval){find_loss(timing, ends[half], ends[half + 1]), ends[half], ends[half + 1]};
             lost += heap[open - 1].loss;
             rise(heap, open);
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import compute
+from brachis.kernel.library import call_checked
 
 
 def halve_intervals(
@@ -14,11 +14,11 @@ def halve_intervals(
     jumps: np.ndarray,
     ramps: np.ndarray,
     *,
-    few: int,
-    pieces: int,
+    least_times: int,
+    begin_count: int,
     tolerance: float,
     shortest: float,
-    most: int,
+    max_count: int,
 ) -> np.ndarray:
     """Halve intervals of 0 to 1, those first that lose most.
 
@@ -33,15 +33,15 @@ def halve_intervals(
         dp/dt there.
     jumps, ramps : (M - 1,) ndarray
         How much of an acceleration jumps between two times, and what a ramp in its place costs a unit of length.
-    few : int
+    least_times : int
         Times within an interval that are needed to tell whether it is smooth.
-    pieces : int
+    begin_count : int
         Equal intervals that are halved.
     tolerance : float
         What all intervals together may lose.
     shortest : float
         Length below which they are not halved.
-    most : int
+    max_count : int
         Number of intervals with which halving ends.
 
     Returns
@@ -49,8 +49,19 @@ def halve_intervals(
     (N,) ndarray
         Where they begin, ascending.
     """
-    timing = (t, accelerations, rate, jumps, ramps, few)
-    sizes = {"S": len(t) - 1, "B": max(most, pieces) + 2}
-    ends = (pieces, tolerance, shortest, most)
-    count, begins = compute("brachis_halve", *timing, *ends, **sizes)
+    count, begins = call_checked(
+        "brachis_halve",
+        t,
+        accelerations,
+        rate,
+        jumps,
+        ramps,
+        least_times,
+        begin_count,
+        tolerance,
+        shortest,
+        max_count,
+        S=len(t) - 1,
+        B=max(max_count, begin_count) + 2,
+    )
     return np.sort(begins[:count])

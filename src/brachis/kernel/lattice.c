@@ -1,9 +1,9 @@
 /* What lattices compute for every step. */
 #include <math.h>
 
-/* Largest sizes, (E), of the parts A step, with rows A, (K, c, n), of the posture where each step, (E, n), begins. */
-void brachis_largest_parts(
-    long steps, long values, long n, const double *rows, const long *origin, const double *step, double *found
+/* Largest sizes, (E), of the numbers A step, with rows A, (K, c, n), of the posture where each step, (E, n), begins. */
+void brachis_largest_products(
+    long steps, long values, long n, const double *rows, const long *origin, const double *step, double *sizes
 )
 {
     for (long e = 0; e < steps; e++) {
@@ -17,6 +17,6 @@ void brachis_largest_parts(
             double size = fabs(sum);
             largest = size > largest || isnan(size) ? size : largest;
         }
-        found[e] = largest;
+        sizes[e] = largest;
     }
 }

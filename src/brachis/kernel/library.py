@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import struct
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
@@ -31,36 +32,37 @@ FUNCTIONS = {
     "brachis_torque_derivatives": "- p K [Kn] [Kn] [Kn] >[Knn] >[Knn] >[Knn]",
     "brachis_mass_matrices": "- p K [Kn] >[Knn]",
     "brachis_tool": "- p K [Kn] i >[K3] >[K33] >[6Kn]",
-    "brachis_tool_derivatives": "- K n [6Kn] [Kn] [Kn] i >[6Kn] >[6Kn] >[6Kn]",
+    "brachis_tool_derivatives": "- K n [6Kn] [Kn] [Kn] i >[36Kn]",
     "brachis_tool_sizes": "- p K i [Kn] [Kn] [Kn] p >[K]",
     "brachis_logarithms": "- K [K33] >[K3]",
     "brachis_bounds_of_pairs": "- P c [Pc] [Pc] [Pc] d >[P] >[P]",
-    "brachis_go_backwards": "i P c [Sc] [Sc] [Sc] [S] [S] d d d >[P] >[P]",
+    "brachis_go_backwards": "i {P c [Sc] [Sc] [Sc]} [S] [S] d d d >[P] >[P]",
     "brachis_go_forwards": "- P c [Sc] [Sc] [P] [P] d >[P]",
     "brachis_rotations": "- m K [mK4] >[mK33]",
     "brachis_body_twists": "- m K [mKw] >[rK6]",
-    "brachis_newton": "- p p K z [Kz] [Kn] r p l n [Kr] i >[Kn]",
-    "brachis_halve": "l M n [M] [Mn] [M] [S] [S] l l d d l B >[B]",
+    "brachis_newton": "- {p p K z [Kz] [Kn] r p l n [Kr] l} >[Kn]",
+    "brachis_halve": "l {M n [M] [Mn] [M] [S] [S] l} l d d l B >[B]",
     "brachis_postures": "- p",
     "brachis_evaluate": "i p",
     "brachis_path_derivatives": "- p",
     "brachis_least_singular": "- K n [Knn] >[K] >[Kn]",
     "brachis_singular_slopes": "- p [K] [Kn] >[Kn] >[K]",
     "brachis_entries": "- K v c [oKvc] p >[ev]",
-    "brachis_differentiate": "- l l l p p p l p l l p p p",
+    "brachis_differentiate": "- {l l l l l l} p p p p p p p",
     "brachis_values": "- l l p l p p",
-    "brachis_largest_parts": "- E c n [Kcn] l[E] [En] >[E]",
+    "brachis_largest_products": "- E c n [Kcn] l[E] [En] >[E]",
     "brachis_solve_band": "- l l l p p",
     "brachis_blossoms": "- K g c [k] [Lc] l[K] [gK] >[Kc]",
-    "brachis_spline_orders": "- o K g c L [k] [Lc] [K] d >[oKc]",
+    "brachis_spline_orders": "- o K {g L c [k] [Lc]} [K] d >[oKc]",
     "brachis_bernstein": "- K w L n [wLn] l[K] [K] >[Kn]",
-    "brachis_curves": "- l l l l l p p p p",
+    "brachis_curves": "- p l l p p",
     "brachis_formula": "- p l p l p l p",
 }
 """What functions return and take: pointer, long, double, int, or nothing.
 
 An array has its shape in brackets: a letter is a size, a digit a number. Arrays behind ``>`` are written to; arrays
-behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size.
+behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size. What is in braces are fields
+of a structure, of which the function gets the address; an ``i`` cannot be a field.
 """
 _DOUBLE = np.dtype(np.float64)
 WHOLE = np.dtype("l")
@@ -69,7 +71,7 @@ WHOLE = np.dtype("l")
 
 def _split(word: str) -> tuple[str, str]:
     """Split the declaration of an argument into its kind and the letters of its shape."""
-    kind, _, letters = word.rstrip("]").partition("[")
+    kind, _, letters = word.strip("{]}").partition("[")
     return kind, letters
 
 
@@ -78,6 +80,22 @@ _ARGUMENTS = {
     for name, words in FUNCTIONS.items()
 }
 _DIGITS = {str(digit): digit for digit in range(10)}
+
+
+def _lay_out_structure(name: str) -> tuple[slice, struct.Struct]:
+    """Return which arguments of a function are the fields of a structure, and their layout there."""
+    before, _, braced = FUNCTIONS[name].partition("{")
+    begin = len(before.split()) - 1
+    fields = slice(begin, begin + len(braced.partition("}")[0].split()))
+    layout = ""
+    for kind, letters in _ARGUMENTS[name][fields]:
+        layout += "P" if letters or kind == "p" else "d" if kind == "d" else "l"
+    return fields, struct.Struct(layout)
+
+
+_STRUCTURES = {
+    name: _lay_out_structure(name) for name in FUNCTIONS if "{" in FUNCTIONS[name]
+}
 
 
 def declare_fields(declaration: str) -> list[tuple[str, Any]]:
@@ -120,16 +138,19 @@ def _open(path: Path) -> ctypes.CDLL:
     except OSError as error:  # missing, or of another kind of machine
         raise NotBuiltError(str(error), SCRIPT) from error
     library.brachis_source.restype = ctypes.c_char_p
-    found = library.brachis_source().decode()
-    if found != source_digest():
+    if library.brachis_source().decode() != source_digest():
         raise NotBuiltError(f"{path.name} was made of other source", SCRIPT)
     for name, declaration in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype = _KINDS[declaration[0]]
-        function.argtypes = [
+        types = [
             _KINDS["p"] if letters else _KINDS.get(kind, ctypes.c_long)
             for kind, letters in _ARGUMENTS[name]
         ]
+        if name in _STRUCTURES:
+            fields, _ = _STRUCTURES[name]
+            types[fields] = [_KINDS["p"]]
+        function.argtypes = types
     return library
 
 
@@ -143,16 +164,19 @@ def address(values: np.ndarray) -> int:
 
 
 def call(name: str, *arguments: Any) -> Any:
-    """Call a function of the library; of contiguous arrays it gets the addresses."""
+    """Call a function of the library; of contiguous arrays, and of a structure, it gets the addresses."""
     plain = [
         address(value) if isinstance(value, np.ndarray) else value
         for value in arguments
     ]
+    if name in _STRUCTURES:
+        fields, layout = _STRUCTURES[name]
+        plain[fields] = [layout.pack(*plain[fields])]
     return getattr(load(), name)(*plain)
 
 
-def compute(name: str, *arguments: Any, **sizes: int) -> Any:
-    """Call a function of the library with arrays of the shapes that are declared, and make room for what it writes.
+def call_checked(name: str, *arguments: Any, **sizes: int) -> Any:
+    """Call a function of the library after a check of the shapes of arrays, and make room for what it writes.
 
     Parameters
     ----------
@@ -173,11 +197,13 @@ def compute(name: str, *arguments: Any, **sizes: int) -> Any:
         See `as_contiguous`.
     """
     shapes = tuple([getattr(value, "shape", None) for value in arguments])
-    found = _find_shapes(name, shapes, tuple(sizes.items()))
-    pairs = zip(arguments, found.taken, strict=True)
-    taken = iter([as_contiguous(value, *own) if own else value for value, own in pairs])
-    written = [np.empty(shape) for shape in found.written]
-    values = [next(taken) if size is None else size for size in found.sizes]
+    call_shapes = _resolve_shapes(name, shapes, tuple(sizes.items()))
+    pairs = zip(arguments, call_shapes.taken, strict=True)
+    taken = iter(
+        [as_contiguous(value, *form) if form else value for value, form in pairs]
+    )
+    written = [np.empty(shape) for shape in call_shapes.written]
+    values = [next(taken) if size is None else size for size in call_shapes.sizes]
     returned = call(name, *values, *written)
     results = written if FUNCTIONS[name][0] == "-" else [returned, *written]
     return results[0] if len(results) == 1 else results
@@ -202,12 +228,12 @@ class _CallShapes(NamedTuple):
 
 
 @lru_cache(maxsize=4096)
-def _find_shapes(
+def _resolve_shapes(
     name: str,
     shapes: tuple[tuple[int, ...] | None, ...],
     sizes: tuple[tuple[str, int], ...],
 ) -> _CallShapes:
-    """Find what the shapes of arguments say of a function's sizes and of what it writes."""
+    """Derive a function's sizes, and the shapes of what it writes, from the shapes of its arguments."""
     known = _DIGITS | dict(sizes)
     words = _ARGUMENTS[name]
     inputs = [word for word in words if word[0] in ("", *_KINDS)]
@@ -230,7 +256,9 @@ def _find_shapes(
 
 def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
     """Return the shape that letters and digits stand for."""
-    return tuple(sizes[own] if own in sizes else int(own) for own in letters)
+    return tuple(
+        sizes[letter] if letter in sizes else int(letter) for letter in letters
+    )
 
 
 class Structured:
@@ -245,11 +273,11 @@ class Structured:
     @property
     def structure(self) -> Any:
         """What the library reads."""
-        kept = vars(self)
-        if "_structure" not in kept:
+        attributes = vars(self)
+        if "_structure" not in attributes:
             # Threads that ask together get the same one.
-            kept.setdefault("_structure", self._make_structure())
-        return kept["_structure"]
+            attributes.setdefault("_structure", self._make_structure())
+        return attributes["_structure"]
 
     @property
     def address(self) -> int:
@@ -278,10 +306,10 @@ def as_contiguous(
             return values
     elif np.iscomplexobj(values):
         raise TypeError("an array is complex; needed: real numbers")
-    found = np.ascontiguousarray(values, dtype=dtype)
-    if found.shape != shape:
-        raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")
-    return found
+    array = np.ascontiguousarray(values, dtype=dtype)
+    if array.shape != shape:
+        raise ValueError(f"an array has the shape {array.shape}; needed: {shape}")
+    return array
 
 
 def as_doubles_at_points(

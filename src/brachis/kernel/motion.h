@@ -5,22 +5,22 @@
 
 #include "tool.h"
 
-/* A formula of one or two arguments, with `counts` numbers each; see formula.py. Numbers are the arguments, then the constants,
-then what each step gives; of them `wanted` are found. They come in groups of `together`: a group with a number that is not
-finite becomes NaN throughout; 0 turns this off. */
+/* A formula of one or two arguments, with `input_counts` numbers each; see formula.py. Numbers are the inputs, then the
+constants, then what each step gives; `outputs` are indices of those that the formula returns. They come in rows of `row_length`: a
+row with a number that is not finite becomes NaN throughout; 0 turns this off. */
 typedef struct {
     int operation, first, second;
 } step;
 
 typedef struct {
-    long counts[2];
-    long constants;
-    const double *constant;
-    long steps;
-    const step *step_of;
-    long outputs;
-    const int *wanted;
-    long together;
+    long input_counts[2];
+    long constant_count;
+    const double *constants;
+    long step_count;
+    const step *steps;
+    long output_count;
+    const int *outputs;
+    long row_length;
 } formula;
 
 /* A branch of a closed form; see postures.py. m joints follow from the target and the r redundant ones. */
@@ -28,7 +28,7 @@ typedef struct {
     const formula *answers_of; /* of target and redundant joints; null where the answers are given */
     long alternatives;         /* A answers of a branch, of which continuity chooses one */
     const long *redundant;     /* (r) */
-    const long *others;        /* (m) */
+    const long *nonredundant;  /* (m) */
     const double *turns;       /* (n): 1 for a joint whose turns are counted */
     const double *ranged;      /* (n): 1 for one that has a finite range: its turns must be certain */
     const double *start;       /* (n): the first posture is in the turns nearest to this one */
@@ -38,8 +38,8 @@ typedef struct {
 joints, and J_aug has the m rows of the task Jacobian, then C. Curves are c = 1 + r. */
 typedef struct {
     const chain *arm;
-    const prescribed *asked;
-    const branch *by;                  /* null in a chart, or where q is given */
+    const prescribed *task;
+    const branch *branch;              /* null in a chart, or where q is given */
     long count;                        /* K */
     long rows_step;                    /* from the rows of one point to those of the next, in doubles; 0 if all points share them */
     double side;                       /* sign that det J_aug must have; 0: either */
@@ -47,7 +47,7 @@ typedef struct {
     const double *targets;             /* (K, coordinates) */
     const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
     const double *rows;                /* (r, n + 1): C and p, at every point */
-    const double *turning;             /* (3, K, r, n + 1): derivatives of C and p by s; null where they vanish */
+    const double *row_derivatives;     /* (3, K, r, n + 1): derivatives of C and p by s; null where they vanish */
     const double *reference;           /* (K, n + r + n r): of a chart, see postures.c; null without one */
     const double *t;                   /* (K): times, by which turns are counted; null: turns are the nearest ones */
     const double *near;                /* (K, n): postures known to be near, which decide about turns; null without them */
@@ -98,24 +98,35 @@ typedef struct {
     const formula *values_of, *slopes_of;
     partial by[4];
     const double *by_s;
-} group;
+} value_group;
+
+/* Postures that Newton's method looks for; see newton.c. They meet targets, and the linear conditions C q = levels. */
+typedef struct {
+    const chain *arm;
+    const prescribed *task;
+    long count, coordinates; /* K */
+    const double *targets;   /* (K, coordinates) */
+    const double *starts;    /* (K, n) */
+    long conditions;         /* r */
+    const double *rows;      /* C */
+    long rows_step;          /* from the rows of one point to those of the next, in doubles; 0 if all points share them */
+    long row_width;          /* from one row of C to the next */
+    const double *levels;    /* (K, r) */
+    long beside;             /* 1: the starts are near; see newton.c */
+} posture_search;
 
 /* What the functions of one file ask of another's. */
 void brachis_torques(
-    const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *found
+    const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *torques
 );
 void brachis_torque_slopes(
     const chain *arm, long count, long width, const double **states, const motion_slopes *motion
 );
 void brachis_formula(
-    const formula *own, long count, const double *first, long first_step, const double *second, long second_step,
-    double *found
+    const formula *formula, long count, const double *first, long first_step, const double *second, long second_step,
+    double *results
 );
-void brachis_newton(
-    const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
-    const double *starts, long conditions, const double *rows, long rows_step, long row_width, const double *levels,
-    int beside, double *found
-);
-void brachis_path_motion(path_motion *own);
+void brachis_newton(const posture_search *search, double *postures);
+void brachis_path_motion(path_motion *motion);
 
 #endif

@@ -11,7 +11,7 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.library import (
     Structured,
     as_doubles_at_points,
-    compute,
+    call_checked,
     declare_fields,
 )
 
@@ -88,8 +88,18 @@ def find_postures(
     rows, levels = conditions
     free = chain.n - prescribed.count
     table, step = as_doubles_at_points(rows, (len(starts), free, chain.n))
-    own = (chain.address, prescribed.address)
-    sizes = {"z": prescribed.coordinates, "r": free, "n": chain.n}
-    arrays = (targets, starts, table, step, levels)
-    postures: np.ndarray = compute("brachis_newton", *own, *arrays, beside, **sizes)
+    postures: np.ndarray = call_checked(
+        "brachis_newton",
+        chain.address,
+        prescribed.address,
+        targets,
+        starts,
+        table,
+        step,
+        levels,
+        beside,
+        z=prescribed.coordinates,
+        r=free,
+        n=chain.n,
+    )
     return postures

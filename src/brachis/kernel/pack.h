@@ -64,12 +64,12 @@ static inline vec cross(vec a, vec b)
 /* One column of LANES rows of a table, (rows, columns), from `row` on; beyond its end the last row again. */
 static inline pack gather(const double *table, long rows, long columns, long row, long column)
 {
-    pack found;
+    pack values;
     for (int lane = 0; lane < LANES; lane++) {
-        long own = row + lane < rows ? row + lane : rows - 1;
-        found[lane] = table[own * columns + column];
+        long nearest = row + lane < rows ? row + lane : rows - 1;
+        values[lane] = table[nearest * columns + column];
     }
-    return found;
+    return values;
 }
 
 /* Write a pack into one column of a table; lanes beyond its end are dropped. */

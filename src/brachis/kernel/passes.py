@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.kernel.library import compute
+from brachis.kernel.library import call_checked
 
 
 def bounds_of_pairs(
@@ -23,11 +23,13 @@ def bounds_of_pairs(
 
     Returns
     -------
-    least, most : (P,) ndarray
+    floor, ceiling : (P,) ndarray
         The largest x is -1 where parallel lines leave nothing between them.
     """
-    least, most = compute("brachis_bounds_of_pairs", slope, lower, upper, parallel)
-    return least, most
+    floor, ceiling = call_checked(
+        "brachis_bounds_of_pairs", slope, lower, upper, parallel
+    )
+    return floor, ceiling
 
 
 def go_backwards(
@@ -43,7 +45,7 @@ def go_backwards(
     Parameters
     ----------
     steps : three (P - 1, c) ndarrays
-        Factor, least and most: the next x is ``factor x + least`` to ``factor x + most``.
+        Factor, lower and upper: the next x is ``factor x + lower`` to ``factor x + upper``.
     levels : tuple of (P - 1,) ndarray
         The least and the largest x at all stations but the last.
     last : float
@@ -59,21 +61,20 @@ def go_backwards(
         None if an interval is empty.
     """
     count = len(steps[0]) + 1
-    ends = (last, flat, rounding)
-    reached, low, high = compute(
-        "brachis_go_backwards", *steps, *levels, *ends, P=count
+    reached, low, high = call_checked(
+        "brachis_go_backwards", *steps, *levels, last, flat, rounding, P=count
     )
     return (low, high) if reached else None
 
 
 def go_forwards(
     factor: np.ndarray,
-    most: np.ndarray,
+    upper: np.ndarray,
     within: tuple[np.ndarray, np.ndarray],
     first: float,
 ) -> np.ndarray:
     """Find the largest x, (P,), from the first station on, within intervals, (P,) each; see `go_backwards`."""
-    x: np.ndarray = compute(
-        "brachis_go_forwards", factor, most, *within, first, P=len(factor) + 1
+    x: np.ndarray = call_checked(
+        "brachis_go_forwards", factor, upper, *within, first, P=len(factor) + 1
     )
     return x

@@ -5,9 +5,9 @@
 
 static inline void swap_lane(pack *a, pack *b, int lane)
 {
-    double kept = (*a)[lane];
+    double number = (*a)[lane];
     (*a)[lane] = (*b)[lane];
-    (*b)[lane] = kept;
+    (*b)[lane] = number;
 }
 
 /* Invert matrices, (n, n), in place by elimination with pivots (Gauss, Jordan); returns their determinants, 0 or NaN where they
@@ -19,13 +19,18 @@ static pack invert(long n, pack *A)
     for (long i = 0; i < n; i++) {
         for (int lane = 0; lane < LANES; lane++) {
             long pivot = i;
+            double largest = fabs(A[i * n + i][lane]);
             for (long row = i + 1; row < n; row++) {
-                pivot = fabs(A[row * n + i][lane]) > fabs(A[pivot * n + i][lane]) ? row : pivot;
+                double size = fabs(A[row * n + i][lane]);
+                pivot = size > largest ? row : pivot;
+                largest = size > largest ? size : largest;
             }
             swaps[i * LANES + lane] = pivot;
-            determinants[lane] *= pivot == i ? 1.0 : -1.0;
-            for (long j = 0; j < n && pivot != i; j++) {
-                swap_lane(&A[i * n + j], &A[pivot * n + j], lane);
+            if (pivot != i) {
+                determinants[lane] = -determinants[lane];
+                for (long j = 0; j < n; j++) {
+                    swap_lane(&A[i * n + j], &A[pivot * n + j], lane);
+                }
             }
         }
         determinants *= A[i * n + i];
@@ -35,9 +40,13 @@ static pack invert(long n, pack *A)
             A[i * n + j] *= inverse;
         }
         for (long row = 0; row < n; row++) {
+            if (row == i) {
+                continue;
+            }
             pack factor = A[row * n + i];
-            for (long j = 0; j < n && row != i; j++) {
-                A[row * n + j] = (j == i ? all(0.0) : A[row * n + j]) - factor * A[i * n + j];
+            A[row * n + i] = all(0.0);
+            for (long j = 0; j < n; j++) {
+                A[row * n + j] -= factor * A[i * n + j];
             }
         }
     }
@@ -66,184 +75,274 @@ static void read_rows(const double *table, long count, long r, long n, long k, p
     }
 }
 
-/* The motion in postures q. */
-void brachis_path_motion(path_motion *own)
+/* Sizes of a motion, and the parts of the tool's motion that are prescribed. */
+typedef struct {
+    long count, n, m, r, c;
+    selection parts;
+} sizes;
+
+static inline sizes sizes_of(const path_motion *motion)
 {
-    const chain *arm = own->arm;
-    const prescribed *asked = own->asked;
-    long count = own->count;
-    long n = arm->joints;
-    const selection chosen = select_parts(asked);
-    long m = chosen.count;
-    long r = n - m;
-    long c = 1 + r;
+    long n = motion->arm->joints;
+    const selection parts = select_parts(motion->task);
+    long r = n - parts.count;
+    return (sizes){motion->count, n, parts.count, r, 1 + r, parts};
+}
+
+/* e = C' q - p', e' = C'' q - p'', and so on */
+static void write_drift(path_motion *motion, const sizes *of, long k, const pack *q)
+{
+    long r = of->r;
+    long width = of->n + 1;
+    for (long i = 0; i < 3 * r; i++) {
+        const double *table = motion->row_derivatives + i / r * of->count * r * width;
+        pack row[width];
+        for (long j = 0; j < width; j++) {
+            row[j] = gather(table, of->count, r * width, k, i % r * width + j);
+        }
+        pack drift = inner_product(row, q, of->n) - row[of->n];
+        scatter(drift, motion->drift + i / r * of->count * r, of->count, r, k, i % r);
+    }
+}
+
+/* Write the parts of a twist that are prescribed into column i of a matrix with n columns. */
+static inline void write_parts(const twist *a, const selection *chosen, long n, long i, pack *matrix)
+{
+    for (long row = 0; row < chosen->count; row++) {
+        matrix[row * n + i] = chosen_part(a, chosen, row);
+    }
+}
+
+/* J_aug, (n, n), with these columns of the tool's Jacobian. */
+static void read_augmented(const path_motion *motion, const sizes *of, long k, const twist *columns, pack *J_aug)
+{
+    long n = of->n;
+    for (long i = 0; i < n; i++) {
+        write_parts(&columns[i], &of->parts, n, i, J_aug);
+    }
+    pack *C = J_aug + of->m * n;
+    for (long i = 0; i < of->r * n; i++) {
+        long at = i + i / n;
+        C[i] = motion->rows_step ? gather(motion->rows, of->count, motion->rows_step, k, at) : all(motion->rows[at]);
+    }
+}
+
+/* G = J_aug^-1 [xi, 0; -e, 1] */
+static void find_gradient(const path_motion *motion, const sizes *of, long k, const pack *inverse, pack *G)
+{
+    long n = of->n;
+    pack right[n];
+    read_block(motion->xi, of->count, of->m, k, right);
+    for (long i = 0; i < of->r; i++) {
+        right[of->m + i] = motion->row_derivatives ? -gather(motion->drift, of->count, of->r, k, i) : all(0.0);
+    }
+    for (long i = 0; i < n; i++) {
+        G[i * of->c] = inner_product(inverse + i * n, right, n);
+        for (long j = 0; j < of->r; j++) {
+            G[i * of->c + 1 + j] = inverse[i * n + of->m + j];
+        }
+    }
+}
+
+/* (xi_ds sdot^2 - Jdot qdot; -2 C' qdot sdot - e' sdot^2) */
+static void find_right(
+    const path_motion *motion, const sizes *of, long k, const twist *columns, const pack *qdot, pack sdot, pack *right
+)
+{
+    long n = of->n;
+    twist bias = bias_of(n, columns, qdot, motion->task->in_tool_axes != 0);
+    for (long row = 0; row < of->m; row++) {
+        pack acceleration = gather(motion->xi_ds, of->count, of->m, k, row) * sdot * sdot;
+        right[row] = acceleration - chosen_part(&bias, &of->parts, row);
+    }
+    if (!motion->row_derivatives) {
+        set_zero(right + of->m, of->r);
+        return;
+    }
+    pack C_s[of->r > 0 ? of->r * n : 1];
+    read_rows(motion->row_derivatives, of->count, of->r, n, k, C_s);
+    for (long i = 0; i < of->r; i++) {
+        pack e_s = gather(motion->drift + of->count * of->r, of->count, of->r, k, i);
+        right[of->m + i] = -sdot * (2.0 * inner_product(C_s + i * n, qdot, n) + e_s * sdot);
+    }
+}
+
+/* The motion in postures q: qdot = G ydot, and qddot = G yddot + J_aug^-1 right. */
+void brachis_path_motion(path_motion *motion)
+{
+    const sizes of = sizes_of(motion);
+    long count = of.count;
+    long n = of.n;
+    long c = of.c;
     for (long k = 0; k < count; k += LANES) {
         twist columns[n];
-        pack posture[n], inverse[n * n], G[n * c], rate[n], more[n], right[n], ydot[c], yddot[c];
-        read_block(own->q, count, n, k, posture);
-        read_block(own->ydot, count, c, k, ydot);
-        read_block(own->yddot, count, c, k, yddot);
-        place_tool(arm, posture, asked->in_tool_axes != 0, columns);
-        for (long i = 0; i < r * n; i++) {
-            long at = i + i / n;
-            inverse[m * n + i] = own->rows_step ? gather(own->rows, count, own->rows_step, k, at) : all(own->rows[at]);
-        }
-        /* e = C' q - p', e' = C'' q - p'', and so on */
-        for (long i = 0; i < 3 * r && own->turning; i++) {
-            const double *table = own->turning + i / r * count * r * (n + 1);
-            pack row[n + 1];
-            for (long j = 0; j <= n; j++) {
-                row[j] = gather(table, count, r * (n + 1), k, i % r * (n + 1) + j);
-            }
-            pack drift = inner_product(row, posture, n) - row[n];
-            scatter(drift, own->drift + i / r * count * r, count, r, k, i % r);
-        }
+        pack q[n], inverse[n * n], G[n * c], qdot[n], qddot[n], right[n], ydot[c], yddot[c];
+        read_block(motion->q, count, n, k, q);
+        read_block(motion->ydot, count, c, k, ydot);
+        read_block(motion->yddot, count, c, k, yddot);
+        place_tool(motion->arm, q, motion->task->in_tool_axes != 0, columns);
         for (long i = 0; i < n; i++) {
-            write_twist(columns[i], own->twists, count, n, k, i);
-            for (long row = 0; row < m; row++) {
-                inverse[row * n + i] = chosen_part(&columns[i], &chosen, row);
-            }
+            write_twist(columns[i], motion->twists, count, n, k, i);
         }
-        scatter(invert(n, inverse), own->determinants, count, 1, k, 0);
-        write_block(inverse, own->inverses, count, n * n, k);
+        if (motion->row_derivatives) {
+            write_drift(motion, &of, k, q);
+        }
+        read_augmented(motion, &of, k, columns, inverse);
+        scatter(invert(n, inverse), motion->determinants, count, 1, k, 0);
+        find_gradient(motion, &of, k, inverse, G);
+        for (long i = 0; i < n; i++) {
+            qdot[i] = inner_product(G + i * c, ydot, c);
+        }
+        find_right(motion, &of, k, columns, qdot, ydot[0], right);
+        for (long i = 0; i < n; i++) {
+            qddot[i] = inner_product(G + i * c, yddot, c) + inner_product(inverse + i * n, right, n);
+        }
+        write_block(inverse, motion->inverses, count, n * n, k);
+        write_block(G, motion->gradients, count, n * c, k);
+        write_block(qdot, motion->qdot, count, n, k);
+        write_block(qddot, motion->qddot, count, n, k);
+    }
+}
 
-        /* G = J_aug^-1 [xi, 0; -e, 1] */
-        read_block(own->xi, count, m, k, right);
-        for (long i = 0; i < r; i++) {
-            right[m + i] = own->turning ? -gather(own->drift, count, r, k, i) : all(0.0);
-        }
-        for (long i = 0; i < n; i++) {
-            G[i * c] = inner_product(inverse + i * n, right, n);
-            for (long j = 0; j < r; j++) {
-                G[i * c + 1 + j] = inverse[i * n + m + j];
-            }
-            rate[i] = inner_product(G + i * c, ydot, c);
-        }
+/* What derivatives at LANES points are made of: `changing` conditions, 0 or r, change along the path. V_q, A_q and A_v, (m, n),
+are derivatives of the tool's velocity and acceleration; C', C'', e' and e'' those of the conditions. */
+typedef struct {
+    long n, m, c, changing;
+    const pack *G, *qdot, *qddot, *xi_ds, *xi_dds, *V_q, *A_q, *A_v, *C_s, *C_ss, *e_s, *e_ss;
+    pack sdot, sddot;
+} terms;
 
-        /* qddot = G yddot + J_aug^-1 (xi_ds sdot^2 - Jdot qdot; -2 C' qdot sdot - e' sdot^2) */
-        twist bias = bias_of(n, columns, rate, asked->in_tool_axes != 0);
-        pack sdot = ydot[0];
-        for (long row = 0; row < m; row++) {
-            pack wanted = gather(own->xi_ds, count, m, k, row) * sdot * sdot;
-            right[row] = wanted - chosen_part(&bias, &chosen, row);
-        }
-        pack C_s[r > 0 ? r * n : 1];
-        if (own->turning) {
-            read_rows(own->turning, count, r, n, k, C_s);
-        }
-        for (long i = 0; i < r; i++) {
-            right[m + i] = all(0.0);
-            if (own->turning) {
-                pack drift = gather(own->drift + count * r, count, r, k, i);
-                right[m + i] = -sdot * (2.0 * inner_product(C_s + i * n, rate, n) + drift * sdot);
+/* (-V_q G + [xi_ds sdot, 0];  -C' G sdot - [C' qdot + e' sdot, 0]) */
+static void find_right_qdot_y(const terms *of, pack *right)
+{
+    long n = of->n;
+    long m = of->m;
+    long c = of->c;
+    set_zero(right, m * c);
+    for (long row = 0; row < m; row++) {
+        right[row * c] = of->xi_ds[row] * of->sdot;
+    }
+    multiply(of->V_q, n, of->G, m, n, c, SUBTRACT, right);
+    for (long i = 0; i < of->changing; i++) {
+        for (long j = 0; j < c; j++) {
+            pack sum = all(0.0);
+            for (long l = 0; l < n; l++) {
+                sum += of->C_s[i * n + l] * of->G[l * c + j];
             }
+            right[(m + i) * c + j] = -sum * of->sdot;
         }
-        for (long i = 0; i < n; i++) {
-            more[i] = inner_product(G + i * c, yddot, c) + inner_product(inverse + i * n, right, n);
+        right[(m + i) * c] -= inner_product(of->C_s + i * n, of->qdot, n) + of->e_s[i] * of->sdot;
+    }
+}
+
+/* (-A_v G + [2 xi_ds sdot, 0];  twice the rows above, which are in their place) */
+static void find_right_qddot_ydot(const terms *of, pack *right)
+{
+    long m = of->m;
+    long c = of->c;
+    set_zero(right, m * c);
+    for (long row = 0; row < m; row++) {
+        right[row * c] = 2.0 * of->xi_ds[row] * of->sdot;
+    }
+    multiply(of->A_v, of->n, of->G, m, of->n, c, SUBTRACT, right);
+    for (long i = m * c; i < (m + of->changing) * c; i++) {
+        right[i] *= 2.0;
+    }
+}
+
+/* (-A_q G - A_v dqdot/dy + [xi_dds sdot^2 + xi_ds sddot, 0];
+    -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0]) */
+static void find_right_qddot_y(const terms *of, const pack *qdot_y, pack *right)
+{
+    long n = of->n;
+    long m = of->m;
+    long c = of->c;
+    pack sdot = of->sdot;
+    pack sddot = of->sddot;
+    set_zero(right, m * c);
+    for (long row = 0; row < m; row++) {
+        right[row * c] = of->xi_dds[row] * sdot * sdot + of->xi_ds[row] * sddot;
+    }
+    multiply(of->A_q, n, of->G, m, n, c, SUBTRACT, right);
+    multiply(of->A_v, n, qdot_y, m, n, c, SUBTRACT, right);
+    for (long i = 0; i < of->changing; i++) {
+        const pack *C_s = of->C_s + i * n;
+        const pack *C_ss = of->C_ss + i * n;
+        pack C_t[n], C_tt[n];
+        for (long l = 0; l < n; l++) {
+            C_t[l] = 2.0 * sdot * C_s[l];
+            C_tt[l] = C_ss[l] * sdot * sdot + C_s[l] * sddot;
         }
-        write_block(G, own->gradients, count, n * c, k);
-        write_block(rate, own->qdot, count, n, k);
-        write_block(more, own->qddot, count, n, k);
+        for (long j = 0; j < c; j++) {
+            pack sum = all(0.0);
+            for (long l = 0; l < n; l++) {
+                sum += C_t[l] * qdot_y[l * c + j] + C_tt[l] * of->G[l * c + j];
+            }
+            right[(m + i) * c + j] = -sum;
+        }
+        pack by_s = inner_product(C_s, of->qddot, n) + 2.0 * sdot * inner_product(C_ss, of->qdot, n);
+        right[(m + i) * c] -= by_s + of->e_ss[i] * sdot * sdot + of->e_s[i] * sddot;
+    }
+}
+
+/* V_q, A_q and A_v of LANES points, (m, n) each. */
+static void differentiate_task(
+    const path_motion *motion, const sizes *of, long k, const pack *qdot, const pack *qddot, pack *V_q, pack *A_q, pack *A_v
+)
+{
+    long n = of->n;
+    twist columns[n], slopes[n], by_q[n], by_qdot[n];
+    for (long i = 0; i < n; i++) {
+        columns[i] = read_twist(motion->twists, of->count, n, k, i);
+    }
+    differentiate_tool(n, columns, qdot, qddot, motion->task->in_tool_axes != 0, slopes, by_q, by_qdot);
+    for (long i = 0; i < n; i++) {
+        write_parts(&slopes[i], &of->parts, n, i, V_q);
+        write_parts(&by_q[i], &of->parts, n, i, A_q);
+        write_parts(&by_qdot[i], &of->parts, n, i, A_v);
     }
 }
 
 /* Derivatives of qdot by y, and of qddot by y and by ydot, of what `brachis_path_motion` found. */
-void brachis_path_derivatives(path_motion *own)
+void brachis_path_derivatives(path_motion *motion)
 {
-    const prescribed *asked = own->asked;
-    long count = own->count;
-    long n = own->arm->joints;
-    const selection chosen = select_parts(asked);
-    long m = chosen.count;
-    long r = n - m;
-    long c = 1 + r;
+    const sizes of = sizes_of(motion);
+    long count = of.count;
+    long n = of.n;
+    long m = of.m;
+    long r = of.r;
+    long c = of.c;
+    long changing = motion->row_derivatives ? r : 0;
     for (long k = 0; k < count; k += LANES) {
-        twist columns[n], slopes[n], by_q[n], by_qdot[n];
-        pack inverse[n * n], G[n * c], rate[n], more[n], right[n * c], V[n * n], A_q[n * n], A_v[n * n];
-        pack first[n * c], second[n * c], third[n * c];
-        read_block(own->inverses, count, n * n, k, inverse);
-        read_block(own->gradients, count, n * c, k, G);
-        read_block(own->qdot, count, n, k, rate);
-        read_block(own->qddot, count, n, k, more);
-        pack sdot = gather(own->ydot, count, c, k, 0);
-        pack sddot = gather(own->yddot, count, c, k, 0);
-        for (long i = 0; i < n; i++) {
-            columns[i] = read_twist(own->twists, count, n, k, i);
+        pack inverse[n * n], G[n * c], qdot[n], qddot[n], right[n * c], V_q[n * n], A_q[n * n], A_v[n * n];
+        pack xi_ds[n], xi_dds[n], C_s[n * n], C_ss[n * n], e_s[n], e_ss[n];
+        pack qdot_y[n * c], qddot_ydot[n * c], qddot_y[n * c];
+        read_block(motion->inverses, count, n * n, k, inverse);
+        read_block(motion->gradients, count, n * c, k, G);
+        read_block(motion->qdot, count, n, k, qdot);
+        read_block(motion->qddot, count, n, k, qddot);
+        read_block(motion->xi_ds, count, m, k, xi_ds);
+        read_block(motion->xi_dds, count, m, k, xi_dds);
+        differentiate_task(motion, &of, k, qdot, qddot, V_q, A_q, A_v);
+        if (changing) {
+            read_rows(motion->row_derivatives, count, r, n, k, C_s);
+            read_rows(motion->row_derivatives + count * r * (n + 1), count, r, n, k, C_ss);
+            read_block(motion->drift + count * r, count, r, k, e_s);
+            read_block(motion->drift + 2 * count * r, count, r, k, e_ss);
         }
-        differentiate_tool(n, columns, rate, more, asked->in_tool_axes != 0, slopes, by_q, by_qdot);
-        for (long row = 0; row < m; row++) {
-            for (long i = 0; i < n; i++) {
-                V[row * n + i] = chosen_part(&slopes[i], &chosen, row);
-                A_q[row * n + i] = chosen_part(&by_q[i], &chosen, row);
-                A_v[row * n + i] = chosen_part(&by_qdot[i], &chosen, row);
-            }
-        }
-        /* Derivatives of the conditions: C' and C'' in the rows below m. */
-        pack *C_s = V + m * n;
-        pack *C_ss = A_q + m * n;
-        pack e_s[r > 0 ? r : 1], e_ss[r > 0 ? r : 1];
-        if (own->turning) {
-            read_rows(own->turning, count, r, n, k, C_s);
-            read_rows(own->turning + count * r * (n + 1), count, r, n, k, C_ss);
-            read_block(own->drift + count * r, count, r, k, e_s);
-            read_block(own->drift + 2 * count * r, count, r, k, e_ss);
-        }
-        long rows = own->turning ? n : m;
-
-        /* (-V_q G + [xi_ds sdot, 0];  -C' G sdot - [C' qdot + e' sdot, 0]) */
-        set_zero(right, m * c);
-        for (long row = 0; row < m; row++) {
-            right[row * c] = gather(own->xi_ds, count, m, k, row) * sdot;
-        }
-        multiply(V, n, G, m, n, c, SUBTRACT, right);
-        for (long i = 0; i < rows - m; i++) {
-            for (long j = 0; j < c; j++) {
-                pack sum = all(0.0);
-                for (long l = 0; l < n; l++) {
-                    sum += C_s[i * n + l] * G[l * c + j];
-                }
-                right[(m + i) * c + j] = -sum * sdot;
-            }
-            right[(m + i) * c] -= inner_product(C_s + i * n, rate, n) + e_s[i] * sdot;
-        }
-        multiply(inverse, n, right, n, rows, c, SET, first);
-
-        /* (-A_v G + [2 xi_ds sdot, 0];  twice the rows above) */
-        set_zero(right, m * c);
-        for (long row = 0; row < m; row++) {
-            right[row * c] = 2.0 * gather(own->xi_ds, count, m, k, row) * sdot;
-        }
-        multiply(A_v, n, G, m, n, c, SUBTRACT, right);
-        for (long i = m * c; i < rows * c; i++) {
-            right[i] *= 2.0;
-        }
-        multiply(inverse, n, right, n, rows, c, SET, second);
-
-        /* (-A_q G - A_v dqdot/dy + [xi_dds sdot^2 + xi_ds sddot, 0];
-            -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0]) */
-        set_zero(right, m * c);
-        for (long row = 0; row < m; row++) {
-            pack bend = gather(own->xi_dds, count, m, k, row);
-            right[row * c] = bend * sdot * sdot + gather(own->xi_ds, count, m, k, row) * sddot;
-        }
-        multiply(A_q, n, G, m, n, c, SUBTRACT, right);
-        multiply(A_v, n, first, m, n, c, SUBTRACT, right);
-        for (long i = 0; i < rows - m; i++) {
-            for (long j = 0; j < c; j++) {
-                pack sum = all(0.0);
-                for (long l = 0; l < n; l++) {
-                    pack turned = C_ss[i * n + l] * sdot * sdot + C_s[i * n + l] * sddot;
-                    sum += 2.0 * sdot * C_s[i * n + l] * first[l * c + j] + turned * G[l * c + j];
-                }
-                right[(m + i) * c + j] = -sum;
-            }
-            pack turned = inner_product(C_s + i * n, more, n) + 2.0 * sdot * inner_product(C_ss + i * n, rate, n);
-            right[(m + i) * c] -= turned + e_ss[i] * sdot * sdot + e_s[i] * sddot;
-        }
-        multiply(inverse, n, right, n, rows, c, SET, third);
-        write_block(first, own->qdot_y, count, n * c, k);
-        write_block(second, own->qddot_ydot, count, n * c, k);
-        write_block(third, own->qddot_y, count, n * c, k);
+        pack sdot = gather(motion->ydot, count, c, k, 0);
+        pack sddot = gather(motion->yddot, count, c, k, 0);
+        const terms at = {n, m, c, changing, G, qdot, qddot, xi_ds, xi_dds, V_q, A_q, A_v, C_s, C_ss, e_s, e_ss, sdot, sddot};
+        long rows = m + changing;
+        find_right_qdot_y(&at, right);
+        multiply(inverse, n, right, n, rows, c, SET, qdot_y);
+        find_right_qddot_ydot(&at, right);
+        multiply(inverse, n, right, n, rows, c, SET, qddot_ydot);
+        find_right_qddot_y(&at, qdot_y, right);
+        multiply(inverse, n, right, n, rows, c, SET, qddot_y);
+        write_block(qdot_y, motion->qdot_y, count, n * c, k);
+        write_block(qddot_ydot, motion->qddot_ydot, count, n * c, k);
+        write_block(qddot_y, motion->qddot_y, count, n * c, k);
     }
 }
 
@@ -304,45 +403,44 @@ void brachis_least_singular(long count, long n, const double *inverses, double *
 /* Slopes of the least singular values by the joints, (K, n), and by s, (K), where the matrices are J_aug of what
 `brachis_path_motion` found: with the left singular vector u = value J_aug^-T v, a value changes by u^T dJ_aug v. */
 void brachis_singular_slopes(
-    const path_motion *own, const double *values, const double *vectors, double *by_q, double *by_s
+    const path_motion *motion, const double *values, const double *vectors, double *by_q, double *by_s
 )
 {
-    const prescribed *asked = own->asked;
-    long count = own->count;
-    long n = own->arm->joints;
-    const selection chosen = select_parts(asked);
-    long m = chosen.count;
+    const sizes of = sizes_of(motion);
+    long count = of.count;
+    long n = of.n;
+    long m = of.m;
     for (long k = 0; k < count; k += LANES) {
         twist columns[n], slopes[n], unused_q[n], unused_qdot[n];
-        pack inverse[n * n], v[n], still[n], u[n], found[n], turned[n * n];
-        read_block(own->inverses, count, n * n, k, inverse);
+        pack inverse[n * n], v[n], still[n], u[n], slopes_q[n], C_s[n * n];
+        read_block(motion->inverses, count, n * n, k, inverse);
         read_block(vectors, count, n, k, v);
         pack value = gather(values, count, 1, k, 0);
         for (long i = 0; i < n; i++) {
-            columns[i] = read_twist(own->twists, count, n, k, i);
+            columns[i] = read_twist(motion->twists, count, n, k, i);
         }
         set_zero(still, n);
         set_zero(u, n);
-        set_zero(found, n);
+        set_zero(slopes_q, n);
         for (long i = 0; i < n; i++) {
             for (long j = 0; j < n; j++) {
                 u[j] += value * inverse[i * n + j] * v[i];
             }
         }
-        differentiate_tool(n, columns, v, still, asked->in_tool_axes != 0, slopes, unused_q, unused_qdot);
+        differentiate_tool(n, columns, v, still, motion->task->in_tool_axes != 0, slopes, unused_q, unused_qdot);
         for (long row = 0; row < m; row++) {
             for (long i = 0; i < n; i++) {
-                found[i] += u[row] * chosen_part(&slopes[i], &chosen, row);
+                slopes_q[i] += u[row] * chosen_part(&slopes[i], &of.parts, row);
             }
         }
-        write_block(found, by_q, count, n, k);
-        pack along_path = all(0.0);
-        if (own->turning) {
-            read_rows(own->turning, count, n - m, n, k, turned);
+        write_block(slopes_q, by_q, count, n, k);
+        pack slope_s = all(0.0);
+        if (motion->row_derivatives) {
+            read_rows(motion->row_derivatives, count, of.r, n, k, C_s);
             for (long i = m; i < n; i++) {
-                along_path += u[i] * inner_product(turned + (i - m) * n, v, n);
+                slope_s += u[i] * inner_product(C_s + (i - m) * n, v, n);
             }
         }
-        scatter(along_path, by_s, count, 1, k, 0);
+        scatter(slope_s, by_s, count, 1, k, 0);
     }
 }

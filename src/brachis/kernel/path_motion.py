@@ -18,14 +18,14 @@ from brachis.kernel.library import (
     as_contiguous,
     as_doubles_at_points,
     call,
-    compute,
+    call_checked,
     declare_fields,
     shape_of,
 )
 from brachis.kernel.newton import Prescribed
 from brachis.kernel.postures import Branch
 
-_GIVEN = {
+_INPUTS = {
     "y": "Kc",
     "ydot": "Kc",
     "yddot": "Kc",
@@ -34,14 +34,14 @@ _GIVEN = {
     "xi_ds": "Km",
     "xi_dds": "Km",
     "rows": "Krw",
-    "turning": "3Krw",
+    "row_derivatives": "3Krw",
     "reference": "Kg",
     "t": "K",
     "near": "Kn",
 }
 """What the library reads, and its shape: K points, n joints, c curves, m prescribed rows, z task coordinates, r rows of
 w = n + 1 numbers, and g = n + r + n r numbers of a chart's reference."""
-_FOUND = {
+_OUTPUTS = {
     "answers": "Kam",
     "levels": "Kr",
     "q": "Kn",
@@ -73,18 +73,18 @@ class _PathMotion(ctypes.Structure):
     """`path_motion` of motion.h."""
 
     _fields_ = declare_fields(
-        f"p arm asked by; l count rows_step; d side;p {' '.join((*_GIVEN, *_FOUND))}"
+        f"p arm task branch; l count rows_step; d side;p {' '.join((*_INPUTS, *_OUTPUTS))}"
     )
 
 
 @lru_cache
 def _lay_out(**sizes: int) -> tuple[dict[str, tuple[int, ...]], np.dtype[Any]]:
-    """Return the shapes of what is given, and one record for all that is written."""
-    given = {name: shape_of(letters, sizes) for name, letters in _GIVEN.items()}
+    """Return the shapes of inputs, and one record for all that is written."""
+    shapes = {name: shape_of(letters, sizes) for name, letters in _INPUTS.items()}
     written = [
-        (name, float, shape_of(letters, sizes)) for name, letters in _FOUND.items()
+        (name, float, shape_of(letters, sizes)) for name, letters in _OUTPUTS.items()
     ]
-    return given, np.dtype(written)
+    return shapes, np.dtype(written)
 
 
 def _written(name: str) -> Any:
@@ -97,7 +97,7 @@ class PathMotion(Structured):
     """Motion at K points along a path.
 
     First all is prepared; answers of a closed form without a formula, or postures that are known, are then written to
-    `answers` or `q`. Without `branch` and ``given["reference"]`` the postures are known.
+    `answers` or `q`. Without `branch` and ``inputs["reference"]`` the postures are known.
 
     Attributes
     ----------
@@ -107,12 +107,13 @@ class PathMotion(Structured):
         By which postures are found; in a chart, None.
     side : float
         Sign that det J_aug must have; 0: either.
-    given : dict of str to ndarray
+    inputs : dict of str to ndarray
         The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) where all points share them.
         For a closed form or a chart ``targets``, (K, coordinates), and in a chart its ``reference``, (K, n + r + n
         r): posture, sigma and dq/dsigma. For `evaluate` ``ydot`` and ``yddot``, and the path's ``xi``, ``xi_ds`` and
-        ``xi_dds``, (K, m). Where rows change along the path, three derivatives of them, ``turning``, (3, K, r, n +
-        1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known to be so.
+        ``xi_dds``, (K, m). Where rows change along the path, three derivatives of them, ``row_derivatives``,
+        (3, K, r, n + 1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known
+        to be so.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
     written : ndarray
@@ -134,7 +135,7 @@ class PathMotion(Structured):
     prescribed: Prescribed
     branch: Branch | None
     side: float
-    given: dict[str, np.ndarray]
+    inputs: dict[str, np.ndarray]
     rows_step: int
     written: np.ndarray
 
@@ -143,12 +144,12 @@ class PathMotion(Structured):
         cls,
         chain: Chain,
         prescribed: Prescribed,
-        given: Mapping[str, np.ndarray],
+        inputs: Mapping[str, np.ndarray],
         *,
         branch: Branch | None = None,
         side: float = 0.0,
     ) -> PathMotion:
-        """Check what is given, and make room; see the class.
+        """Check the inputs, and make room for the outputs; see the class.
 
         Raises
         ------
@@ -160,14 +161,14 @@ class PathMotion(Structured):
         m = prescribed.count
         alternatives = 0
         needed = ["y", "rows"]
-        if "reference" in given or (branch is not None and branch.answers_of):
+        if "reference" in inputs or (branch is not None and branch.answers_of):
             needed.append("targets")
-        _need(given, needed)
+        _need(inputs, needed)
         if branch is not None:
             branch.check_fits(n, n - m, prescribed.coordinates)
             alternatives = branch.alternatives
         shapes, record = _lay_out(
-            K=len(given["y"]),
+            K=len(inputs["y"]),
             n=n,
             m=m,
             r=n - m,
@@ -177,14 +178,14 @@ class PathMotion(Structured):
             g=n + (n - m) * (n + 1),
             a=alternatives,
         )
-        kept = {
-            name: as_contiguous(own, shapes[name])
-            for name, own in given.items()
+        arrays = {
+            name: as_contiguous(values, shapes[name])
+            for name, values in inputs.items()
             if name != "rows"
         }
-        kept["rows"], step = as_doubles_at_points(given["rows"], shapes["rows"])
+        arrays["rows"], step = as_doubles_at_points(inputs["rows"], shapes["rows"])
         written = np.empty((), record)
-        return cls(chain, prescribed, branch, side, kept, step, written)
+        return cls(chain, prescribed, branch, side, arrays, step, written)
 
     answers = _written("answers")
     q = _written("q")
@@ -196,17 +197,17 @@ class PathMotion(Structured):
     gradient = _written("gradient")
 
     def _make_structure(self) -> _PathMotion:
-        given = self.given
+        inputs = self.inputs
         first = self.written.ctypes.data
         record: Any = self.written.dtype.fields
         return _PathMotion(
             self.chain.address,
             self.prescribed.address,
             None if self.branch is None else self.branch.address,
-            len(given["y"]),
+            len(inputs["y"]),
             self.rows_step,
             self.side,
-            *[address(given[name]) if name in given else None for name in _GIVEN],
+            *[address(inputs[name]) if name in inputs else None for name in _INPUTS],
             *[first + offset for _, offset in record.values()],
         )
 
@@ -218,7 +219,7 @@ class PathMotion(Structured):
 
     def evaluate(self) -> Fault | None:
         """Find postures and motion; return what is at fault."""
-        _need(self.given, _OF_MOTION)
+        _need(self.inputs, _OF_MOTION)
         fault = call("brachis_evaluate", self.address)
         return Fault(fault) if fault else None
 
@@ -233,19 +234,20 @@ class PathMotion(Structured):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Differentiate what `find_least_singular` gives for J_aug, (K,), by q, (K, n), and by s, (K,)."""
         count, n = self.qdot.shape
-        name = "brachis_singular_slopes"
-        by_q, by_s = compute(name, self.address, values, vectors, K=count, n=n)
+        by_q, by_s = call_checked(
+            "brachis_singular_slopes", self.address, values, vectors, K=count, n=n
+        )
         return by_q, by_s
 
 
-def _need(given: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
+def _need(inputs: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
     """Refuse what is not complete."""
-    missing = [name for name in names if name not in given]
+    missing = [name for name in names if name not in inputs]
     if missing:
         raise ValueError(f"{', '.join(missing)} of the motion is missing")
 
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
-    values, vectors = compute("brachis_least_singular", inverses)
+    values, vectors = call_checked("brachis_least_singular", inverses)
     return values, vectors

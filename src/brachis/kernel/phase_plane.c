@@ -15,11 +15,11 @@ static inline double larger(double a, double b)
 /* The least and the largest x, (P), at which no lower line `slope x + lower`, (P, c), is above an upper one. Slopes that
 differ by less than `parallel` are equal; -1 is the largest x where such lines leave nothing between them. */
 void brachis_bounds_of_pairs(
-    long places, long rows, const double *slope, const double *lower, const double *upper, double parallel,
+    long stations, long rows, const double *slope, const double *lower, const double *upper, double parallel,
     double *least, double *most
 )
 {
-    for (long k = 0; k < places; k++, slope += rows, lower += rows, upper += rows) {
+    for (long k = 0; k < stations; k++, slope += rows, lower += rows, upper += rows) {
         double floor = 0.0;
         double ceiling = INFINITY;
         int is_empty = 0;
@@ -42,24 +42,34 @@ void brachis_bounds_of_pairs(
     }
 }
 
-/* Intervals of x, (P), from which the end can be reached with x = `last`. The next x is `factor x + least` to
-`factor x + most` by each row, (P - 1, c), and x is `floor` to `ceiling`. Returns 0 if an interval is empty. */
+/* Steps between P stations: the next x is `factor x + lower` to `factor x + upper` by each row, (P - 1, c). */
+typedef struct {
+    long stations, rows;
+    const double *factor, *lower, *upper;
+} steps;
+
+/* Intervals of x, (P), from which the end can be reached with x = `last`, where x is `floor` to `ceiling`. Returns 0 if an
+interval is empty. */
 int brachis_go_backwards(
-    long places, long rows, const double *factor, const double *least, const double *most, const double *floor,
-    const double *ceiling, double last, double flat, double rounding, double *low, double *high
+    const steps *steps, const double *floor, const double *ceiling, double last, double flat, double rounding, double *low,
+    double *high
 )
 {
-    low[places - 1] = last;
-    high[places - 1] = last;
-    for (long k = places - 2; k >= 0; k--) {
+    long end = steps->stations - 1;
+    long rows = steps->rows;
+    low[end] = last;
+    high[end] = last;
+    for (long k = end - 1; k >= 0; k--) {
         double from = floor[k];
         double to = ceiling[k];
-        const double *f = factor + k * rows;
+        const double *factor = steps->factor + k * rows;
+        const double *lower = steps->lower + k * rows;
+        const double *upper = steps->upper + k * rows;
         for (long i = 0; i < rows; i++) {
             /* Where the next x does not rise with this one a row is left out. */
-            if (f[i] > flat) {
-                to = smaller(to, (high[k + 1] - least[k * rows + i]) / f[i]);
-                from = larger(from, (low[k + 1] - most[k * rows + i]) / f[i]);
+            if (factor[i] > flat) {
+                to = smaller(to, (high[k + 1] - lower[i]) / factor[i]);
+                from = larger(from, (low[k + 1] - upper[i]) / factor[i]);
             }
         }
         if (!(from <= to * (1.0 + rounding)) || to < 0.0) {
@@ -73,15 +83,15 @@ int brachis_go_backwards(
 
 /* The largest x, (P), from the `first` one on, within the intervals. */
 void brachis_go_forwards(
-    long places, long rows, const double *factor, const double *most, const double *low, const double *high,
+    long stations, long rows, const double *factor, const double *upper, const double *low, const double *high,
     double first, double *x
 )
 {
     x[0] = first;
-    for (long k = 0; k + 1 < places; k++) {
+    for (long k = 0; k + 1 < stations; k++) {
         double next = high[k + 1];
         for (long i = 0; i < rows; i++) {
-            next = smaller(next, factor[k * rows + i] * x[k] + most[k * rows + i]);
+            next = smaller(next, factor[k * rows + i] * x[k] + upper[k * rows + i]);
         }
         x[k + 1] = larger(next, low[k + 1]);
     }

@@ -9,22 +9,22 @@ static const double TURN = 6.283185307179586476925;
 
 /* Take that answer of the closed form for each posture that is nearest, modulo turns, to `near`, or to the posture before. If
 none exists, the first is taken. */
-static void take_answers(path_motion *own, long n, long m)
+static void take_answers(path_motion *motion, long n, long m)
 {
-    const branch *by = own->by;
+    const branch *branch = motion->branch;
     long r = n - m;
-    const double *before = by->start;
-    for (long k = 0; k < own->count; k++) {
-        const double *answers = own->answers + k * by->alternatives * m;
-        double *q = own->q + k * n;
+    const double *before = branch->start;
+    for (long k = 0; k < motion->count; k++) {
+        const double *answers = motion->answers + k * branch->alternatives * m;
+        double *q = motion->q + k * n;
         long best = 0;
         double least = INFINITY;
-        before = own->near ? own->near + k * n : before;
-        for (long i = 0; i < by->alternatives; i++) {
+        before = motion->near ? motion->near + k * n : before;
+        for (long i = 0; i < branch->alternatives; i++) {
             double square = 0.0;
             for (long j = 0; j < m; j++) {
-                double gap = answers[i * m + j] - before[by->others[j]];
-                gap -= by->turns[by->others[j]] != 0.0 ? TURN * nearbyint(gap / TURN) : 0.0;
+                double gap = answers[i * m + j] - before[branch->nonredundant[j]];
+                gap -= branch->turns[branch->nonredundant[j]] != 0.0 ? TURN * nearbyint(gap / TURN) : 0.0;
                 square += gap * gap;
             }
             if (square < least) {
@@ -33,10 +33,10 @@ static void take_answers(path_motion *own, long n, long m)
             }
         }
         for (long j = 0; j < r; j++) {
-            q[by->redundant[j]] = own->y[k * (1 + r) + 1 + j];
+            q[branch->redundant[j]] = motion->y[k * (1 + r) + 1 + j];
         }
         for (long j = 0; j < m; j++) {
-            q[by->others[j]] = answers[best * m + j];
+            q[branch->nonredundant[j]] = answers[best * m + j];
         }
         before = least < INFINITY ? q : before;
     }
@@ -44,17 +44,17 @@ static void take_answers(path_motion *own, long n, long m)
 
 /* Put angles into the turns nearest to `near`, or to the angles before, at first to the start. In the second case nothing is
 done if one number is not finite. */
-static void take_turns(path_motion *own, long n)
+static void take_turns(path_motion *motion, long n)
 {
-    const branch *by = own->by;
-    if (!own->near && !all_finite(own->q, own->count * n)) {
+    const branch *branch = motion->branch;
+    if (!motion->near && !all_finite(motion->q, motion->count * n)) {
         return;
     }
     for (long j = 0; j < n; j++) {
-        double before = by->start[j];
-        for (long k = 0; k < own->count && by->turns[j] != 0.0; k++) {
-            double *angle = &own->q[k * n + j];
-            before = own->near ? own->near[k * n + j] : before;
+        double before = branch->start[j];
+        for (long k = 0; k < motion->count && branch->turns[j] != 0.0; k++) {
+            double *angle = &motion->q[k * n + j];
+            before = motion->near ? motion->near[k * n + j] : before;
             *angle += TURN * nearbyint((before - *angle) / TURN);
             before = *angle;
         }
@@ -67,28 +67,28 @@ quintic through both ends,
     h (v0 + v1) / 2 - h^2 (a1 - a0) / 12.
 
 Returns 0 if the predicted step of a joint with a finite range differs from every possible step by more than a quarter turn. */
-static int follow_rates(path_motion *own, long n)
+static int follow_rates(path_motion *motion, long n)
 {
-    const branch *by = own->by;
+    const branch *branch = motion->branch;
     for (long j = 0; j < n; j++) {
         double before = 0.0;
         double counted = 0.0;
-        for (long k = 0; k < own->count && by->turns[j] != 0.0; k++) {
+        for (long k = 0; k < motion->count && branch->turns[j] != 0.0; k++) {
             long at = k * n + j;
-            double angle = own->q[at];
+            double angle = motion->q[at];
             if (k > 0) {
-                double h = own->t[k] - own->t[k - 1];
-                double rise = own->qddot[at] - own->qddot[at - n];
-                double step = 0.5 * h * (own->qdot[at] + own->qdot[at - n]) - h * h / 12.0 * rise;
+                double h = motion->t[k] - motion->t[k - 1];
+                double rise = motion->qddot[at] - motion->qddot[at - n];
+                double step = 0.5 * h * (motion->qdot[at] + motion->qdot[at - n]) - h * h / 12.0 * rise;
                 double gap = (step - (angle - before)) / TURN;
-                double whole = nearbyint(gap);
-                if (by->ranged[j] != 0.0 && !(fabs(gap - whole) <= 0.25)) {
+                double turns = nearbyint(gap);
+                if (branch->ranged[j] != 0.0 && !(fabs(gap - turns) <= 0.25)) {
                     return 0;
                 }
-                counted += whole;
+                counted += turns;
             }
             before = angle;
-            own->q[at] = angle + TURN * counted;
+            motion->q[at] = angle + TURN * counted;
         }
     }
     return 1;
@@ -96,12 +96,12 @@ static int follow_rates(path_motion *own, long n)
 
 /* Postures of a chart by Newton's method, from `near` or beside its reference: at each point posture, sigma and dq/dsigma, n + r +
 n r numbers. Within 0.8 rad or m the reference's own self-motion says where a posture is. */
-static void solve_chart(path_motion *own, long n, long r, long coordinates)
+static void solve_chart(path_motion *motion, long n, long r, long coordinates)
 {
-    for (long k = 0; k < own->count; k++) {
-        const double *reference = own->reference + k * (n + r + n * r);
-        const double *rows = own->rows + k * own->rows_step;
-        const double *curves = own->y + k * (1 + r) + 1;
+    for (long k = 0; k < motion->count; k++) {
+        const double *reference = motion->reference + k * (n + r + n * r);
+        const double *rows = motion->rows + k * motion->rows_step;
+        const double *curves = motion->y + k * (1 + r) + 1;
         double aside[n];
         double largest = 0.0;
         for (long i = 0; i < n; i++) {
@@ -112,60 +112,61 @@ static void solve_chart(path_motion *own, long n, long r, long coordinates)
             largest = fabs(aside[i]) < largest ? largest : fabs(aside[i]);
         }
         for (long i = 0; i < n; i++) {
-            own->q[k * n + i] = own->near ? own->near[k * n + i] : reference[i] + (largest < 0.8 ? aside[i] : 0.0);
+            motion->q[k * n + i] = motion->near ? motion->near[k * n + i] : reference[i] + (largest < 0.8 ? aside[i] : 0.0);
         }
         for (long j = 0; j < r; j++) {
-            own->levels[k * r + j] = curves[j] + rows[j * (n + 1) + n];
+            motion->levels[k * r + j] = curves[j] + rows[j * (n + 1) + n];
         }
     }
-    brachis_newton(
-        own->arm, own->asked, own->count, coordinates, own->targets, own->q, r, own->rows, own->rows_step, n + 1,
-        own->levels, 0, own->q
-    );
+    const posture_search search = {
+        motion->arm, motion->task, motion->count, coordinates, motion->targets, motion->q, r, motion->rows, motion->rows_step,
+        n + 1, motion->levels, 0,
+    };
+    brachis_newton(&search, motion->q);
 }
 
 /* Find the postures q; nothing is done where they are given. */
-void brachis_postures(path_motion *own)
+void brachis_postures(path_motion *motion)
 {
-    long n = own->arm->joints;
-    long m = select_parts(own->asked).count;
+    long n = motion->arm->joints;
+    long m = select_parts(motion->task).count;
     long r = n - m;
-    long coordinates = own->asked->turns == 3 ? own->asked->rows + 9 : m;
-    if (own->reference) {
-        solve_chart(own, n, r, coordinates);
+    long coordinates = motion->task->turns == 3 ? motion->task->rows + 9 : m;
+    if (motion->reference) {
+        solve_chart(motion, n, r, coordinates);
     }
-    if (!own->by) {
+    if (!motion->branch) {
         return;
     }
-    if (own->by->answers_of) {
-        const formula *answers_of = own->by->answers_of;
+    if (motion->branch->answers_of) {
+        const double *q_r = motion->y + 1;
         brachis_formula(
-            answers_of, own->count, own->targets, coordinates, own->y + 1, 1 + r, own->answers
+            motion->branch->answers_of, motion->count, motion->targets, coordinates, q_r, 1 + r, motion->answers
         );
     }
-    take_answers(own, n, m);
-    take_turns(own, n);
+    take_answers(motion, n, m);
+    take_turns(motion, n);
 }
 
 enum { NO_FAULT, NO_POSTURE, SINGULAR, TURNS_TOO_FAR };
 
 /* Find postures and motion. Returns what is at fault. */
-int brachis_evaluate(path_motion *own)
+int brachis_evaluate(path_motion *motion)
 {
-    long n = own->arm->joints;
-    brachis_postures(own);
-    if (!all_finite(own->q, own->count * n)) {
+    long n = motion->arm->joints;
+    brachis_postures(motion);
+    if (!all_finite(motion->q, motion->count * n)) {
         return NO_POSTURE;
     }
-    brachis_path_motion(own);
-    for (long k = 0; k < own->count; k++) {
-        double determinant = own->determinants[k];
-        double size = own->side == 0.0 ? fabs(determinant) : determinant * own->side;
+    brachis_path_motion(motion);
+    for (long k = 0; k < motion->count; k++) {
+        double determinant = motion->determinants[k];
+        double size = motion->side == 0.0 ? fabs(determinant) : determinant * motion->side;
         if (!(size > 0.0)) {
             return SINGULAR;
         }
     }
-    if (own->by && own->t && !follow_rates(own, n)) {
+    if (motion->branch && motion->t && !follow_rates(motion, n)) {
         return TURNS_TOO_FAR;
     }
     return NO_FAULT;

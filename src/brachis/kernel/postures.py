@@ -15,7 +15,7 @@ class _Branch(ctypes.Structure):
     """`branch` of motion.h."""
 
     _fields_ = declare_fields(
-        "p answers_of; l alternatives; p redundant others turns ranged start"
+        "p answers_of; l alternatives; p redundant nonredundant turns ranged start"
     )
 
 
@@ -28,7 +28,7 @@ class Branch(Structured):
 
     Attributes
     ----------
-    redundant, others : (r,), (m,) int ndarray
+    redundant, nonredundant : (r,), (m,) int ndarray
         Indices of the joints.
     turns : (n,) bool ndarray
         Joints whose turns are counted.
@@ -43,7 +43,7 @@ class Branch(Structured):
     """
 
     redundant: np.ndarray
-    others: np.ndarray
+    nonredundant: np.ndarray
     turns: np.ndarray
     ranged: np.ndarray
     start: np.ndarray
@@ -64,10 +64,11 @@ class Branch(Structured):
         ------
         ValueError
         """
-        found = len(self.start), len(self.redundant)
-        if found != (n, r):
+        joints = len(self.start)
+        redundant = len(self.redundant)
+        if (joints, redundant) != (n, r):
             raise ValueError(
-                f"the branch has {found[0]} joints, {found[1]} redundant; needed: {n}, {r}"
+                f"the branch has {joints} joints, {redundant} redundant; needed: {n}, {r}"
             )
         if self.answers_of is None or self.answers_of.counts == (coordinates, r):
             return
@@ -77,7 +78,7 @@ class Branch(Structured):
 
     def _make_structure(self) -> _Branch:
         n = len(self.start)
-        joints = np.concatenate([self.redundant, self.others])
+        joints = np.concatenate([self.redundant, self.nonredundant])
         if not np.array_equal(np.sort(joints), np.arange(n)):
             raise ValueError("redundant and other joints are not all joints, once each")
         if self.alternatives < 1:
@@ -85,15 +86,17 @@ class Branch(Structured):
         formula = None
         if self.answers_of is not None:
             formula = self.answers_of.address
-            needed = (self.alternatives, len(self.others))
+            needed = (self.alternatives, len(self.nonredundant))
             if self.answers_of.shape != needed:
                 raise ValueError(
                     f"the answers have the shape {self.answers_of.shape}; needed: {needed}"
                 )
+        indices = [self.redundant.astype("l"), self.nonredundant.astype("l")]
         tables = [
-            as_contiguous(own, (n,)) for own in (self.turns, self.ranged, self.start)
+            as_contiguous(table, (n,))
+            for table in (self.turns, self.ranged, self.start)
         ]
-        numbers = [self.redundant.astype("l"), self.others.astype("l"), *tables]
-        structure = _Branch(formula, self.alternatives, *map(address, numbers))
-        structure.kept = numbers
+        arrays = indices + tables
+        structure = _Branch(formula, self.alternatives, *map(address, arrays))
+        structure.arrays = arrays
         return structure

@@ -3,30 +3,30 @@
 A function of one parameter is given by its derivatives from the value on. Divided by factorials they are the coefficients
 of a power series, and products of functions are products of these. */
 
-enum { MOST = 8 };
+enum { MAX_ORDERS = 8 };
 
 /* Power series of one number: its coefficients. */
 typedef struct {
-    double at[MOST];
+    double at[MAX_ORDERS];
 } series;
 
 static inline series read_series(const double *values, long orders, long stride)
 {
-    series found = {{0.0}};
+    series coefficients = {{0.0}};
     double factorial = 1.0;
     for (long i = 0; i < orders; i++) {
         factorial *= i > 1 ? (double)i : 1.0;
-        found.at[i] = values[i * stride] / factorial;
+        coefficients.at[i] = values[i * stride] / factorial;
     }
-    return found;
+    return coefficients;
 }
 
-static inline void write_series(const series *own, double *values, long orders, long stride)
+static inline void write_series(const series *coefficients, double *values, long orders, long stride)
 {
     double factorial = 1.0;
     for (long i = 0; i < orders; i++) {
         factorial *= i > 1 ? (double)i : 1.0;
-        values[i * stride] = own->at[i] * factorial;
+        values[i * stride] = coefficients->at[i] * factorial;
     }
 }
 
@@ -85,14 +85,14 @@ void brachis_rotations(long orders, long count, const double *quaternions, doubl
 They are R' p' and the angular velocity of R' R', along the axes of the turning frame. */
 void brachis_body_twists(long orders, long count, const double *poses, double *twists)
 {
-    long less = orders - 1;
+    long twist_orders = orders - 1;
     for (long k = 0; k < count; k++) {
         series R[9], rates[12];
         for (int i = 0; i < 12; i++) {
-            const double *own = poses + 12 * k + i;
-            rates[i] = read_series(own + 12 * count, less, 12 * count);
+            const double *pose = poses + 12 * k + i;
+            rates[i] = read_series(pose + 12 * count, twist_orders, 12 * count);
             if (i >= 3) {
-                R[i - 3] = read_series(own, less, 12 * count);
+                R[i - 3] = read_series(pose, twist_orders, 12 * count);
             }
         }
         for (int i = 0; i < 3; i++) {
@@ -100,12 +100,12 @@ void brachis_body_twists(long orders, long count, const double *poses, double *t
             int next = (i + 1) % 3;
             int last = (i + 2) % 3;
             for (int row = 0; row < 3; row++) {
-                add_product(&linear, 1.0, &R[3 * row + i], &rates[row], less);
-                add_product(&angular, 0.5, &R[3 * row + last], &rates[3 + 3 * row + next], less);
-                add_product(&angular, -0.5, &R[3 * row + next], &rates[3 + 3 * row + last], less);
+                add_product(&linear, 1.0, &R[3 * row + i], &rates[row], twist_orders);
+                add_product(&angular, 0.5, &R[3 * row + last], &rates[3 + 3 * row + next], twist_orders);
+                add_product(&angular, -0.5, &R[3 * row + next], &rates[3 + 3 * row + last], twist_orders);
             }
-            write_series(&linear, twists + 6 * k + i, less, 6 * count);
-            write_series(&angular, twists + 6 * k + 3 + i, less, 6 * count);
+            write_series(&linear, twists + 6 * k + i, twist_orders, 6 * count);
+            write_series(&angular, twists + 6 * k + 3 + i, twist_orders, 6 * count);
         }
     }
 }

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from brachis.kernel.library import compute
+from brachis.kernel.library import call_checked
 
 _MOST = 8
 """Derivatives that the library has room for, with the value itself."""
@@ -17,7 +17,7 @@ def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
     orders, *places, _ = quaternions.shape
     _check(orders)
     flat = quaternions.reshape(orders, math.prod(places), 4)
-    rotations: np.ndarray = compute("brachis_rotations", flat)
+    rotations: np.ndarray = call_checked("brachis_rotations", flat)
     return rotations.reshape(orders, *places, 3, 3)
 
 
@@ -37,7 +37,7 @@ def body_twists(poses: np.ndarray) -> np.ndarray:
     orders, *places, width = poses.shape
     _check(orders)
     flat = poses.reshape(orders, math.prod(places), width)
-    twists: np.ndarray = compute("brachis_body_twists", flat, w=12, r=orders - 1)
+    twists: np.ndarray = call_checked("brachis_body_twists", flat, w=12, r=orders - 1)
     return twists.reshape(orders - 1, *places, 6)
 
 

@@ -7,6 +7,7 @@ behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t)
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +16,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brachis.kernel.library import as_contiguous, call, compute
+from brachis.kernel.library import (
+    Structured,
+    address,
+    as_contiguous,
+    call,
+    call_checked,
+    declare_fields,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +65,9 @@ class Spline:
         inner = places[beside : len(places) - beside]
         outer = np.ones(degree + 1)
         knots = np.concatenate([places[0] * outer, inner, places[-1] * outer])
-        piece = _find_piece(knots, degree, places)
+        span = _find_spans(knots, degree, places)
         number = np.arange(len(places))[:, None]
-        column = piece[:, None] + np.arange(-degree, 1)
+        column = span[:, None] + np.arange(-degree, 1)
         # Of d + 1 successive control points each has a column of its own.
         every = np.arange(len(places)) % (degree + 1)
         basis = cls(knots, np.eye(degree + 1)[every], degree)(places)
@@ -76,9 +84,9 @@ class Spline:
             return self.derivative(x, nu - 1)
         x = np.asarray(x, dtype=float)
         flat = x.ravel()
-        piece = _find_piece(self.knots, self.degree, flat)
+        spans = _find_spans(self.knots, self.degree, flat)
         points = self.control_points.reshape(len(self.control_points), -1)
-        values = blossom(self.knots, points, piece, [flat] * self.degree)
+        values = blossom(self.knots, points, spans, [flat] * self.degree)
         return values.reshape(x.shape + self.control_points.shape[1:])
 
     def derivatives(
@@ -90,9 +98,15 @@ class Spline:
         """
         shape = self.control_points.shape
         points = self.control_points.reshape(len(self.control_points), -1)
-        sizes = {"o": order + 1, "g": self.degree}
-        arrays = (self.knots, points, x, rounding)
-        values = compute("brachis_spline_orders", *arrays, **sizes)
+        values = call_checked(
+            "brachis_spline_orders",
+            self.knots,
+            points,
+            x,
+            rounding,
+            o=order + 1,
+            g=self.degree,
+        )
         return np.reshape(values, (order + 1, len(x), *shape[1:]))
 
     @cached_property
@@ -118,17 +132,17 @@ def collocation(
 def blossom(
     knots: np.ndarray,
     control_points: np.ndarray,
-    piece: np.ndarray,
+    spans: np.ndarray,
     arguments: Sequence[np.ndarray],
 ) -> np.ndarray:
-    """Evaluate the blossoms of a spline's pieces; see the module.
+    """Evaluate the blossoms of a spline's polynomials; see the module.
 
     Parameters
     ----------
     knots : (L + d + 1,) ndarray
     control_points : (L, c) ndarray
-    piece : (K,) int ndarray
-        Numbers of the knots at which the pieces begin.
+    spans : (K,) int ndarray
+        Numbers of the knots at which the spans of the polynomials begin.
     arguments : sequence of d (K,) ndarray
 
     Returns
@@ -136,24 +150,25 @@ def blossom(
     (K, c) ndarray
     """
     degree = len(arguments)
-    count = len(piece)
+    count = len(spans)
     points = len(knots) - degree - 1
-    if count and not degree <= piece.min() <= piece.max() < points:
+    if count and not degree <= spans.min() <= spans.max() < points:
         raise ValueError(f"a piece does not exist; they are {degree} to {points - 1}")
     places = np.reshape(arguments, (degree, count))
-    arrays = (knots, control_points, piece, places)
-    values: np.ndarray = compute("brachis_blossoms", *arrays, g=degree, L=points)
+    values: np.ndarray = call_checked(
+        "brachis_blossoms", knots, control_points, spans, places, g=degree, L=points
+    )
     return values
 
 
-def bernstein(coefficients: np.ndarray, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
+def bernstein(coefficients: np.ndarray, spans: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Evaluate polynomials in Bernstein form by de Casteljau's algorithm.
 
     Parameters
     ----------
     coefficients : (m + 1, L, ...) ndarray
         Of L pieces.
-    piece : (K,) int ndarray
+    spans : (K,) int ndarray
     u : (K,) ndarray
         Places in the pieces, 0 to 1.
 
@@ -161,49 +176,67 @@ def bernstein(coefficients: np.ndarray, piece: np.ndarray, u: np.ndarray) -> np.
     -------
     (K, ...) ndarray
     """
-    width, count, *others = coefficients.shape
-    if len(piece) and not 0 <= piece.min() <= piece.max() < count:
+    width, count, *shape = coefficients.shape
+    if len(spans) and not 0 <= spans.min() <= spans.max() < count:
         raise ValueError(f"a piece does not exist; they are 0 to {count - 1}")
-    columns = coefficients.reshape(width, count, math.prod(others))
-    values = compute("brachis_bernstein", columns, piece, u)
-    return np.reshape(values, (len(u), *others))
+    columns = coefficients.reshape(width, count, math.prod(shape))
+    values = call_checked("brachis_bernstein", columns, spans, u)
+    return np.reshape(values, (len(u), *shape))
 
 
-def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
-    """Find the knot at which the piece of each x, (K,), begins; beyond the ends that of the outer piece."""
-    piece = np.searchsorted(knots, x, side="right") - 1
-    return np.clip(piece, degree, len(knots) - degree - 2)
+def _find_spans(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
+    """Find the knot at which the span of each x, (K,), begins; beyond the ends that of the outer span."""
+    spans = np.searchsorted(knots, x, side="right") - 1
+    return np.clip(spans, degree, len(knots) - degree - 2)
 
 
-class Basis:
+class _Basis(ctypes.Structure):
+    """`basis` of splines.c."""
+
+    _fields_ = declare_fields("l orders count width; p values first")
+
+
+@dataclass(frozen=True, eq=False)
+class Basis(Structured):
     """Basis functions of splines, and their derivatives, that matter at K places.
 
-    Parameters
+    Attributes
     ----------
     values : (orders, K, w) ndarray
     first : (K,) int ndarray
         Number of the control point of the first of the w functions.
     """
 
-    def __init__(self, values: np.ndarray, first: np.ndarray) -> None:
-        orders, count, width = values.shape
-        if first.shape != (count,):
+    values: np.ndarray
+    first: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of control points that do not exist."""
+        if self.first.shape != (self.values.shape[1],):
             raise ValueError("first needs one number for each place")
-        if count and first.min() < 0:
+        if self.first.min(initial=0) < 0:
             raise ValueError("numbers of control points are negative")
-        self._values = as_contiguous(values, (orders, count, width))
-        self._first = first.astype("l", order="C", copy=False)
-        self._needed = int(first.max(initial=0)) + width
+
+    @cached_property
+    def _needed(self) -> int:
+        """How many control points a curve needs."""
+        return int(self.first.max(initial=0)) + self.values.shape[2]
+
+    def _make_structure(self) -> _Basis:
+        values = as_contiguous(self.values, self.values.shape)
+        first = self.first.astype("l", order="C", copy=False)
+        structure = _Basis(*values.shape, address(values), address(first))
+        structure.arrays = values, first
+        return structure
 
     def sum(self, control_points: np.ndarray) -> np.ndarray:
         """Values of splines with control points, (c, L), and their derivatives, (orders, K, c)."""
-        orders, count, width = self._values.shape
-        curves, many = control_points.shape
-        if count and many < self._needed:
-            raise ValueError(f"a control point does not exist; there are {many}")
+        orders, count, _ = self.values.shape
+        curves, point_count = control_points.shape
+        if count and point_count < self._needed:
+            raise ValueError(f"a control point does not exist; there are {point_count}")
         # Shapes are known here, and this is called most often.
         values = np.empty((orders, count, curves))
-        points = as_contiguous(control_points, (curves, many))
-        arrays = (self._values, self._first, points, values)
-        call("brachis_curves", orders, count, width, curves, many, *arrays)
+        points = as_contiguous(control_points, (curves, point_count))
+        call("brachis_curves", self.address, curves, point_count, points, values)
         return values

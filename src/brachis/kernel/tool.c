@@ -26,26 +26,26 @@ void brachis_tool(
     }
 }
 
-/* Derivatives, (6, K, n) each, of the tool's velocity and acceleration, from the columns of its Jacobian and rates,
-(K, n). */
+/* Derivatives dV/dq, da/dq and da/dqdot, (3, 6, K, n), of the tool's velocity V and acceleration a, from the columns of its
+Jacobian, and qdot and qddot, (K, n). */
 void brachis_tool_derivatives(
     long count, long n, const double *twists, const double *qdot, const double *qddot, int in_tool_axes,
-    double *velocity_q, double *acceleration_q, double *acceleration_qdot
+    double *derivatives
 )
 {
     for (long k = 0; k < count; k += LANES) {
-        twist columns[n], by_q[n], by_qdot[n], slopes[n];
-        pack rates[n], more[n];
+        twist columns[n], V_q[n], a_q[n], a_qdot[n];
+        pack rates[n], accelerations[n];
         for (long i = 0; i < n; i++) {
             columns[i] = read_twist(twists, count, n, k, i);
         }
         read_block(qdot, count, n, k, rates);
-        read_block(qddot, count, n, k, more);
-        differentiate_tool(n, columns, rates, more, in_tool_axes, slopes, by_q, by_qdot);
+        read_block(qddot, count, n, k, accelerations);
+        differentiate_tool(n, columns, rates, accelerations, in_tool_axes, V_q, a_q, a_qdot);
         for (long i = 0; i < n; i++) {
-            write_twist(slopes[i], velocity_q, count, n, k, i);
-            write_twist(by_q[i], acceleration_q, count, n, k, i);
-            write_twist(by_qdot[i], acceleration_qdot, count, n, k, i);
+            write_twist(V_q[i], derivatives, count, n, k, i);
+            write_twist(a_q[i], derivatives + 6 * count * n, count, n, k, i);
+            write_twist(a_qdot[i], derivatives + 12 * count * n, count, n, k, i);
         }
     }
 }
@@ -59,17 +59,17 @@ void brachis_tool_sizes(
 {
     long n = arm->joints;
     for (long k = 0; k < count; k += LANES) {
-        pack posture[n], rates[n], more[n];
-        twist columns[n], by_q[n], by_qdot[n], slopes[n];
+        pack posture[n], rates[n], accelerations[n];
+        twist columns[n], V_q[n], a_q[n], a_qdot[n];
         twist V = {0};
         vec tangential = {0};
         read_block(q, count, n, k, posture);
         read_block(qdot, count, n, k, rates);
-        read_block(qddot, count, n, k, more);
+        read_block(qddot, count, n, k, accelerations);
         place_tool(arm, posture, 0, columns);
         for (long i = 0; i < n; i++) {
             V = add_twists(V, scale_twist(columns[i], rates[i]));
-            tangential = add(tangential, scale(columns[i].v, more[i]));
+            tangential = add(tangential, scale(columns[i].v, accelerations[i]));
         }
         vec motions[3] = {V.v, V.w, add(tangential, bias_of(n, columns, rates, 0).v)};
         vec direction = motions[quantity];
@@ -83,16 +83,15 @@ void brachis_tool_sizes(
             continue;
         }
         direction = scale(direction, inverse);
-        differentiate_tool(n, columns, rates, more, 0, slopes, by_q, by_qdot);
+        differentiate_tool(n, columns, rates, accelerations, 0, V_q, a_q, a_qdot);
         for (long i = 0; i < n; i++) {
-            vec found[3][3] = {
-                {slopes[i].v, columns[i].v, {0}},
-                {slopes[i].w, columns[i].w, {0}},
-                {by_q[i].v, by_qdot[i].v, columns[i].v},
+            vec slopes[3][3] = {
+                {V_q[i].v, columns[i].v, {0}},
+                {V_q[i].w, columns[i].w, {0}},
+                {a_q[i].v, a_qdot[i].v, columns[i].v},
             };
-            const vec *own = found[quantity];
             for (int by = 0; by < 3; by++) {
-                scatter(dot(direction, own[by]), slopes_of_sizes + by * count * n, count, n, k, i);
+                scatter(dot(direction, slopes[quantity][by]), slopes_of_sizes + by * count * n, count, n, k, i);
             }
         }
     }

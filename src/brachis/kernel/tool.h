@@ -26,12 +26,12 @@ typedef struct {
     long count, parts[6];
 } selection;
 
-static inline selection select_parts(const prescribed *asked)
+static inline selection select_parts(const prescribed *task)
 {
-    selection chosen = {asked->rows + asked->turns, {0}};
+    selection chosen = {task->rows + task->turns, {0}};
     for (long i = 0; i < chosen.count; i++) {
-        long turn = asked->turns == 1 ? 6 - asked->first - asked->second : 3 + i - asked->rows;
-        chosen.parts[i] = i < asked->rows ? asked->axes[i] : turn;
+        long turn = task->turns == 1 ? 6 - task->first - task->second : 3 + i - task->rows;
+        chosen.parts[i] = i < task->rows ? task->axes[i] : turn;
     }
     return chosen;
 }
@@ -104,14 +104,15 @@ static inline void logarithm(const double *R, double *vector)
         {y, R[1] + R[3], 1.0 + 2.0 * R[4] - trace, R[5] + R[7]},
         {z, R[2] + R[6], R[5] + R[7], 1.0 + 2.0 * R[8] - trace},
     };
-    const double *found = table[largest];
-    double sign = found[0] < 0.0 ? -1.0 : 1.0;
-    double size = sqrt(found[1] * found[1] + found[2] * found[2] + found[3] * found[3]);
-    double real = sign * found[0];
+    const double *quaternion = table[largest];
+    double sign = quaternion[0] < 0.0 ? -1.0 : 1.0;
+    double size =
+        sqrt(quaternion[1] * quaternion[1] + quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3]);
+    double real = sign * quaternion[0];
     /* The angle over the length of the quaternion's vector. */
     double factor = size > 1e-9 * real ? 2.0 * atan2(size, real) / size : 2.0 / real;
     for (int i = 0; i < 3; i++) {
-        vector[i] = sign * factor * found[1 + i];
+        vector[i] = sign * factor * quaternion[1 + i];
     }
 }
 
@@ -138,14 +139,14 @@ static inline twist turn_axes(vec w, twist a)
     return (twist){cross(w, a.w), cross(w, a.v)};
 }
 
-/* The tool's acceleration that rates alone make, from the columns of its Jacobian. */
-static inline twist bias_of(long n, const twist *columns, const pack *rates, int in_tool_axes)
+/* The tool's acceleration Jdot qdot, from the columns of its Jacobian. */
+static inline twist bias_of(long n, const twist *columns, const pack *qdot, int in_tool_axes)
 {
     twist V = {0};
     twist a = {0};
     for (long i = 0; i < n; i++) {
-        a = add_twists(a, scale_twist(cross_twists(V, columns[i]), rates[i]));
-        V = add_twists(V, scale_twist(columns[i], rates[i]));
+        a = add_twists(a, scale_twist(cross_twists(V, columns[i]), qdot[i]));
+        V = add_twists(V, scale_twist(columns[i], qdot[i]));
     }
     if (!in_tool_axes) {
         a.v = add(a.v, cross(V.w, V.v));
@@ -153,33 +154,32 @@ static inline twist bias_of(long n, const twist *columns, const pack *rates, int
     return a;
 }
 
-/* Derivatives of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian, rates and their own
-rates. Joints after joint i carry its axis relative to the tool: in the tool's axes dJ_i/dq_k = [J_i, J_k] for i < k,
-else 0 (Murray, Li, Sastry 1994, chapter 3). With S_k and s_k the parts of V and a that come from the joints before
-joint k,
+/* Derivatives of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian, qdot and qddot. Joints after
+joint i carry its axis relative to the tool: in the tool's axes dJ_i/dq_k = [J_i, J_k] for i < k, else 0 (Murray, Li, Sastry 1994,
+chapter 3). With S_k and s_k the parts of V and a that come from the joints before joint k,
     dV/dq_k = [S_k, J_k],    da/dq_k = [s_k, J_k] + [[S_k, J_k], V - S_k],    da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
 In the world's axes the tool's turn with each joint, and a point of it has the acceleration a_v + w x v. */
 static inline void differentiate_tool(
-    long n, const twist *columns, const pack *rates, const pack *more, int in_tool_axes, twist *velocity_q,
-    twist *acceleration_q, twist *acceleration_qdot
+    long n, const twist *columns, const pack *qdot, const pack *qddot, int in_tool_axes, twist *V_q, twist *a_q,
+    twist *a_qdot
 )
 {
-    twist before[n], parts[n];
+    twist S[n], s[n];
     twist V = {0};
     twist a = {0};
     for (long i = 0; i < n; i++) {
-        before[i] = V;
-        parts[i] = a;
-        velocity_q[i] = cross_twists(V, columns[i]);
-        V = add_twists(V, scale_twist(columns[i], rates[i]));
-        a = add_twists(a, scale_twist(columns[i], more[i]));
-        a = add_twists(a, scale_twist(velocity_q[i], rates[i]));
+        S[i] = V;
+        s[i] = a;
+        V_q[i] = cross_twists(V, columns[i]);
+        V = add_twists(V, scale_twist(columns[i], qdot[i]));
+        a = add_twists(a, scale_twist(columns[i], qddot[i]));
+        a = add_twists(a, scale_twist(V_q[i], qdot[i]));
     }
     twist classical = {a.w, add(a.v, cross(V.w, V.v))};
     for (long i = 0; i < n; i++) {
-        twist after = add_twists(V, scale_twist(before[i], all(-1.0)));
-        twist slope = velocity_q[i];
-        twist by_q = add_twists(cross_twists(parts[i], columns[i]), cross_twists(slope, after));
+        twist after = add_twists(V, scale_twist(S[i], all(-1.0)));
+        twist slope = V_q[i];
+        twist by_q = add_twists(cross_twists(s[i], columns[i]), cross_twists(slope, after));
         twist by_qdot = add_twists(scale_twist(slope, all(2.0)), cross_twists(columns[i], V));
         if (!in_tool_axes) {
             vec w = columns[i].w;
@@ -188,9 +188,9 @@ static inline void differentiate_tool(
             by_q = add_twists(by_q, turn_axes(w, classical));
             slope = add_twists(slope, turn_axes(w, V));
         }
-        velocity_q[i] = slope;
-        acceleration_q[i] = by_q;
-        acceleration_qdot[i] = by_qdot;
+        V_q[i] = slope;
+        a_q[i] = by_q;
+        a_qdot[i] = by_qdot;
     }
 }
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import compute
+from brachis.kernel.library import call_checked
 
 
 def tool_derivatives(
     twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, *, in_tool_axes: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> np.ndarray:
     """Differentiate the tool's velocity V = J qdot and its acceleration a = J qddot + Jdot qdot.
 
     Parameters
@@ -22,16 +22,16 @@ def tool_derivatives(
 
     Returns
     -------
-    tuple of (6, K, n) ndarray
+    (3, 6, K, n) ndarray
         dV/dq, da/dq and da/dqdot.
     """
-    velocity_q, acceleration_q, acceleration_qdot = compute(
+    derivatives: np.ndarray = call_checked(
         "brachis_tool_derivatives", twists, qdot, qddot, in_tool_axes
     )
-    return velocity_q, acceleration_q, acceleration_qdot
+    return derivatives
 
 
 def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
     """Rotation vectors, (K, 3), rad, of rotation matrices, (K, 3, 3)."""
-    vectors: np.ndarray = compute("brachis_logarithms", rotations)
+    vectors: np.ndarray = call_checked("brachis_logarithms", rotations)
     return vectors

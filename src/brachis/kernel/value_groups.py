@@ -24,11 +24,11 @@ _GROUP = np.dtype(
         ("values", "l"),
         ("quantity", "l"),
         *((name, np.intp) for name in _OF_VALUES),
-        *((f"{name}_{part}", "l") for name in _PARTIAL for part in ("at", "step")),
+        *((f"{name}_{field}", "l") for name in _PARTIAL for field in ("at", "step")),
         ("s", np.intp),
     ]
 )
-"""`group` of motion.h."""
+"""`value_group` of motion.h."""
 
 Partial = np.ndarray | None
 
@@ -103,7 +103,7 @@ class ValueGroups:
     ) -> None:
         self._quantities = tuple(quantities)
         self._sizes = tuple(sizes)
-        self._kept: list[np.ndarray] = []
+        self._arrays: list[np.ndarray] = []
         self._first = np.cumsum([0, *sizes]).tolist()
         self._table = np.zeros(len(self._sizes), dtype=_GROUP)
         self._table["values"] = self._sizes
@@ -114,57 +114,59 @@ class ValueGroups:
         self._joints: int | None = None
         self._formulas: list[int] = []
         self.with_partials = [
-            number for number, own in enumerate(quantities) if own is None
+            i for i, quantity in enumerate(quantities) if quantity is None
         ]
-        for number, own in enumerate(quantities):
-            if isinstance(own, FormulaQuantity):
-                self._set_formula(number, own)
-            elif own is not None:
-                self._set(self._table[number], own)
+        for number, quantity in enumerate(quantities):
+            if isinstance(quantity, FormulaQuantity):
+                self._set_formula(number, quantity)
+            elif quantity is not None:
+                self._set(self._table[number], quantity)
 
     def __reduce__(self) -> tuple[type[ValueGroups], tuple[Any, ...]]:
         """Leave addresses behind."""
         return ValueGroups, (self._quantities, self._sizes)
 
-    def _set_formula(self, number: int, own: FormulaQuantity) -> None:
+    def _set_formula(self, number: int, quantity: FormulaQuantity) -> None:
         """Set what the library reads of a formula."""
         row = self._table[number]
         size = int(row["values"])
-        (n,) = own.values_of.counts
-        found = (own.values_of.shape, own.slopes_of.shape, own.slopes_of.counts)
-        if found != ((size,), (size, n), (n,)):
-            raise ValueError(f"the formulas of {size} values have the shapes {found}")
-        factors = as_contiguous(own.factors, (size,))
+        values_of = quantity.values_of
+        slopes_of = quantity.slopes_of
+        (n,) = values_of.counts
+        shapes = (values_of.shape, slopes_of.shape, slopes_of.counts)
+        if shapes != ((size,), (size, n), (n,)):
+            raise ValueError(f"the formulas of {size} values have the shapes {shapes}")
+        factors = as_contiguous(quantity.factors, (size,))
         self._set_joints(n)
-        self._kept.append(factors)
+        self._arrays.append(factors)
         self._formulas.append(number)
         row["quantity"] = _FORMULA
         row["factors"] = address(factors)
-        row["values_of"] = own.values_of.address
-        row["slopes_of"] = own.slopes_of.address
+        row["values_of"] = values_of.address
+        row["slopes_of"] = slopes_of.address
 
-    def _set(self, row: np.void, own: ScaledQuantity) -> None:
+    def _set(self, row: np.void, scaled: ScaledQuantity) -> None:
         """Set what the library reads of a scaled quantity."""
-        quantity = QUANTITIES.index(own.quantity)
-        joints = np.ascontiguousarray(own.joints, dtype="l")
+        quantity = QUANTITIES.index(scaled.quantity)
+        joints = np.ascontiguousarray(scaled.joints, dtype="l")
         count = row["values"]
-        if len(joints) and not 0 <= joints.min() <= joints.max() < own.chain.n:
-            raise ValueError(f"a joint does not exist; there are {own.chain.n}")
-        offsets = as_contiguous(own.offsets, (count,))
-        factors = as_contiguous(own.factors, (count,))
+        if len(joints) and not 0 <= joints.min() <= joints.max() < scaled.chain.n:
+            raise ValueError(f"a joint does not exist; there are {scaled.chain.n}")
+        offsets = as_contiguous(scaled.offsets, (count,))
+        factors = as_contiguous(scaled.factors, (count,))
         if joints.shape != (count,):
             raise ValueError("joints are not as many as values")
-        self._set_joints(own.chain.n)
+        self._set_joints(scaled.chain.n)
         row["quantity"] = quantity
         row["joints"] = address(joints)
         row["offsets"] = address(offsets)
         row["factors"] = address(factors)
-        self._kept += [joints, offsets, factors]
-        self.has_jerk |= own.quantity == "qdddot"
+        self._arrays += [joints, offsets, factors]
+        self.has_jerk |= scaled.quantity == "qdddot"
         if quantity == _TORQUE:
-            if self.chain not in (None, own.chain):
+            if self.chain not in (None, scaled.chain):
                 raise ValueError("torques are of more than one chain")
-            self.chain = own.chain
+            self.chain = scaled.chain
 
     def _set_joints(self, n: int) -> None:
         if self._joints not in (None, n):
@@ -176,12 +178,12 @@ class ValueGroups:
         if self._joints not in (None, n):
             raise ValueError(f"the motion has {n} joints; needed: {self._joints}")
 
-    def split(self, found: np.ndarray, count: int) -> list[np.ndarray]:
+    def split(self, values: np.ndarray, count: int) -> list[np.ndarray]:
         """Divide values of K points, of one group behind the other, into (K, size) of each group."""
-        parts = zip(self._first, self._sizes, strict=False)
+        groups = zip(self._first, self._sizes, strict=False)
         return [
-            found[count * first : count * (first + size)].reshape(count, size)
-            for first, size in parts
+            values[count * first : count * (first + size)].reshape(count, size)
+            for first, size in groups
         ]
 
     def values(
@@ -207,25 +209,25 @@ class ValueGroups:
             raise ValueError("a group needs qdddot")
         if self.chain is not None and torque is None:
             raise ValueError("a group needs the torque")
-        kept: list[np.ndarray] = []
-        nothing = [None] * (_TORQUE - len(states))
-        given = (*states, *nothing, torque)
-        addresses = [keep_address(own, (count, n), kept) for own in given]
-        found = np.empty(count * self.size)
+        arrays: list[np.ndarray] = []
+        missing = [None] * (_TORQUE - len(states))
+        quantities = (*states, *missing, torque)
+        addresses = [hold_and_address(q, (count, n), arrays) for q in quantities]
+        values = np.empty(count * self.size)
         of_states = (ctypes.c_void_p * len(QUANTITIES))(*addresses)
         table = self._table
-        call("brachis_values", count, n, of_states, len(table), table, found)
-        return self.split(found, count)
+        call("brachis_values", count, n, of_states, len(table), table, values)
+        return self.split(values, count)
 
     def table_with(
         self,
         partials: Sequence[tuple[Sequence[Partial], Partial]],
         points: tuple[int, int],
-        kept: list[np.ndarray],
+        arrays: list[np.ndarray],
     ) -> np.ndarray:
         """Return what the library reads, with partials at K points of n joints; see `differentiate`.
 
-        What is added to `kept` has to stay alive.
+        What is added to `arrays` has to stay alive.
         """
         if not (self.with_partials or self._formulas):
             return self._table
@@ -233,23 +235,23 @@ class ValueGroups:
         table = self._table.copy()
         pairs = zip(self.with_partials, partials, strict=True)
         for number, (by_joints, by_s) in pairs:
-            _set_partials(table[number], by_joints, by_s, points, kept)
+            _set_partials(table[number], by_joints, by_s, points, arrays)
         for number in self._formulas:
             size = self._sizes[number]
-            kept.append(np.empty((count, size, n)))
-            table[number]["q_at"] = address(kept[-1])
+            arrays.append(np.empty((count, size, n)))
+            table[number]["q_at"] = address(arrays[-1])
             table[number]["q_step"] = size * n
         return table
 
 
-def keep_address(
-    values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]
+def hold_and_address(
+    values: Partial, shape: tuple[int, ...], arrays: list[np.ndarray]
 ) -> int | None:
-    """Return where numbers are, None without any; what is added to `kept` has to stay alive."""
+    """Return where numbers are, None without any; what is added to `arrays` has to stay alive."""
     if values is None:
         return None
-    kept.append(as_contiguous(values, shape))
-    return address(kept[-1])
+    arrays.append(as_contiguous(values, shape))
+    return address(arrays[-1])
 
 
 def _set_partials(
@@ -257,16 +259,16 @@ def _set_partials(
     by_joints: Sequence[Partial],
     by_s: Partial,
     points: tuple[int, int],
-    kept: list[np.ndarray],
+    arrays: list[np.ndarray],
 ) -> None:
-    """Set what the library reads of partials at K points of n joints; see `keep_address`."""
+    """Set what the library reads of partials at K points of n joints; see `hold_and_address`."""
     count, n = points
     size = int(row["values"])
     for name, partial in zip(_PARTIAL, by_joints, strict=True):
         if partial is None:
             continue
-        own, step = as_doubles_at_points(partial, (count, size, n))
-        kept.append(own)
-        row[f"{name}_at"] = address(own)
+        numbers, step = as_doubles_at_points(partial, (count, size, n))
+        arrays.append(numbers)
+        row[f"{name}_at"] = address(numbers)
         row[f"{name}_step"] = step
-    row["s"] = keep_address(by_s, (count, size), kept) or 0
+    row["s"] = hold_and_address(by_s, (count, size), arrays) or 0

@@ -119,7 +119,7 @@ class ChartRows:
         if self.is_constant:
             return {"rows": self.coefficients[0]}
         orders = self._orders_at(s)
-        return {"rows": orders[0], "turning": orders[1:]}
+        return {"rows": orders[0], "row_derivatives": orders[1:]}
 
 
 class ChartMap(PathMap):

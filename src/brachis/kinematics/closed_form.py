@@ -126,8 +126,8 @@ class ClosedFormMap(PathMap):
     def write_answers(self, motion: PathMotion) -> None:
         """Write the answers where the kernel has no formula of them."""
         if self.branch_of.answers_of is None:
-            targets = motion.given["targets"]
-            q_r = motion.given["y"][:, 1:]
+            targets = motion.inputs["targets"]
+            q_r = motion.inputs["y"][:, 1:]
             answers = self.solver.solve_branch(targets, q_r, self.branch)
             if np.shape(answers) != motion.answers.shape:
                 raise ValueError(

@@ -76,11 +76,11 @@ def breaks_for(
         rate,
         jumps,
         ramps,
-        few=_FEW,
-        pieces=max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL),
+        least_times=_FEW,
+        begin_count=max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL),
         tolerance=tolerance,
         shortest=1.0 / len(timing.times),
-        most=max_intervals,
+        max_count=max_intervals,
     )
     return even_out(np.append(begins, 1.0))
 

@@ -30,7 +30,7 @@ from typing import TypedDict
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.kernel import largest_parts
+from brachis.kernel import find_largest_products
 from brachis.limits import HasLatticeWeights
 from brachis.problem.problem import Problem
 from brachis.robot.joints import TURN
@@ -449,5 +449,7 @@ class Lattice(ABC):
                 continue
             for length, rows in zip(lengths, limit.lattice_weights(q), strict=True):
                 if rows is not None:
-                    np.maximum(length, largest_parts(rows, step, origin), out=length)
+                    np.maximum(
+                        length, find_largest_products(rows, step, origin), out=length
+                    )
         return lengths[0] + 0.5 * lengths[1]  # T = 0.5 s
