@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import pickle
 import subprocess
 import sys
 
@@ -147,29 +146,6 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
 
 
 @pytest.mark.parametrize(
-    ("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (panda_lengths, (4,))]
-)
-def test_answers_of_a_sign_differ_and_stand_in_ascending_order(robot, redundant):
-    bench = Bench(robot(), redundant, 500)
-    answers = bench.solve(bench.q).reshape(-1, PER_SIGN, 6)
-    count = np.isfinite(answers).all(axis=2).sum(axis=1)
-    assert np.array_equal(
-        np.isfinite(answers[:, :, 0]), np.arange(PER_SIGN) < count[:, None]
-    ), "no gaps between alternatives"
-    for first in range(PER_SIGN):
-        assert not np.any(np.diff(answers[:, first:, 0], axis=1) < -0.01)
-        for second in range(first):
-            both = count > first
-            gap = np.abs(
-                wrapped(
-                    answers[both, first] - answers[both, second], np.ones(6, dtype=bool)
-                )
-            )
-            assert np.all(gap.max(axis=1) > 1e-4)
-    assert count.max() == 4
-
-
-@pytest.mark.parametrize(
     ("robot", "redundant"),
     [(ur, ()), (iiwa, (2,)), (panda_lengths, (5,)), (much_redundant, (0, 1, 4, 9))],
 )
@@ -182,59 +158,6 @@ def test_margin_gradient(robot, redundant):
                 bench.q + step, branch
             ) - bench.solver.branch_margins(bench.q - step, branch)
             np.testing.assert_allclose(exact[:, :, joint], change / 2e-6, atol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("robot", "redundant", "elbow"),
-    [(ur, (), 2), (iiwa, (2,), 3), (telescope, (2, 3), 4)],
-)
-def test_margins_vanish_where_answers_merge(robot, redundant, elbow):
-    bench = Bench(robot(), redundant, 200)
-    bent = bench.q.copy()
-    bent[:, elbow] = 0.1
-    straight = bench.q[
-        np.abs(bench.margin(bent)) > 0.02
-    ]  # nothing but the elbow is stretched
-    assert len(straight) > 50
-    margins, distances = [], []
-    for bend in (1e-3, 1e-4):
-        q = straight.copy()
-        q[:, elbow] = bend
-        margin, answers = bench.margin(q), bench.solve(q)
-        other = answers[np.arange(len(q)), (margin > 0.0).astype(int)]
-        gap = np.abs(
-            wrapped(other - q[:, None, bench.rest], np.ones(6, dtype=bool))
-        ).max(axis=2)
-        margins.append(np.abs(margin) / bend)
-        distances.append(np.nanmin(gap, axis=1) / bend)
-    for ratios in (margins, distances):
-        np.testing.assert_allclose(ratios[0], ratios[1], rtol=0.1)
-        assert 1e-2 < ratios[1].min() < ratios[1].max() < 100.0
-
-
-@pytest.mark.parametrize(
-    ("robot", "redundant"),
-    [(ur, ()), (iiwa, (1,)), (panda_lengths, (3,)), (rail_arm, (0,))],
-)
-def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundant):
-    bench = Bench(robot(), redundant, 150)
-    t = np.linspace(0.0, 1.0, 301)[:, None]
-    followed = 0
-    for start in bench.q:
-        q = start + 0.5 * np.sin(2.0 * np.pi * t * np.linspace(0.4, 1.0, bench.robot.n))
-        margin = bench.margin(q)
-        if np.abs(margin).min() < 0.03:
-            continue
-        answers = bench.solve(q)[:, int(margin[0] < 0.0)]
-        joint_path = [q[0, bench.rest]]
-        for choice in answers:
-            gap = wrapped(choice - joint_path[-1], np.ones(6, dtype=bool))
-            joint_path.append(
-                joint_path[-1] + gap[np.nanargmin(np.abs(gap).max(axis=1))]
-            )
-        np.testing.assert_allclose(joint_path[1:], q[:, bench.rest], atol=1e-8)
-        followed += 1
-    assert followed >= 5
 
 
 @pytest.mark.parametrize(
@@ -289,29 +212,6 @@ def test_postures_with_joints_at_quarter_turns():
         assert bench.own_gap(q, bench.solve(q)).max() < 1e-7
 
 
-@pytest.mark.parametrize(
-    ("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (much_redundant, (0, 1, 4, 9))]
-)
-def test_what_cannot_be_solved_is_nan_and_disturbs_nothing(robot, redundant):
-    bench = Bench(robot(), redundant, 30)
-    targets, q_r = bench.poses(bench.q), bench.q[:, bench.redundant]
-    clean = bench.solver.solve(targets, q_r)
-    assert np.isfinite(clean).any(axis=(1, 2, 3)).all()
-    targets[3, :3] += 50.0
-    targets[5, 0] = np.nan
-    targets[7, 4] = np.inf
-    spoilt = [3, 5, 7]
-    if redundant:
-        q_r[9, 0] = np.nan
-        spoilt.append(9)
-    answers = bench.solver.solve(targets, q_r)
-    assert np.isnan(answers[spoilt]).all()
-    others = np.setdiff1d(np.arange(30), spoilt)
-    np.testing.assert_allclose(answers[others], clean[others], atol=1e-12)
-    assert bench.solver.solve(targets[:0], q_r[:0]).shape == (0, 2, PER_SIGN, 6)
-    assert np.isnan(bench.solver.solve(targets[[3]], q_r[[3]])).all()
-
-
 def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
     monkeypatch,
 ):
@@ -325,21 +225,6 @@ def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
         np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
     one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])
     np.testing.assert_allclose(one_by_one, first, atol=1e-12)
-
-
-@pytest.mark.parametrize(("robot", "redundant"), [(ur, ()), (iiwa, (4,))])
-def test_solvers_can_be_pickled_after_use(robot, redundant):
-    bench = Bench(robot(), redundant, 100)
-    answers = bench.solve(bench.q)
-    bench.solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301  (our own)
-    np.testing.assert_allclose(bench.solve(bench.q), answers, atol=1e-12)
-    np.testing.assert_allclose(
-        bench.margin(bench.q), eaik_margin(robot(), redundant, bench.q), atol=1e-12
-    )
-
-
-def eaik_margin(robot, redundant, q):
-    return Bench(robot, redundant, 1).margin(q)
 
 
 def rows(robot, *names):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.ik.point_recipes import RECIPES
 from support.factored_bench import Bench
 from support.screw_arms import BASES, extra, screw_robot, wrist
 
@@ -33,29 +32,3 @@ def test_every_recipe(name, arrangement):
     bench = Bench(screw_robot(axes), redundant).check()
     assert len(bench.solver.branches) == 2 * alternatives(name)
     assert len(set(bench.solver.branches)) == len(bench.solver.branches)
-
-
-def test_every_recipe_is_tried_by_a_case_of_its_own():
-    used = {}
-    for name, base in BASES.items():
-        bench = Bench(
-            screw_robot([*base, *wrist(np.random.default_rng(0))]), (), postures=1
-        )
-        used.setdefault(RECIPES.index(bench.solver.recipe), []).append(name)
-    # Two slides behind a third joint move in one plane as well.
-    assert set(used[0]) == {
-        "R|RR",
-        "P|RR",
-        "R|RP",
-        "RP|P",
-        "P|RP",
-        "R|PR",
-        "P|PR",
-        "R|PP",
-        "PP|P",
-        "P|PP",
-    }
-    assert set(used[1]) == {"RR|R", "RR|P", "RP|R", "PR|R", "PR|P", "PP|R"}
-    assert used[2] == ["RxR R", "RxR P"]
-    assert used[3] == ["R RxR", "P RxR"]
-    assert used[4] == ["cylinder"]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import brachis
-from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
+from brachis.ik import ChainGeometry, NotApplicableError
 from brachis.ik.point_recipes import RECIPES, positioning
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndAngle
@@ -163,31 +162,6 @@ def test_labels_say_where_the_arm_is():
     assert bench(screw_robot(BASES["P|PP"]), (), 1).solver.branches == ("slides",)
 
 
-# Robot, redundant joints, and the joint of every step with two answers.
-SMOOTH = {
-    "three joints": (three_joints, (), (0, 2)),
-    "scara": (scara, (0,), (2,)),
-    "slide in a plane": (lambda: screw_robot(BASES["R|RP"]), (), (0, 2)),
-    "rail and wrist": (lambda: built("tx90l_rail"), (0, 4, 5, 6), (1, 3)),
-    "joint 1 and wrist": (lambda: built("tx90l_rail"), (1, 4, 5, 6), (None, 3)),
-    "iiwa14": (lambda: built("iiwa14"), (2, 4, 5, 6), (1, 3)),
-    "meeting of the last": (panda, (0, 1, 2, 6), (5, 3)),
-    "backwards": (lambda: screw_robot(BASES["cylinder"][::-1]), (), (0, 0)),
-}
-
-
-@pytest.mark.parametrize("name", SMOOTH)
-def test_labels_follow_the_branch_along_smooth_curves(name):
-    make, redundant, _ = SMOOTH[name]
-    bench(make(), redundant, 1).check_labels_along_curves()
-
-
-@pytest.mark.parametrize("name", SMOOTH)
-def test_margins_vanish_where_two_answers_meet(name):
-    make, redundant, steps = SMOOTH[name]
-    bench(make(), redundant).check_boundaries(steps)
-
-
 def test_refusals():
     robot = built("tx90l_rail")
     geometry, position = ChainGeometry.of(robot), task_map_of(robot, "position")
@@ -230,40 +204,6 @@ def test_refusals_say_what_the_joints_cannot_do():
     ]
     with pytest.raises(NotApplicableError, match="no closed form moves the tool by"):
         bench(screw_robot(askew), (), 1)
-
-
-def test_solvers_can_be_sent_to_other_processes():
-    checked = bench(rail_arm(), (0, 4, 5, 6), 5)
-    solver = pickle.loads(pickle.dumps(checked.solver))  # noqa: S301
-    targets, q_r = checked.targets(checked.q), checked.q[:, [0, 4, 5, 6]]
-    np.testing.assert_allclose(
-        solver.solve(targets, q_r), checked.solver.solve(targets, q_r), atol=1e-12
-    )
-
-
-def test_no_targets_have_no_answers():
-    solver = bench(rail_arm(), (0, 4, 5, 6), 1).solver
-    assert solver.solve(np.empty((0, 3)), np.empty((0, 4))).shape == (0, 4, 1, 3)
-
-
-def test_out_of_reach_is_nan():
-    solver = bench(three_joints(), (), 1).solver
-    assert np.isnan(
-        solver.solve(np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 0.478]]), np.empty((2, 0)))
-    ).all()
-
-
-def test_it_is_found_by_geometry():
-    robot = rail_arm()
-    space = task_map_of(robot, "position")
-    assert find(robot, space, ["j1", "j5", "j6", "j7"]).family == "positioning"
-    families = {
-        candidate.redundant_joints: candidate.family
-        for candidate in find_all(robot, space)
-    }
-    assert families["j2", "j5", "j6", "j7"] == "positioning"
-    slides = screw_robot(BASES["P|PP"])
-    assert find(slides, task_map_of(slides, "position"), []).family == "prismatic"
 
 
 PLANS = {

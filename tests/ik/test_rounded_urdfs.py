@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import itertools
 import json
-import pickle
 import re
 import sysconfig
 from pathlib import Path
@@ -132,64 +131,6 @@ def test_no_answer_is_given_twice(name, joints):
             axis=1
         )
         assert np.nanmin(gap, initial=1.0) > 1e-6
-
-
-LABELLED = [case for case in CASES if len(polished_of(case[0])[case[1]].branches) == 8]
-
-
-@pytest.mark.parametrize(("name", "joints"), LABELLED, ids=str)
-def test_labels_are_continuous_along_smooth_curves(name, joints):
-    bench, followed = bench_of(name, joints, 1), 0
-    for seed in range(3):
-        q = bench.curve(seed)
-        solved = bench.answers(q)
-        ideal = bench.solver.ideal.solve(bench.poses(q), q[:, bench.redundant])[:, :, 0]
-        for branch in range(8):
-            postures, margin = q.copy(), np.full(len(q), -1.0)
-            exists = np.isfinite(ideal[:, branch]).all(axis=1)
-            postures[:, bench.rest] = ideal[:, branch]
-            margin[exists] = bench.solver.branch_margins(postures[exists], branch).min(
-                axis=1
-            )
-            assert np.isfinite(solved[margin > 0.02, branch]).all(), (
-                "the branch ends in its midst"
-            )
-            clear = margin > 0.15
-            assert (
-                np.abs(solved[clear, branch] - ideal[clear, branch]).max(initial=0.0)
-                < 0.01
-            )
-            steps = np.abs(wrapped(np.diff(solved[:, branch], axis=0), bench.turning))
-            assert steps[clear[1:] & clear[:-1]].max(initial=0.0) < 0.5, (
-                "the branch jumps"
-            )
-            followed += np.count_nonzero(clear)
-    assert followed > 2000
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_solvers_can_be_pickled_and_answer_in_the_branch_that_is_asked_for(name):
-    for joints in polished_of(name):
-        bench = bench_of(name, joints, 50)
-        targets, q_r = bench.poses(bench.q), bench.q[:, bench.redundant]
-        solved = bench.solver.solve(targets, q_r)
-        again = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301  (our own)
-        np.testing.assert_allclose(again.solve(targets, q_r), solved, atol=1e-12)
-        for branch in range(len(bench.solver.branches)):
-            own = bench.solver.solve_branch(targets, q_r, branch)
-            np.testing.assert_allclose(own, solved[:, branch], atol=1e-13)
-
-
-def test_what_cannot_be_reached_is_nan():
-    bench = bench_of("TX90L on a rail", ("j1",), 5)
-    targets = bench.poses(bench.q)
-    targets[1, 2] += 10.0
-    targets[2, 5] = np.nan
-    solved = bench.solver.solve(targets, bench.q[:, [0]])
-    assert np.isnan(solved[[1, 2]]).all()
-    assert np.isfinite(solved[[0, 3, 4]]).any(axis=(1, 2, 3)).all()
-    assert bench.solver.solve(targets[:0], bench.q[:0, [0]]).shape == (0, 8, 1, 6)
-    assert np.isnan(bench.solver.solve(targets[[1]], bench.q[[1]][:, [0]])).all()
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import pickle
 
 import numpy as np
 import pytest
@@ -279,26 +278,8 @@ def test_refusals():
         )
 
 
-def test_solvers_can_be_sent_to_other_processes():
-    bench = Bench(rail_arm(), (2,), postures=5)
-    solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301
-    targets, q_r = bench.targets(bench.q), bench.q[:, [2]]
-    np.testing.assert_allclose(
-        solver.solve(targets, q_r), bench.solver.solve(targets, q_r), atol=1e-12
-    )
-
-
-def test_no_targets_have_no_answers():
-    assert Bench(rail_arm(), (0,), 1).solver.solve(
-        np.empty((0, 12)), np.empty((0, 1))
-    ).shape == (0, 8, 1, 6)
-
-
-def test_it_is_found_by_geometry():
+def test_a_refusal_lists_the_choices_that_have_a_closed_form():
     robot = rail_arm()
-    match = find(robot, task_map_of(robot, "pose"), ["j1"], families=[spherical_wrist])
-    assert match.family == "spherical_wrist"
-    assert "point_recipes" in spherical_wrist.source
     with pytest.raises(
         DecompositionError, match="no two neighbours among them move in one plane"
     ) as caught:
@@ -309,3 +290,20 @@ def test_it_is_found_by_geometry():
             families=[spherical_wrist],
         )
     assert ("j1",) in caught.value.available
+
+
+ALONG = (0.0, 0.0, 1.0)
+SMOOTH = {
+    "rail": (rail_arm, 0),
+    "joint 1": (rail_arm, 1),
+    "joint 3, rail along": (lambda: rail_arm(ALONG), 3),
+    "seven joints": (seven_joints, 2),
+    "backwards": (panda, 6),
+    "meeting of the last": (panda, 3),
+}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_labels_follow_the_branch_along_smooth_curves(name):
+    make, redundant = SMOOTH[name]
+    Bench(make(), (redundant,), postures=1).check_labels_along_curves()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sysconfig
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from brachis.ik import ChainGeometry, Family, IKSolver
@@ -172,21 +171,6 @@ def example_robot(name: str) -> Robot:
     return Robot.from_urdf(path, tool_frame="tool0")
 
 
-def zero_crossing(
-    function: Callable[[np.ndarray], np.ndarray], q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Posture of a curve (K, n) at which a function of postures first vanishes, and the curve's step there."""
-    crossings = np.flatnonzero(np.diff(np.sign(function(q))))
-    if len(crossings) == 0:
-        return None
-    start = q[crossings[0]]
-    step = q[crossings[0] + 1] - start
-    share = brentq(
-        lambda x: function((start + x * step)[None])[0], 0.0, 1.0, xtol=1e-14
-    )
-    return start + share * step, step
-
-
 class PoseBench:
     """Random postures of a robot, their poses, and a family's solver for some redundant joints."""
 
@@ -236,10 +220,6 @@ class PoseBench:
             wrapped(solved - q[:, *[None] * (solved.ndim - 2), self.rest], self.turning)
         ).max(axis=-1)
         return np.where(np.isnan(delta), np.inf, delta)
-
-    def difference(self, first: np.ndarray, second: np.ndarray) -> float:
-        """Largest difference of two answers."""
-        return float(np.abs(wrapped(first - second, self.turning)).max())
 
     def margins(self, q: np.ndarray) -> np.ndarray:
         """Margins (K, B, k) of all branches."""
@@ -292,15 +272,3 @@ class PoseBench:
                 np.testing.assert_allclose(
                     exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7
                 )
-
-    def curve(self, seed: int, samples: int = 2001) -> np.ndarray:
-        """A smooth random motion of all joints, (samples, n)."""
-        rng, n, t = (
-            np.random.default_rng(seed),
-            self.robot.n,
-            np.linspace(0.0, 1.0, samples)[:, None],
-        )
-        sway = rng.uniform(0.5, 2.0, n) * np.sin(
-            2.0 * np.pi * t * rng.uniform(0.3, 1.0, n)
-        )
-        return rng.uniform(-2.0, 2.0, n) + sway

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
-from scipy.optimize import brentq
 
 from brachis.ik import ChainGeometry
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import task_map_of
-
-
-def wrapped(delta, turning):
-    return np.where(turning, np.remainder(delta + np.pi, 2.0 * np.pi) - np.pi, delta)
+from support.closed_forms import wrapped
 
 
 class Bench:
@@ -154,45 +148,3 @@ class Bench:
             changes += np.count_nonzero(turned)
         assert changes >= 2, "no curve crossed a boundary: the test shows nothing"
         assert followed > 4000
-
-    def other_answer(self, posture, kind):
-        """The answer in the branch that one margin's sign tells apart from the posture's own."""
-        margins = self.margins(posture[None])[0]
-        others = np.delete(margins, kind, axis=1)
-        branch = np.flatnonzero((margins[:, kind] < 0.0) & (others > 0.0).all(axis=1))
-        assert len(branch) == 1
-        return self.answers(posture[None])[0, branch[0]]
-
-    def check_boundaries(self, steps):
-        """Two answers meet where a margin vanishes; `steps` are the joints whose answers do, None for a linear step."""
-        assert self.margins(self.q[:1]).shape[2] == len(steps)
-        largest, met = np.abs(self.determinant(self.q)).max(), [0] * len(steps)
-        for (start, end), kind in itertools.product(
-            itertools.pairwise(self.q[:50] * 0.8), range(len(steps))
-        ):
-            if met[kind] >= 6:
-                continue
-
-            def margin(x, start=start, end=end, kind=kind):
-                return self.solver.branch_margins((start + x * (end - start))[None], 0)[
-                    0, kind
-                ]
-
-            if margin(0.0) * margin(1.0) > 0.0:
-                continue
-            at = brentq(margin, 0.0, 1.0, xtol=1e-15)
-            edge, beside = (
-                start + at * (end - start),
-                start + (at + 1e-5) * (end - start),
-            )
-            others = np.abs(np.delete(self.margins(edge[None])[0, 0], kind))
-            if others.min(initial=np.inf) < 0.1 or abs(margin(at + 1e-5)) < 1e-6:
-                continue
-            assert np.abs(self.determinant(edge[None])[0]) < 1e-12 * largest
-            other, step = self.other_answer(beside, kind), steps[kind]
-            if step is None:  # a slide would have to go to infinity
-                assert np.isnan(other[self.rest]).all()
-                met[kind] += 1
-            else:  # or the step's joint moves nothing: then its two answers differ
-                met[kind] += np.abs(wrapped(other - beside, turning=True))[step] < 1e-3
-        assert min(met) >= 3, "some boundary was not visited"
