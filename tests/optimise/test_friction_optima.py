@@ -77,6 +77,7 @@ def coulomb_time() -> float:
 
 
 FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
+HEAVY = 2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE)
 
 
 @pytest.mark.parametrize(
@@ -91,12 +92,8 @@ FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
             EVEN,
             FRICTIONLESS,
         ),
-        (
-            slide(),
-            {"rotor_inertia": 1e-4, "gear_ratio": 200.0},
-            EVEN,
-            2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE),
-        ),
+        (slide(), {"rotor_inertia": 1e-4, "gear_ratio": 200.0}, EVEN, HEAVY),
+        (slide(), {"armature": 4.0}, EVEN, HEAVY),
     ],
     ids=[
         "viscous of the URDF",
@@ -104,6 +101,7 @@ FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
         "Coulomb of the URDF",
         "switched off",
         "rotor",
+        "armature",
     ],
 )
 def test_slides_with_friction_reach_the_known_optimum(urdf, friction, spline, expected):
@@ -125,9 +123,3 @@ def test_a_motion_without_friction_exceeds_the_torque_of_a_drive_that_rubs(urdf)
     )
     checks = verify_trajectory(free.trajectory, robot=rubbing).checks
     assert [check.name for check in checks if not check.passed] == ["torque ratio"]
-
-
-def test_the_friction_in_use_is_said_in_the_result():
-    said = plan(slide(VISCOUS, COULOMB), FEW).to_dict()["in_use"]
-    assert said["viscous friction"] == "j1 12 N s/m (as the URDF states it)"
-    assert said["Coulomb friction"] == "j1 20 N (as the URDF states it)"

@@ -81,37 +81,40 @@ def changes_to(*programs):
 FIRST = solved(Fake(5.0))
 
 
-def test_every_motion_is_kept_unless_said_otherwise():
-    changes, seen = changes_to(Fake(4.0), Fake(6.0), Fake(5.5))
-    found = improve(FIRST, changes, partial(attempt_once, solve))
-    assert found.t_end == 5.5
-    assert seen == [5.0, 4.0, 6.0]
-    assert [report.objective for report in found.reports] == [5.0, 4.0, 6.0, 5.5]
+GAINS = {"least_gain": 0.0, "go_on_above": None}
+KEEPING = {
+    "every motion": ([4.0, 6.0, 5.5], {}, 5.5, [5.0, 4.0, 6.0]),
+    "gains alone": ([4.0, 6.0, 4.5], GAINS, 4.0, [5.0, 4.0, 4.0]),
+    "up to a small gain": (
+        [4.0, 3.99, 1.0],
+        {"least_gain": 0.0, "go_on_above": 0.01},
+        3.99,
+        [5.0, 4.0],
+    ),
+    "what something else judges to be better": (
+        [4.0, 6.0],
+        {**GAINS, "judge": lambda solved: 10.0 - solved.t_end},
+        6.0,
+        [5.0, 5.0],
+    ),
+}
 
 
-def test_only_gains_are_kept_and_the_report_of_what_is_kept_is_the_last():
-    changes, seen = changes_to(Fake(4.0), Fake(6.0), Fake(4.5))
-    found = improve(
-        FIRST, changes, partial(attempt_once, solve), least_gain=0.0, go_on_above=None
-    )
-    assert found.t_end == 4.0
-    assert found.program.t_end == 4.0
-    assert seen == [5.0, 4.0, 4.0]
-    assert [report.objective for report in found.reports] == [5.0, 6.0, 4.5, 4.0]
-
-
-def test_a_small_gain_is_kept_and_is_the_last():
-    changes, seen = changes_to(Fake(4.0), Fake(3.99), Fake(1.0))
-    attempt = partial(attempt_once, solve)
-    found = improve(FIRST, changes, attempt, least_gain=0.0, go_on_above=0.01)
-    assert found.t_end == 3.99
-    assert len(seen) == 2
+@pytest.mark.parametrize("case", KEEPING)
+def test_which_motions_stay(case):
+    times, options, t_end, proposed_from = KEEPING[case]
+    changes, seen = changes_to(*map(Fake, times))
+    best = improve(FIRST, changes, partial(attempt_once, solve), **options)
+    assert best.t_end == best.program.t_end == best.reports[-1].objective == t_end
+    assert seen == proposed_from
+    tried = times[: len(seen)]
+    assert sorted(report.objective for report in best.reports) == sorted([5.0, *tried])
 
 
 def test_a_failure_ends_it():
     changes, seen = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
-    found = improve(FIRST, changes, partial(attempt_once, solve))
-    assert found.t_end == 4.0
+    best = improve(FIRST, changes, partial(attempt_once, solve))
+    assert best.t_end == 4.0
     assert len(seen) == 2
 
 
@@ -150,20 +153,7 @@ def test_an_early_end_counts_if_it_is_faster_than_its_beginning():
     assert kept.t_end == 5.0
 
 
-def test_judged_by_something_else():
-    changes, _ = changes_to(Fake(4.0), Fake(6.0))
-    found = improve(
-        FIRST,
-        changes,
-        partial(attempt_once, solve),
-        least_gain=0.0,
-        go_on_above=None,
-        judge=lambda tried: 10.0 - tried.t_end,
-    )
-    assert found.t_end == 6.0
-
-
-def test_the_answer_is_lengthened_by_the_factor():
+def test_the_end_time_has_the_factor_of_the_answer():
     lengthened = SolvedProgram(Fake(5.0), FIRST.reports, time_scaled=1.01)
     assert lengthened.t_end == pytest.approx(5.05)
     assert lengthened.report.x[0] == 5.0

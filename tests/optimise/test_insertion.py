@@ -13,7 +13,6 @@ from brachis.optimise.bspline import (
     basis_derivatives,
     basis_functions,
     clamped_knots,
-    clamped_uniform_knots,
     insert_knots,
     local_basis,
 )
@@ -47,18 +46,6 @@ def test_the_same_curves(degree, old, new, seed):
         BSpline(fine_knots, inserted.T, degree)(t_norm),
     )
     np.testing.assert_allclose(after, before, atol=1e-13)
-
-
-def test_one_knot_by_boehm():
-    """Boehm's rule: new points divide the old legs in the ratio of the new knot."""
-    points = np.array([[0.0, 1.0, 3.0, -2.0]])
-    inserted = insert_knots(
-        points,
-        clamped_uniform_knots(3, 1),
-        clamped_knots(3, np.array([0.0, 0.25, 1.0])),
-        3,
-    )
-    np.testing.assert_allclose(inserted, [[0.0, 0.25, 1.5, 1.75, -2.0]], atol=1e-15)
 
 
 @pytest.mark.parametrize("degree", range(2, 7))

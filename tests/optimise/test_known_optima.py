@@ -90,12 +90,6 @@ def bang_bang(mass: float) -> float:
     return 2.0 * np.sqrt(mass * LENGTH / FORCE)
 
 
-def test_one_slide(slides):
-    result = plan(slides([X], [FORCE]), ["x"], [LENGTH])
-    assert result.verified
-    assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
-
-
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 @pytest.mark.parametrize(
     ("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)]
@@ -321,18 +315,6 @@ def test_rest_in_jerk_too(slides):
     assert np.abs(np.diff(jerk, axis=0)).max() < 0.05 * JERK, "it is continuous"
     best = (32.0 * LENGTH / JERK) ** (1.0 / 3.0)
     assert best < result.t_end < 1.03 * best
-
-
-def test_armature_is_carried_like_mass(slides):
-    result = plan(
-        slides([X, Y], [FORCE, FORCE]),
-        ["x", "y"],
-        [LENGTH, 0.0],
-        robot={"friction": {"armature": {"j1": 3.0}}},
-    )
-    best = bang_bang(2.0 * MASS + 3.0)
-    assert result.verified
-    assert best <= result.t_end < 1.01 * best
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0], ids=["up", "down"])

@@ -131,19 +131,6 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     assert rough.program.phases[0].violation(rough.x).max() < 1e-5
 
 
-def test_a_round_beyond_its_end_gains_little(solved):
-    tolerance = 0.02
-    fine = refine_mesh(
-        solved, solve, SplineSettings(intervals="auto", tolerance=tolerance), NEVER
-    )
-    first = SolvedProgram(fine.program, (fine.report,))
-    again = refine_mesh(
-        first, solve, SplineSettings(intervals="auto", tolerance=tolerance), NEVER
-    )
-    assert again.program.intervals > fine.program.intervals
-    assert again.t_end > (1.0 - tolerance) * fine.t_end
-
-
 class Broken:
     """A solver that breaks down in every session."""
 
@@ -348,11 +335,6 @@ def test_settings_choose_what_is_done(solved):
     auto = SplineSettings(intervals="auto", tolerance=0.1)
     finer = adapt_mesh(known, solve, auto, options)
     assert finer.program.intervals > program.intervals
-
-
-def test_auto_begins_coarse():
-    program, _ = brachis.transcribe(robot(), task(intervals="auto"))
-    assert program.intervals == 10
 
 
 def test_a_mesh_is_refined_where_a_mean_torque_holds_the_motion():

@@ -90,8 +90,3 @@ def test_value_is_the_mean_square_over_time():
     assert LeastAcceleration(weights, np.array([5.0])).value(phase, x) == pytest.approx(
         expected, rel=1e-6
     )
-
-
-def test_a_program_without_an_objective_minimises_the_end_time_unbounded():
-    phase = phase_of("r1")
-    assert Program([phase]).x_upper[0] == np.inf

@@ -217,10 +217,7 @@ def test_jacobian_of_links_in_motion(case, knots):
     np.testing.assert_array_equal(
         np.flatnonzero(program.gradient(x)), [0, phases[0].variables]
     )
-    places = program.jacobian_rows * program.variables + program.jacobian_columns
-    assert len(np.unique(places)) == len(places)
-    exact = np.zeros((len(program.lower), program.variables))
-    exact[program.jacobian_rows, program.jacobian_columns] = program.jacobian(x)
+    exact = dense(program, x)
     own = np.arange(len(program.lower) - sum(link.size for link in links), len(exact))
     sides = [
         (program.rows(x + step)[own], program.rows(x - step)[own])
@@ -233,33 +230,6 @@ def test_jacobian_of_links_in_motion(case, knots):
     np.testing.assert_allclose(
         program.rows(x)[own[: len(curves)]], last.y[-1] - first.y[0], atol=1e-12
     )
-
-
-def test_one_phase_is_the_program():
-    phase = phase_of("r1")
-    program = Program([phase])
-    (x,) = reachable_points(phase, 1)
-    assert program.variables == phase.variables
-    assert program.objective(x) == program.end_time(x) == x[0]
-    np.testing.assert_array_equal(program.gradient(x), np.eye(program.variables)[0])
-    np.testing.assert_array_equal(program.x_lower, phase.x_lower)
-    np.testing.assert_array_equal(program.x_upper, phase.x_upper)
-    # Means over time come behind the phase's rows, and depend on all variables.
-    own = len(phase.lower)
-    (mean,) = program.means.limits
-    assert program.rows_of(mean).tolist() == [list(range(own, len(program.lower)))]
-    np.testing.assert_array_equal(program.lower[:own], phase.lower)
-    np.testing.assert_array_equal(program.upper[:own], phase.upper)
-    np.testing.assert_array_equal(program.upper[own:], mean.upper)
-    np.testing.assert_array_equal(program.rows(x)[:own], phase.rows(x))
-    mean_values = phase.mean_weights(x) @ mean.values(phase.state(x))
-    np.testing.assert_allclose(program.rows(x)[own:], mean_values, rtol=1e-14)
-    exact = dense(program, x)
-    np.testing.assert_array_equal(exact[:own], dense(phase, x))
-    assert np.all(np.bincount(program.jacobian_rows)[own:] == program.variables)
-    slower = program.scale_time(x, 2.0)
-    assert slower[0] == 2.0 * x[0]
-    np.testing.assert_array_equal(slower[1:], x[1:])
 
 
 def test_a_program_in_another_process_is_the_same():
