@@ -31,7 +31,6 @@ from brachis.search import (
     portfolio,
     schedule,
 )
-from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.guesses import SEARCH_LEVELS
 from brachis.search.joint_path import DeadEnd
@@ -166,15 +165,6 @@ def test_a_free_start_is_faster_and_on_the_path(robot, usual, from_anywhere):
     assert {candidate.branch for candidate in free.candidates} == {CHART}
 
 
-def test_a_free_start_is_on_every_branch(robot):
-    free = brachis.plan(
-        robot, task(start="free", path_start=HERE, redundant_joints=["j1"])
-    )
-    assert free.verified
-    labels = {candidate.branch for candidate in free.candidates}
-    assert labels == {"elbow_positive", "elbow_negative"}
-
-
 def test_a_branch_can_be_asked_for(robot):
     for label in ("elbow_positive", "elbow_negative"):
         result = brachis.plan(
@@ -208,16 +198,6 @@ def test_a_free_start_needs_a_place_and_no_numeric_guess(robot):
         brachis.plan(
             robot, task(start="free", path_start=HERE, search={"guesses": "numeric"})
         )
-
-
-def test_an_end_posture_with_a_free_start(robot, from_anywhere):
-    free = from_anywhere
-    end = free.trajectory.position(free.t_end)
-    result = brachis.plan(
-        robot, task(start="free", path_start=HERE, end={"joints": list(end)})
-    )
-    assert result.verified
-    assert result.t_end == pytest.approx(free.t_end, rel=1e-2)
 
 
 def test_numeric_guesses_stay_an_option(robot):
@@ -454,17 +434,6 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, c
     assert len(calls) == 5
 
 
-def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joints(
-    robot, clock
-):
-    clock.jump(PostureLattice, "_next", at=1)
-    with pytest.raises(
-        PlanningError,
-        match="within the time limit of 60 s: the lattice of all postures",
-    ):
-        brachis.plan(robot, task(task_space=["x"], path=[{"line": {"by": [0.3]}}]))
-
-
 def test_no_solve_begins_without_time_and_its_start_is_the_motion(robot, clock):
     calls = clock.jump(over_time, "initial_guess", at=1)
     joints = {
@@ -518,13 +487,6 @@ def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clo
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
     assert any(undone.startswith("the lattice of") for undone in result.not_completed)
-
-
-def test_a_lattice_ends_between_its_layers(robot, clock):
-    calls = clock.jump(ClosedFormLattice, "_next", at=5)
-    with pytest.raises(PlanningError, match="was not searched completely"):
-        brachis.plan(robot, task(redundant_joints=["j1"]))
-    assert len(calls) == 5
 
 
 def test_only_a_moment_of_grace_for_what_fails(robot, monkeypatch, clock):

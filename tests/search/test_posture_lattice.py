@@ -20,29 +20,14 @@ from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.posture_lattice import PostureLattice
 from brachis.task import task_with
 from support.chains import planar_robot
+from support.scara import START, problem, scara
 from support.screw_arms import seven_joints
 from support.spatial import START as RAIL_START
 from support.spatial import rail_arm
 
 ROOT = Path(__file__).parents[2]
-SCARA = ROOT / "robots/scara3/robot.urdf"
-START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
 TURN = 2.0 * math.pi
-
-
-def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
-    spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
-    return brachis.Robot.from_urdf(
-        SCARA, limits=spec, **({"gravity": [0, 0, 0]} | options)
-    )
-
-
-def problem(robot: brachis.Robot, rows: Any = ("x", "y"), **task: Any) -> Problem:
-    rows = rows if isinstance(rows, str) else list(rows)
-    return Problem.of(
-        robot, brachis.load_task({"brachis": 1, "task_space": rows} | task)
-    )
 
 
 def line(
@@ -57,7 +42,7 @@ def line(
     )
 
 
-def lengthened(given: Problem, **options: Any) -> Any:
+def joint_paths_of(given: Problem, **options: Any) -> Any:
     return PostureLattice(given, [], **options).joint_paths(4)
 
 
@@ -98,7 +83,7 @@ CASES = {
 def test_joint_paths_are_motions_of_the_robot(case):
     given = CASES[case]()
     limits = given.robot.limits
-    joint_paths = lengthened(given, nodes=40)
+    joint_paths = joint_paths_of(given, nodes=40)
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
@@ -120,23 +105,16 @@ def test_joint_paths_are_motions_of_the_robot(case):
         np.testing.assert_array_equal(q[0], given.start)
 
 
-def test_gravity_turns_joint_paths_away():
-    """Without the torque limit the shortest joint path goes where the torques of the case above could not hold it."""
-    held, free = (
-        CASES["r = 1, gravity"](),
-        scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0]),
-    )
-    (shortest, *_) = lengthened(line(free, START, [0.3, 0.9]))
+def test_gravity_and_ranges_turn_joint_paths_away():
+    """Without these limits the shortest joint paths go where the limits of the cases above forbid it."""
+    held = CASES["r = 1, gravity"]().robot.limits
+    strong = scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0])
+    (shortest, *_) = joint_paths_of(line(strong, START, [0.3, 0.9]))
     still = np.zeros_like(shortest.q)
-    assert np.any(
-        np.abs(dynamics.torque(free, shortest.q, still, still))
-        > held.robot.limits.torque
-    )
-
-
-def test_ranges_turn_joint_paths_away():
+    load = dynamics.torque(strong, shortest.q, still, still)
+    assert np.any(np.abs(load) > held.torque)
     bounded = CASES["r = 1, ranges"]().robot.limits
-    (shortest, *_) = lengthened(line(scara(), START, [0.0, 1.0]))
+    (shortest, *_) = joint_paths_of(line(scara(), START, [0.0, 1.0]))
     assert np.any(
         (shortest.q < bounded.position_lower) | (shortest.q > bounded.position_upper)
     )
@@ -157,7 +135,7 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
         ).joint_paths(4)
         assert isinstance(end, DeadEnd)
         assert 0.5 < end.s < 1.0
-    (first, *_) = lengthened(given)
+    (first, *_) = joint_paths_of(given)
     assert first.q[0, 1] < 0.0 < first.q[-1, 1], "the elbow has changed its side"
 
 
@@ -174,7 +152,7 @@ def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_for
         ClosedFormLattice(one).joint_paths(1)[0].length
         for one in decompositions_of(given)
     )
-    assert lengthened(given)[0].length < 1.15 * best
+    assert joint_paths_of(given)[0].length < 1.15 * best
 
 
 def component(q: np.ndarray) -> int:
@@ -262,7 +240,7 @@ def test_the_end_is_reached_in_its_own_turn(turns, reached):
     given = problem(
         scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()}
     )
-    found = lengthened(given, **COARSE)
+    found = joint_paths_of(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
         np.testing.assert_allclose(joint_path.q[-1], end, atol=1e-3)
@@ -282,34 +260,43 @@ def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
         path_start=path_start,
         end={"joints": end.tolist()},
     )
-    found = lengthened(given, **COARSE)
+    found = joint_paths_of(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
         np.testing.assert_array_equal(joint_path.q[-1], end)
         assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(TURN, abs=1.6)
 
 
+LATTICES = {
+    "of all postures": lambda given: PostureLattice(
+        given, decompositions_of(given), density=0.2
+    ),
+    "of a closed form": lambda given: ClosedFormLattice(*decompositions_of(given)),
+}
+
+
+@pytest.mark.parametrize("lattice", LATTICES.values(), ids=LATTICES)
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_free_start_may_be_in_any_turn_of_a_range(way):
+def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
     """A circle and a half about the base fits into the range only from one of its ends on."""
     robot = scara({"position": {"j1": [-TURN, TURN]}}, locked_joints={"j3": 0.4})
     start = np.array([way * (-TURN + 0.2), 0.9])
     here = robot.tool_placement(start).translation[:2].tolist()
-    turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
-    given = problem(robot, start="free", path_start=here, path=turns)
-    joint_paths = PostureLattice(
-        given, decompositions_of(given), density=0.2
-    ).joint_paths(4)
+
+    def end_of(turns):
+        circle = [{"circle": {"center": [0.0, 0.0], "turns": turns * way}}]
+        given = problem(robot, start="free", path_start=here, path=circle)
+        return lattice(given).joint_paths(4)
+
+    joint_paths = end_of(1.5)
     assert all(
         -TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0]
     )
     assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
-    turns[0]["circle"]["turns"] = 2.1 * way
-    given = problem(robot, start="free", path_start=here, path=turns)
-    end = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
-    assert isinstance(end, DeadEnd)
-    assert 1.8 / 2.1 < end.s < 1.0
-    assert "the range of joint 'j1' ends" in end.cause
+    dead = end_of(2.1)
+    assert isinstance(dead, DeadEnd)
+    assert 1.8 / 2.1 < dead.s < 1.0
+    assert "the range of joint 'j1' ends" in dead.cause
 
 
 @pytest.mark.parametrize(
@@ -332,7 +319,7 @@ def test_back_from_a_given_end_in_its_own_turns(turned):
         "redundant_joints": "auto",
         "branch": "auto",
     }
-    joint_paths = lengthened(Problem.of(robot, brachis.load_task(task)))
+    joint_paths = joint_paths_of(Problem.of(robot, brachis.load_task(task)))
     assert joint_paths
     for joint_path in joint_paths:
         np.testing.assert_array_equal(joint_path.q[-1], end)
@@ -365,47 +352,17 @@ def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns()
         end={"joints": end.tolist()},
         path=path,
     )
-    joint_paths = lengthened(given, nodes=40)
+    joint_paths = joint_paths_of(given, nodes=40)
     assert joint_paths
     for joint_path in joint_paths:
         np.testing.assert_array_equal(joint_path.q[-1], end)
         assert np.abs(np.diff(joint_path.q, axis=0)).max() <= 0.8
 
 
-@pytest.mark.parametrize(
-    ("make", "reason"),
-    [
-        (lambda: line(scara(), START, [3.0, 0.0]), "it is out of reach"),
-        (
-            lambda: line(
-                scara({"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}),
-                START,
-                [0.0, 1.0],
-            ),
-            "range of joint",
-        ),
-        (
-            lambda: line(
-                scara({"torque": [280.0, 200.0, 100.0]}, gravity=[0, -9.81, 0]),
-                START,
-                [1.1, 0.0],
-            ),
-            "the torque limit of j1 cannot hold",
-        ),
-    ],
-    ids=["reach", "ranges", "gravity"],
-)
-def test_where_it_ends_and_why(make, reason):
-    end = lengthened(make())
-    assert isinstance(end, DeadEnd)
-    assert 0.0 < end.s <= 1.0
-    assert reason in end.cause
-
-
 def test_the_same_seed_gives_the_same_joint_paths():
     given = CASES["r = 2, 4R"]()
     first, again, other = (
-        lengthened(
+        joint_paths_of(
             dataclasses.replace(given, task=task_with(given.task, seed=seed)), nodes=60
         )
         for seed in (3, 3, 4)
@@ -420,7 +377,7 @@ def test_the_same_seed_gives_the_same_joint_paths():
 
 
 def test_no_layer_is_begun_after_the_deadline():
-    found = lengthened(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0))
+    found = joint_paths_of(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0))
     assert found.cause == NO_TIME
 
 

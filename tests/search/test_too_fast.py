@@ -111,28 +111,6 @@ def test_two_speeds_too_near_to_each_other(monkeypatch):
     assert 0.9 * np.sqrt(0.11) < allowed(caught.value) < np.sqrt(0.11)
 
 
-def test_no_number_is_advised_where_the_time_is_up(monkeypatch):
-    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    with pytest.raises(brachis.PlanningError) as caught:
-        brachis.plan(slide(0.5, (0.1, 0.6)))
-    assert re.match(
-        r"Lower tool_limits\.process_speed\[0\]\.speed \(how far is not known\), or raise",
-        caught.value.hint,
-    )
-
-
-def test_a_number_that_was_not_verified_is_not_advised(monkeypatch):
-    """Only half of what the phase plane allows leads to a plan here."""
-
-    def is_planned(_robot, task, *_):
-        return task.tool_limits.process_speed[0].speed < 0.16
-
-    monkeypatch.setattr("brachis.search.remedies.is_planned", is_planned)
-    with pytest.raises(brachis.PlanningError) as caught:
-        brachis.plan(slide(0.5, (0.1, 0.6)))
-    assert 0.15 < advised(caught.value, "tool_limits.process_speed[0].speed") < 0.16
-
-
 class TriedError(Exception):
     """A plan was tried."""
 
@@ -164,17 +142,6 @@ def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
         match=r"s = 0\.9 to 1 is too short to get from 0\.36 m/s to rest",
     ):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))
-
-
-def test_of_several_parts_the_one_is_named_that_is_too_fast(monkeypatch):
-    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    with pytest.raises(
-        brachis.PlanningError,
-        match=r"s = 0\.9 to 1 is too short to get from 0\.5 m/s to rest",
-    ) as caught:
-        brachis.plan(slide(0.2, (0.1, 0.3), parts=[{"speed": 0.5, "s": [0.6, 0.9]}]))
-    assert caught.value.where == "tool_limits.process_speed[1].speed"
-    assert caught.value.hint.startswith("Lower tool_limits.process_speed[1].speed (how")
 
 
 def test_a_speed_that_joint_velocities_forbid(monkeypatch):
