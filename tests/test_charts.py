@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +22,12 @@ from brachis.robot import task_map_of
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 from support.charts import jacobian
+from support.scara import START, scara
 
 ROOT = Path(__file__).parents[1]
-START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 
 
 def scara_line(angle: float, **changes: Any) -> brachis.Result:
-    limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    robot = brachis.Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
-    )
     task = {
         "brachis": 1,
         "start": {"joints": START},
@@ -40,7 +35,7 @@ def scara_line(angle: float, **changes: Any) -> brachis.Result:
         "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
         "spline": {"degree": 3, "intervals": 20, "rest": "full"},
     }
-    return brachis.plan(robot, task | changes)
+    return brachis.plan(scara(), task | changes)
 
 
 @pytest.fixture(scope="module")

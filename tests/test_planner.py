@@ -6,7 +6,6 @@ import dataclasses
 import os
 import signal
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +16,9 @@ from brachis.errors import NotInstalledError, StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
 from support.effort import QUICK
+from support.scara import START, scara
 from support.solvers import INSTALLED
 from support.starts import starting_points
-
-ROOT = Path(__file__).parents[1]
-SCARA = ROOT / "robots/scara3/robot.urdf"
-START = [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]
 
 
 def task(**changes) -> dict:
@@ -38,18 +34,13 @@ def task(**changes) -> dict:
     return {**base, **changes}
 
 
-def robot(torque: float = 10.0, **options) -> brachis.Robot:
-    limits = brachis.LimitSpec(torque=torque, velocity=None)
-    return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=limits, **options)
-
-
 def solve_with_uno(program, x):
     return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
     for torque in (20.0, 5.0):
-        result = brachis.plan(robot(torque), task())
+        result = brachis.plan(scara({"torque": torque}), task())
         assert result.verified
         result.trajectory.save(tmp_path / "result.npz")
         again = brachis.Trajectory.load(tmp_path / "result.npz")
@@ -71,13 +62,13 @@ def test_a_coordinate_that_no_joint_changes_is_named():
 
 
 def test_task_of_the_result_repeats_the_plan():
-    result = brachis.plan(robot(12.0), task())
+    result = brachis.plan(scara({"torque": 12.0}), task())
     assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
 
 
 def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_refined_one_does_not():
     program, _ = brachis.transcribe(
-        robot(), brachis.load_task(task(redundant_joints=["j1"]))
+        scara(), brachis.load_task(task(redundant_joints=["j1"]))
     )
     first = solve_with_uno(program, next(starting_points(program)))
     (phase,) = program.phases
@@ -91,7 +82,7 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
 
 def test_if_the_time_is_up_a_motion_gets_as_slow_as_it_has_to_and_hardly_more():
     program, _ = brachis.transcribe(
-        robot(), brachis.load_task(task(redundant_joints=["j1"]))
+        scara(), brachis.load_task(task(redundant_joints=["j1"]))
     )
     first = solve_with_uno(program, next(starting_points(program)))
     fast = dataclasses.replace(first, x=program.scale_time(first.x, 0.8))
@@ -103,7 +94,7 @@ def test_if_the_time_is_up_a_motion_gets_as_slow_as_it_has_to_and_hardly_more():
 
 def test_without_refinement_the_answer_is_left_as_it_is():
     result = brachis.plan(
-        robot(), task(redundant_joints=["j1"], refinement={"max_rounds": 0})
+        scara(), task(redundant_joints=["j1"], refinement={"max_rounds": 0})
     )
     assert not result.verified
     assert result.verification.worst_ratio > 1.01
@@ -113,7 +104,7 @@ def test_without_refinement_the_answer_is_left_as_it_is():
 
 def test_every_solve_is_reported():
     result = brachis.plan(
-        robot(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}])
+        scara(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}])
     )
     reports = result.candidate.reports
     assert len(reports) == 2 + result.candidate.refinement_rounds, (
@@ -128,32 +119,32 @@ def test_every_solve_is_reported():
 def test_without_ipopt_plans_are_made_by_what_uno_brings(name, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipyopt", None)
     spec = task(spline={"intervals": 8}, solver={"name": name})
-    assert brachis.plan(robot(), spec).verified
+    assert brachis.plan(scara(), spec).verified
 
 
 def test_a_solver_that_is_not_installed_is_an_error_that_names_the_others(monkeypatch):
     monkeypatch.setitem(sys.modules, "ipyopt", None)
     others = r"Linux on x86_64.*auto, uno or uno_interior, or .*\.\[ipopt\]"
     with pytest.raises(NotInstalledError, match=f"solver.name: ipopt.*{others}"):
-        brachis.plan(robot(), task(solver={"name": "ipopt"}))
+        brachis.plan(scara(), task(solver={"name": "ipopt"}))
 
 
 def test_path_start_is_checked():
-    assert brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.0])).verified
+    assert brachis.plan(scara(), task(path_start=[np.sqrt(3.0), 0.0])).verified
     with pytest.raises(
         StartError, match=r"the start posture is off the path; found 0.01 m off in y"
     ):
-        brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.01]))
+        brachis.plan(scara(), task(path_start=[np.sqrt(3.0), 0.01]))
     with pytest.raises(
         brachis.InputError, match="path_start: this is the wrong number of coordinates"
     ):
-        brachis.plan(robot(), task(path_start=[1.0, 0.0, 0.0]))
+        brachis.plan(scara(), task(path_start=[1.0, 0.0, 0.0]))
 
 
 def test_end_posture_on_another_branch_is_refused():
-    free = brachis.plan(robot(), task())
+    free = brachis.plan(scara(), task())
     end = free.trajectory.position(free.t_end)
-    assert brachis.plan(robot(), task(end={"joints": end})).verified
+    assert brachis.plan(scara(), task(end={"joints": end})).verified
     # The mirror image of the first two links about the line to the third joint reaches the same point.
     elbow = np.array([np.cos(end[0]), np.sin(end[0])])
     wrist = elbow + np.array([np.cos(end[0] + end[1]), np.sin(end[0] + end[1])])
@@ -162,7 +153,7 @@ def test_end_posture_on_another_branch_is_refused():
         [2 * bearing - end[0], -end[1], end[2] + 2 * (end[0] + end[1] - bearing)]
     )
     with pytest.raises(StartError, match="the end posture is on another branch"):
-        brachis.plan(robot(), task(end={"joints": mirrored}))
+        brachis.plan(scara(), task(end={"joints": mirrored}))
 
 
 def test_full_turns_are_counted_even_between_few_points():
@@ -175,10 +166,8 @@ def test_full_turns_are_counted_even_between_few_points():
     )
     times = []
     for position in (None, {"j1": [-50.0, 50.0]}, {"j1": [-1.0, 50.0]}):
-        limits = brachis.LimitSpec(torque=100.0, velocity=None, position=position)
-        arm = brachis.Robot.from_urdf(
-            SCARA, gravity=[0, 0, 0], limits=limits, locked_joints={"j3": 0.4}
-        )
+        limits = {"torque": 100.0, "position": position}
+        arm = scara(limits, locked_joints={"j3": 0.4})
         result = brachis.plan(arm, circles)
         assert result.verified
         turned = result.trajectory.position(result.t_end) - result.trajectory.position(
@@ -193,7 +182,7 @@ def test_full_turns_are_counted_even_between_few_points():
 def test_ctrl_c_reaches_the_user(name):
     """A real signal while the solver works."""
     program, _ = brachis.transcribe(
-        robot(), brachis.load_task(task(spline={"intervals": 60}))
+        scara(), brachis.load_task(task(spline={"intervals": 60}))
     )
     x = next(starting_points(program))
     solver = solvers_for(name)[0]

@@ -9,7 +9,6 @@ import signal
 import sys
 import time
 import types
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,9 +43,8 @@ from brachis.search.stages import (
     facts_of,
 )
 from brachis.task import load_task
+from support.scara import START, scara
 
-ROOT = Path(__file__).parents[2]
-START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 FEW_POINTS = {"intervals": 10, "points_per_interval": 1}
 """With so few the limits are exceeded in between by far."""
 HERE = [math.sqrt(3.0), 0.0]
@@ -58,10 +56,7 @@ TIMES = ("estimate", "t_end")
 
 @pytest.fixture(scope="module")
 def robot() -> brachis.Robot:
-    limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    return brachis.Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
-    )
+    return scara()
 
 
 def task(**changes: Any) -> dict[str, Any]:
@@ -521,12 +516,8 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
 
     monkeypatch.setattr(uno, "call_uno", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
-    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
-    arm = brachis.Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=jerks
-    )
     result = brachis.plan(
-        arm,
+        scara({"jerk": 2000.0}),
         task(
             redundant_joints=["j1"],
             spline={"intervals": 100, "degree": 4},
@@ -607,10 +598,7 @@ def test_a_motion_no_faster_over_all_knots_is_not_refined(robot, monkeypatch):
 
 
 def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
-    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
-    robot = brachis.Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=jerks
-    )
+    robot = scara({"jerk": 2000.0})
     finish = pipeline.finish_candidate
     meshes: list[int] = []
     tried: list[Candidate] = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,15 +15,14 @@ from brachis.optimise import improve
 from brachis.optimise.backends import TABLE, SolverReport, SolveStatus
 from brachis.optimise.retiming import COARSE, ROUGH
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
 from brachis.search import guesses as module
 from brachis.search import screening
 from brachis.task import load_task
+from support.scara import scara
 from support.solvers import INTERIOR
 
 MOST = 2
-URDF = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 
 
 def quiet(_text: str) -> None:
@@ -37,15 +35,13 @@ def guesses():
     task = load_task(
         {
             "brachis": 1,
-            "robot": {"gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": None}},
             "start": "free",
             "path_start": [1.2, 0.4],
             "task_space": ["x", "y"],
             "path": [{"line": {"by": [-1.2, 0.9]}}],
         }
     )
-    robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
-    problem = Problem.of(robot, task)
+    problem = Problem.of(scara(), task)
     (level,) = module.SEARCH_LEVELS["fast"]
     many = dataclasses.replace(
         level, in_charts=100, only_minima=False, cells_per_turn=24
