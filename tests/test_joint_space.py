@@ -230,19 +230,6 @@ def test_bottlenecks_of_the_saved_motion_are_those_of_the_plan(planned, tmp_path
     assert again.t_end == pytest.approx(planned.t_end, rel=1e-4)
 
 
-def test_program():
-    robot = brachis.Robot.from_urdf(IIWA)
-    program, family = brachis.transcribe(robot, brachis.load_task(task()))
-    assert family == "path of joints"
-    assert program.variables == 1 + 20 + 3 - 6
-
-
-def test_plain_data(planned):
-    data = json.loads(json.dumps(planned.to_dict()))
-    assert data["t_end"] == planned.t_end
-    assert data["verified"] is True
-
-
 @pytest.mark.parametrize(("row", "excess"), [(0, 1e-8), (1, 5e-5), (2, 1e-8)])
 def test_a_path_of_joints_may_leave_a_range_within_the_tolerance(row, excess):
     robot = brachis.robots.iiwa14

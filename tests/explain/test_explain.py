@@ -86,13 +86,6 @@ def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
     assert f"{text} {saved}" in str(seams.bottleneck())
 
 
-def test_json_names_key_and_place_of_a_process_speed(seams):
-    rows = seams.sensitivities.to_dict()["limits"]
-    (row,) = [row for row in rows if row["kind"] == "process speed of 0.2 m/s"]
-    assert row["key"] == "tool_limits.process_speed"
-    assert row["s"] == [[0.1, 0.5]]
-
-
 def test_a_cause_has_one_row(seams):
     entries = seams.sensitivities.limits
     rows = [(entry.label, entry.side) for entry in entries]

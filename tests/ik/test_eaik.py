@@ -196,22 +196,6 @@ def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     )
 
 
-def test_postures_with_joints_at_quarter_turns():
-    for robot, redundant in (
-        (ur, ()),
-        (iiwa, (2,)),
-        (panda_lengths, (6,)),
-        (rail_arm, (0,)),
-    ):
-        bench = Bench(robot(), redundant, 3000)
-        rng = np.random.default_rng(7)
-        quarters = rng.choice([-0.5 * np.pi, 0.0, 0.5 * np.pi, np.pi], bench.q.shape)
-        q = np.where(rng.uniform(size=bench.q.shape) < 0.5, quarters, bench.q)
-        q = q[np.abs(bench.margin(q)) > 5e-3]
-        assert len(q) > 500
-        assert bench.own_gap(q, bench.solve(q)).max() < 1e-7
-
-
 def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
     monkeypatch,
 ):
@@ -296,22 +280,6 @@ print(sorted({"urchin", "trimesh", "pyglet", "eaik.IK_Robot"} & set(sys.modules)
         check=True,
     )
     assert done.stdout.strip() == "[]"
-
-
-def test_the_registry_takes_it_and_lists_what_it_can_do():
-    robot = iiwa()
-    found = find(robot, rows(robot), ["j3"], families=[eaik])
-    assert found.family == "eaik"
-    with pytest.raises(DecompositionError, match="singular everywhere") as caught:
-        find(robot, rows(robot), ["j4"], families=[eaik])
-    assert [names for (names,) in caught.value.available] == [
-        "j1",
-        "j2",
-        "j3",
-        "j5",
-        "j6",
-        "j7",
-    ]
 
 
 def lines_apart(axes, points, first, second):

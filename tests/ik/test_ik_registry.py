@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -20,8 +18,6 @@ from brachis.ik import (
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndAngle
 from support.chains import Joint, chain_urdf, planar_robot
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -305,11 +301,3 @@ def test_two_families_have_two_names(arm, plane):
         InputError, match=r"families\[1\].name: a family of this name exists"
     ):
         find(arm, plane, ["j3"], families=[family, family])
-
-
-def test_a_choice_without_a_closed_form_names_those_that_have_one():
-    robot = Robot.from_urdf(ROOT / "robots/tx90l_rail/robot.urdf")
-    with pytest.raises(DecompositionError) as caught:
-        find(robot, task_map_of(robot, "pose"), ["joint_5"])
-    names = [joints for (joints,) in caught.value.available]
-    assert names == ["rail", "joint_1", "joint_2", "joint_3"]

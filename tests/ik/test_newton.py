@@ -117,17 +117,6 @@ def test_singular_matrices_do_not_raise_and_leave_the_others_alone():
     np.testing.assert_allclose(found[1], [0.05, 0.05, 0.1], atol=1e-14)
 
 
-def test_without_redundancy_there_are_no_rows():
-    _, task_map = bind(planar_robot("RR"), ["x", "y"])
-    there = np.array([[0.5, 1.1], [0.3, 1.3]])
-    q, none = there + 0.05, np.zeros((2, 0, 2))
-    np.testing.assert_allclose(
-        Newton(task_map).solve(task_map.values(there), q, none, np.zeros((2, 0))),
-        there,
-        atol=1e-12,
-    )
-
-
 def test_no_postures_at_all():
     _, task_map = bind(planar_robot("RRR"), ["x", "y"])
     found = Newton(task_map).solve(

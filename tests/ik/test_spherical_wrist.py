@@ -159,14 +159,6 @@ def test_spherical_shoulder_and_wrist(redundant):
     assert np.isfinite(bench.answers(bench.q)).all()
 
 
-def test_elbow_of_spherical_shoulder_and_wrist_is_not_redundant():
-    with pytest.raises(NotApplicableError) as caught:
-        Bench(seven_joints(), (3,), postures=1)
-    assert str(caught.value) == (
-        "J_nr is singular everywhere: there is always a motion of the tool that needs j4"
-    )
-
-
 def test_spherical_shoulder_and_wrist_on_a_rail():
     robot, found = seven_joints(rail=Y), []
     for redundant in itertools.combinations(range(8), 2):

@@ -12,25 +12,17 @@ from brachis.kinematics import ChartMap, ChartRows
 from brachis.robot import Robot
 from support.chains import planar_robot
 from support.charts import PLACES, chart_of, jacobian, least_motion, path_from
-from support.motions import Sway, check_derivatives, check_time_derivatives, joint_map
+from support.motions import (
+    PLANAR,
+    Sway,
+    check_derivatives,
+    check_time_derivatives,
+    curved,
+    joint_map,
+)
 from support.screw_arms import seven_joints
 from support.spatial import START, rail_arm
 
-PLANAR = {
-    "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
-    "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
-    "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
-    "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
-    "r = 1, 4R with yaw": (
-        "RRRR",
-        "xz",
-        ["x", "z", "pitch"],
-        [0.4, -0.6, 1.4, 0.8],
-        ["j1"],
-    ),
-    "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
-    "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
-}
 SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
 SPATIAL = {
     "r = 1, 7R, pose": (seven_joints, "pose", SEVEN, ["j1"]),
@@ -38,15 +30,6 @@ SPATIAL = {
     "r = 4, 7R, position": (seven_joints, "position", SEVEN, None),
     "r = 2, rail, free roll": (rail_arm, "pose_free_roll", [*START, 0.0], None),
 }
-
-
-def curved(robot, rows, start):
-    """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
-    tool = robot.tool_placement(np.array(start, dtype=float)).translation[
-        ["xyz".index(row) for row in rows[:2]]
-    ]
-    arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 35.0}
-    return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
 
 
 def bent(robot, start):
@@ -61,7 +44,7 @@ def given(name):
     if name in PLANAR:
         pattern, plane, rows, start, redundant = PLANAR[name]
         robot = planar_robot(pattern, plane)
-        return robot, rows, curved(robot, rows, start), start, redundant
+        return robot, rows, curved(robot, rows, start, angle_deg=35.0), start, redundant
     make, rows, start, redundant = SPATIAL[name]
     robot = make()
     return robot, rows, bent(robot, start), start, redundant
@@ -243,17 +226,6 @@ def test_angles_stay_in_the_turns_of_the_reference(scara_urdf, turns):
     np.testing.assert_allclose(chart.coordinates(1.0, expected[-1]), y[-1], atol=1e-12)
     assert chart.coordinates(1.0, expected[-1])[1] != pytest.approx(
         chart.coordinates(1.0, expected[0])[1], abs=1.0
-    )
-
-
-def test_coordinates_of_what_is_not_known_are_not_known():
-    robot, rows, segments, start, _ = given("r = 2, 4R")
-    chart = chart_of(robot, rows, segments, start, "following")
-    assert np.isnan(chart.coordinates(0.4, np.full(4, np.nan))[1:]).all()
-    assert chart.coordinates(0.4, np.full(4, np.nan))[0] == 0.4
-    # Rows that follow the reference measure the way aside from it.
-    np.testing.assert_allclose(
-        chart.curves(chart.s, chart.reference)[:, 1:], 0.0, atol=1e-12
     )
 
 

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brachis.kernel import Chain
 from brachis.limits import (
     TABLE,
     Label,
@@ -17,7 +16,6 @@ from brachis.limits import (
     Partials,
     limits_of,
 )
-from brachis.robot import dynamics
 from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
 from brachis.task.tolerances import Margins
@@ -246,28 +244,3 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     np.testing.assert_allclose(
         limit.ratio(limit.values(STATES))[inside, column], share[inside], atol=1e-12
     )
-
-
-def test_torques_of_a_motion_are_computed_once(monkeypatch):
-    robot = dataclasses.replace(
-        ROBOT, limits=dataclasses.replace(ROBOT.limits, torque_rate=np.full(3, 100.0))
-    )
-    built = [
-        TABLE[kind](robot, TASK)
-        for kind in ("torque", "power", "total_power", "torque_speed", "rms_torque")
-    ]
-    motion = Moments(STATES.q, STATES.qdot, STATES.qddot, STATES.qdddot, STATES.s)
-    calls = []
-    for name in ("torques", "torque_derivatives"):
-        own = getattr(Chain, name)
-        monkeypatch.setattr(
-            Chain,
-            name,
-            lambda *given, own=own, name=name: calls.append(name) or own(*given),
-        )
-    for limit in built:
-        limit.values(motion)
-        limit.partials(motion)
-    assert sorted(calls) == ["torque_derivatives", "torques"]
-    again = dynamics.torque(robot, STATES.q, STATES.qdot, STATES.qddot)
-    np.testing.assert_allclose(motion.torque(robot), again, rtol=1e-12, atol=1e-12)

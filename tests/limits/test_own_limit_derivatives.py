@@ -105,6 +105,12 @@ def test_values_that_use_the_jerk_need_order_3():
     bind(Sum(values, partials, order=3))
 
 
+def torque_partials(motion):
+    exact = motion.torque_derivatives(ROBOT)
+    parts = (exact.q, exact.qdot, exact.qddot)
+    return Partials(*(0.01 * part[:, :1] for part in parts))
+
+
 def speed_in_steps(motion):
     return motion.qdot[:, :1] / np.where(motion.s > 0.5, 0.7, 1.0)[:, None]
 
@@ -148,25 +154,21 @@ def speed_in_steps(motion):
             lambda m: right_values(m) + 1e-6 * np.sin(1e9 * m.q[:, :1]),
             right_partials,
         ),
+        (lambda m: 0.01 * m.torque(ROBOT)[:, :1], torque_partials),
     ],
-    ids=["smooth", "kink", "float32", "large", "s step", "steps", "steep", "noisy"],
+    ids=[
+        "smooth",
+        "kink",
+        "float32",
+        "large",
+        "s step",
+        "steps",
+        "steep",
+        "noisy",
+        "torques, which a motion keeps",
+    ],
 )
 def test_right_derivatives_pass(values, partials):
-    limit = Sum(values, partials)
-    assert any(own is limit for own in bind(limit).limits)
-
-
-def test_a_limit_on_torques_passes():
-    """A motion keeps its torques once they are computed."""
-
-    def values(motion):
-        return 0.01 * motion.torque(ROBOT)[:, :1]
-
-    def partials(motion):
-        exact = motion.torque_derivatives(ROBOT)
-        parts = (exact.q, exact.qdot, exact.qddot)
-        return Partials(*(0.01 * part[:, :1] for part in parts))
-
     limit = Sum(values, partials)
     assert any(own is limit for own in bind(limit).limits)
 

@@ -10,8 +10,6 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.apps.plots import plot_timeline
-from brachis.errors import TaskError
 from brachis.limits.tool import SpeedTable
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
@@ -91,28 +89,6 @@ def test_sensitivity_is_within_5_percent_of_solving_again(result):
     assert checked.deviation < 0.05
     assert "10 % more speed at tool (0.1 m/s) saves" in str(report)
     assert "tool is at its speed limit for" in str(report)
-
-
-def test_the_timeline_has_a_row(result):
-    labels = [
-        label.get_text()
-        for label in plot_timeline(result.trajectory).axes[0].get_yticklabels()
-    ]
-    assert "tool speed" in labels
-
-
-def test_a_saved_motion_remembers(result, tmp_path):
-    result.trajectory.save(tmp_path / "motion.npz")
-    loaded = brachis.Trajectory.load(tmp_path / "motion.npz")
-    assert loaded.task.tool_limits.speed == CAP
-    assert verify_trajectory(loaded).passed
-
-
-@pytest.mark.parametrize("wrong", [0.0, -1.0, "fast", 1e-9, [1.0]])
-def test_what_is_no_speed_is_refused(task, wrong):
-    with pytest.raises(TaskError) as caught:
-        brachis.load_task({**task, "tool_limits": {"speed": wrong}})
-    assert "tool_limits.speed" in str(caught.value)
 
 
 @pytest.mark.parametrize("rows", [["x", "y"], ["x"]])

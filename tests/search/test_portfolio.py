@@ -627,18 +627,6 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     assert all(math.isinf(each.adapted) for each in rest)
 
 
-def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
-    result = brachis.plan(
-        robot, task(search={"effort": "thorough"}, redundant_joints=["j1"])
-    )
-    finished = [
-        candidate.estimate
-        for candidate in result.candidates
-        if math.isfinite(candidate.t_end)
-    ]
-    assert len({f"{time:.4g}" for time in finished}) == len(finished)
-
-
 def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):
     tool = robot.tool_placement(START).translation
     post = brachis.Cylinder(0.1, 1.0, name="post", position=[tool[0] - 0.6, tool[1], 0])
