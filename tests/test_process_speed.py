@@ -134,17 +134,6 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     assert check.passed
 
 
-def test_two_parts():
-    parts = [{"speed": 0.5, "s": [0.2, 0.35]}, {"speed": 0.8, "s": [0.6, 0.8]}]
-    result = brachis.plan(task(parts))
-    assert result.verified
-    s, speed = sampled(result.trajectory)
-    for part in parts:
-        begin, end = part["s"]
-        inside = (s > begin + 1e-3) & (s < end - 1e-3)
-        np.testing.assert_allclose(speed[inside], part["speed"], rtol=1e-8)
-
-
 def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():
     result = brachis.plan(
         {

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import DecompositionError, TaskError
-from brachis.ik import default_task_space, find, find_all
+from brachis.errors import TaskError
+from brachis.ik import default_task_space, find_all
 from brachis.path import build_path
 from brachis.robot import Robot, bind, task_map_of
 from brachis.task import load_task
@@ -135,25 +135,6 @@ def test_closed_forms(word, rows, family):
     robot = chain(word)
     found = find_all(robot, task_map_of(robot, rows))
     assert {choice.family for choice in found} == {family}
-
-
-@pytest.mark.parametrize(
-    ("redundant", "exists"), [("j1", True), ("j2", True), ("j3", False), ("j4", True)]
-)
-def test_positions_of_a_scara_with_a_redundant_joint(redundant, exists):
-    robot = chain(SCARA)
-    task_map = task_map_of(robot, ["x", "y", "z"])
-    if not exists:
-        with pytest.raises(DecompositionError, match="z needs one slide"):
-            find(robot, task_map, [redundant])
-        return
-    solver = find(robot, task_map, [redundant]).solver
-    q = np.random.default_rng(1).uniform(-1.4, 1.4, (50, 4))
-    held = robot.joint_names.index(redundant)
-    answers = solver.solve(task_map.values(q), q[:, [held]])[:, :, 0]
-    free = [i for i in range(4) if i != held]
-    gaps = np.abs(answers - q[:, None, free]).max(axis=2)
-    assert np.nanmin(gaps, axis=1).max() < 1e-9
 
 
 @pytest.mark.parametrize(

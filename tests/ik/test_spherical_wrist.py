@@ -29,55 +29,6 @@ from support.spatial import rail_arm, rail_arm_joints
 X, Y, Z = np.eye(3)
 
 
-def ortho_parallel(rng):
-    """Industrial arm of random lengths, offsets, joint senses and zero posture, on a rail across axis 1 (j1 ... j7).
-
-    Lengths as in Brandstoetter et al. 2014: a1, b, c1 ... c4, a2.
-    """
-    a1, a2, b = rng.uniform(-0.2, 0.2, 3)
-    c1, c2, c3, c4 = rng.uniform(0.2, 0.7, 4)
-    places = [
-        (0, 0, 0),
-        (a1, 0, c1),
-        (a1, 0, c1 + c2),
-        (a1 + a2, b, c1 + c2),
-        (a1 + a2, b, c1 + c2 + c3),
-    ]
-    places.append((a1 + a2, b, c1 + c2 + c3 + c4))
-    senses = rng.choice([-1.0, 1.0], 6)
-    directions = [
-        axis * sense for axis, sense in zip((Z, Y, Y, Z, Y, Z), senses, strict=True)
-    ]
-    angle = rng.uniform(-np.pi, np.pi)
-    axes = [Axis("P", np.array([np.cos(angle), np.sin(angle), 0.0]), np.zeros(3))]
-    axes += [
-        Axis("R", axis, np.array(place, dtype=float))
-        for axis, place in zip(directions, places, strict=True)
-    ]
-    posed = ChainGeometry.of(screw_robot(axes)).screws_at(
-        rng.uniform(-2.0, 2.0, (1, 7))
-    )
-    moved = [
-        Axis(
-            a.letter,
-            posed.axes[:, i, 0],
-            posed.points[:, i, 0] if a.letter == "R" else np.zeros(3),
-        )
-        for i, a in enumerate(axes)
-    ]
-    return screw_robot(moved, tool=rng.uniform(-0.5, 1.5, 3))
-
-
-@pytest.mark.parametrize("redundant", range(4))
-def test_arms_with_ortho_parallel_base_on_a_rail(redundant):
-    rng = np.random.default_rng(redundant)
-    for _ in range(3):
-        bench = Bench(ortho_parallel(rng), (redundant,), postures=300).check()
-        first = "left" if redundant == 1 else "front"
-        assert bench.solver.branches[0] == f"{first}_up_noflip"
-        assert len(bench.solver.branches) == 8
-
-
 RAILS = {
     "across": (0.8, -0.6, 0.0),
     "along": (0.0, 0.0, 1.0),
@@ -110,20 +61,6 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
                 "the axes of j3, j2, j1 do not meet in a point: a joint slides"
                 in reason
             )
-
-
-def test_labels_say_where_the_arm_is():
-    bench = Bench(rail_arm(), (0,), postures=1)
-    bend_forwards = np.array([[0.2, 0.3, 0.4, 1.2, 0.5, 0.8, -0.3]])
-    labels = bench.solver.branches
-    assert (
-        labels[np.argmax((bench.margins(bend_forwards) > 0.0).all(axis=2))]
-        == "front_up_noflip"
-    )
-    other = bend_forwards * np.array([1.0, 1.0, -4.0, -1.0, 1.0, -1.0, 1.0])
-    assert (
-        labels[np.argmax((bench.margins(other) > 0.0).all(axis=2))] == "back_down_flip"
-    )
 
 
 def test_a_rail_answers_on_the_side_to_which_it_moves_the_arm():

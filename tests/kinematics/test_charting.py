@@ -122,17 +122,6 @@ def test_given_rows_are_kept_and_name_the_joints_that_they_select(scara):
         assert chart.redundant_joints == names
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, np.pi / 2])
-def test_transversality_is_the_cosine_of_the_angle_to_the_self_motion(angle, scara):
-    task_map, _ = path_from(scara, ["x", "y"], [{"line": {"by": [0.0, 0.2]}}], START)
-    null = null_spaces(jacobian(task_map, np.array([START])))
-    aside = null_space(null[0].T)[:, 0]
-    row = np.cos(angle) * null[0, :, 0] + np.sin(angle) * aside
-    np.testing.assert_allclose(
-        transversality(row[None, None], null), [np.cos(angle)], atol=1e-12
-    )
-
-
 def test_transversality_of_several_rows_is_that_of_the_worst_direction():
     task_map, _ = path_from(
         seven_joints(), "position", [{"line": {"by": [0.0, 0.0, 0.1]}}], SEVEN

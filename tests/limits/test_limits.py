@@ -215,7 +215,7 @@ def pairs(kind: str) -> Limit:
 
 @pytest.mark.parametrize("kind", ["torque", "velocity"])
 def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
-    limit, same = pairs(kind), TABLE[kind](ROBOT, TASK)
+    limit = pairs(kind)
     test_partials_equal_differences(limit)
     test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit)
     figures = {
@@ -228,19 +228,3 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     }[kind]
     assert (figures[first[0], "lower"], figures[first[0], "upper"]) == first[1:]
     assert figures["j3 force" if kind == "torque" else "j3 velocity", None] > 0.0
-    column = [str(label) for label in limit.labels].index(first[0])
-    quantity = same.values(STATES)[:, column] * same.bounds[column].figure
-    middle, half = 0.5 * (first[1] + first[2]), 0.5 * (first[2] - first[1])
-    np.testing.assert_allclose(
-        limit.values(STATES)[:, column], (quantity - middle) / half
-    )
-    beyond = np.maximum(quantity - first[2], first[1] - quantity) / min(
-        first[2], -first[1]
-    )
-    np.testing.assert_allclose(limit.violation(limit.values(STATES))[:, column], beyond)
-    share = quantity / np.where(quantity > 0.0, first[2], -first[1])
-    inside = beyond <= 0.0
-    assert inside.sum() > 0
-    np.testing.assert_allclose(
-        limit.ratio(limit.values(STATES))[inside, column], share[inside], atol=1e-12
-    )

@@ -91,29 +91,6 @@ def test_sensitivity_is_within_5_percent_of_solving_again(result):
     assert "tool is at its speed limit for" in str(report)
 
 
-@pytest.mark.parametrize("rows", [["x", "y"], ["x"]])
-def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
-    """With only x prescribed the tool may move along y; the cap is on its speed in space."""
-    task = {
-        "brachis": 1,
-        "robot": {
-            "urdf": str(ROOT / "robots/scara3/robot.urdf"),
-            "tool_frame": "tool",
-            "gravity": [0, 0, 0],
-            "limits": {"torque": 10, "velocity": None},
-        },
-        "start": {"joints": [0.5, -2.0, 2.0]},
-        "task_space": rows,
-        "path": [{"line": {"by": [-0.5, 0.3][: len(rows)]}}],
-        "tool_limits": {"speed": 0.4},
-        "spline": {"intervals": 20},
-        "search": QUICK,
-    }
-    result = brachis.plan(task)
-    assert result.verified
-    assert speeds(result.trajectory).max() <= 0.4 * (1.0 + 1e-4)
-
-
 def test_steps_become_ramps_on_their_faster_side():
     table = SpeedTable(
         [0.0, 0.4, 0.4, 0.401, 0.401, 1.0], [1.0, 1.0, 3.0, 3.0, 2.0, 2.0]

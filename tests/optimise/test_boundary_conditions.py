@@ -33,32 +33,6 @@ def curves_at_the_ends(phase, x):
     return [spline(np.array([0.0, motion.t_end]), nu=order) for order in range(3)]
 
 
-@pytest.mark.parametrize(
-    ("degree", "rest"),
-    [(2, "velocity"), *((d, r) for d in (3, 4, 5) for r in ("full", "velocity"))],
-)
-@pytest.mark.parametrize("case", ["r0", "r1", "r2"])
-def test_start_and_rest(case, degree, rest):
-    phase = phase_of(case, degree=degree, rest=rest, intervals=6)
-    start = phase.joint_map.start[phase.joint_map.redundant]
-    for x in random_points(phase):
-        y, ydot, yddot = curves_at_the_ends(phase, x)
-        np.testing.assert_allclose(y[:, 0], [0.0, 1.0], atol=1e-12)
-        np.testing.assert_allclose(y[0, 1:], start, atol=1e-12)
-        np.testing.assert_allclose(ydot, 0.0, atol=1e-10)
-        scale = np.abs(x[1:]).max() / x[0] ** 2
-        if rest == "full":
-            np.testing.assert_allclose(yddot, 0.0, atol=1e-9 * scale)
-        else:
-            assert np.abs(yddot).min() > 1e-3 * scale, (
-                "the acceleration should be free at both ends"
-            )
-        if phase.joint_map.r:
-            assert np.abs(y[1, 1:] - start).max() > 1e-3, (
-                "the end posture should be free"
-            )
-
-
 def test_given_end_posture():
     # An end posture on the path: the closed form at s = 1 with a chosen redundant joint.
     free = phase_of("r1")
@@ -94,36 +68,6 @@ def test_states_are_those_of_the_curves(case):
             mine, theirs, atol=1e-10 * max(1.0, np.abs(theirs).max())
         )
     np.testing.assert_allclose(state.q[0], phase.joint_map.start, atol=1e-9)
-
-
-def test_resampled_keeps_the_meaning_of_x():
-    phase = phase_of("r2")
-    t_norm = np.linspace(0.0, 1.0, 37)
-    other = phase.with_points(t_norm)
-    (x,) = reachable_points(phase, 1)
-    np.testing.assert_allclose(
-        other.motion(x).control_points, phase.motion(x).control_points, atol=1e-12
-    )
-    np.testing.assert_array_equal(other.x_lower, phase.x_lower)
-    assert other.variables == phase.variables
-    assert len(phase.t_norm) == 11
-    assert len(other.state(x).q) == 37
-    shared = np.flatnonzero(
-        np.isclose(t_norm[:, None], phase.t_norm[None], atol=1e-12).any(axis=1)
-    )
-    matching = np.flatnonzero(
-        np.isclose(phase.t_norm[:, None], t_norm[None], atol=1e-12).any(axis=1)
-    )
-    assert len(shared) >= 2
-    np.testing.assert_allclose(
-        other.state(x).q[shared], phase.state(x).q[matching], atol=1e-12
-    )
-    np.testing.assert_allclose(
-        phase.violation_at(x, t_norm), other.violation(x), atol=1e-9
-    )
-    assert len(other.rows(x)) == len(other.lower) == len(other.upper)
-    assert len(other.jacobian(x)) == len(other.jacobian_rows)
-    assert other.jacobian_rows.max() == len(other.lower) - 1
 
 
 @settings(max_examples=80)

@@ -8,24 +8,18 @@ from functools import partial
 import numpy as np
 import pytest
 
-import brachis
-from brachis.common.deadline import NEVER, Deadline
-from brachis.optimise import improve as module
+from brachis.common.deadline import Deadline
 from brachis.optimise.backends import (
-    Solver,
-    SolverOptions,
     SolverReport,
     SolveStatus,
 )
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import (
     SolvedProgram,
-    SolverSession,
     attempt_once,
     improve,
     keep_feasible,
 )
-from brachis.optimise.near_rows import NearRows
 from brachis.optimise.program import Program
 from support.phases import phase_of
 from support.starts import starting_points
@@ -157,26 +151,6 @@ def test_the_end_time_has_the_factor_of_the_answer():
     lengthened = SolvedProgram(Fake(5.0), FIRST.reports, time_scaled=1.01)
     assert lengthened.t_end == pytest.approx(5.05)
     assert lengthened.report.x[0] == 5.0
-
-
-@pytest.mark.parametrize("rows", [[0, 1], None])
-def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
-    program, _ = brachis.transcribe(
-        brachis.examples.scara_line, redundant_joints=["j1"], intervals=10
-    )
-    x = next(starting_points(program))
-    steps = []
-
-    def run(monitor, x):
-        steps.append(monitor.options.first_step)
-        return monitor.report("fake", SolveStatus.OPTIMAL, x, np.zeros_like(x), "")
-
-    def solve_some(problem, x, solve, **_):
-        return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)
-
-    monkeypatch.setattr(module, "solve_near_rows", solve_some)
-    SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
-    assert steps == [1.0 if rows is None else 0.1]
 
 
 def test_if_the_time_is_up_a_feasible_start_is_the_answer():

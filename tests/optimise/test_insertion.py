@@ -14,7 +14,6 @@ from brachis.optimise.bspline import (
     basis_functions,
     clamped_knots,
     insert_knots,
-    local_basis,
 )
 
 LENGTHS = np.array([0.3, 0.05, 0.2, 0.01, 0.14, 0.3])
@@ -46,27 +45,6 @@ def test_the_same_curves(degree, old, new, seed):
         BSpline(fine_knots, inserted.T, degree)(t_norm),
     )
     np.testing.assert_allclose(after, before, atol=1e-13)
-
-
-@pytest.mark.parametrize("degree", range(2, 7))
-def test_basis_functions_of_lengths_are_scipys(degree):
-    breaks = np.concatenate([[0.0], np.cumsum(LENGTHS)])
-    knots = clamped_knots(degree, breaks / breaks[-1])
-    for interval, length in enumerate(LENGTHS):
-        for fraction in (0.0, 0.31, 0.999):
-            lengths = around(LENGTHS, degree, interval)
-            mine = basis_functions(lengths[None], np.array([fraction]))[:, 0]
-            t_norm = breaks[interval] + fraction * length
-            assert local_basis(knots, degree, np.array([t_norm]))[0][0] == interval
-            for order in range(4):
-                expected = BSpline(knots, np.eye(len(knots) - degree - 1), degree)(
-                    t_norm, nu=order
-                )
-                own = expected[interval : interval + degree + 1]
-                np.testing.assert_allclose(
-                    mine[order], own, atol=1e-12 * max(1.0, np.abs(own).max())
-                )
-                assert np.count_nonzero(expected) <= degree + 1
 
 
 @pytest.mark.parametrize("degree", range(2, 7))

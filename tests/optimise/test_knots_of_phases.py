@@ -131,18 +131,6 @@ def test_frozen():
     assert phase.fix_knots(x).variables == phase.variables
 
 
-def test_lengths_that_do_not_add_up_make_a_longer_motion():
-    phase = phase_of("r1")
-    (x,) = reachable_points(phase, 1)
-    free, there = moved(phase, x)
-    longer = there.copy()
-    longer[-5:] *= 1.01
-    assert free.motion(longer).t_end == pytest.approx(1.01 * x[0])
-    state = free.state(longer)
-    at = free.motion(longer).at(spread(free.motion(longer).breaks, 2))
-    np.testing.assert_allclose(state.yddot, at[2], atol=1e-10 * np.abs(at[2]).max())
-
-
 def test_curves_at_knots_are_those_behind_them_whatever_the_rounding():
     phase = phase_of("r1", degree=2, rest="velocity", intervals=11)
     (x,) = reachable_points(phase, 1)

@@ -9,7 +9,6 @@ import pytest
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
-from brachis.optimise import mesh
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.mesh import (
@@ -165,22 +164,6 @@ def test_no_interval_is_so_short_that_points_fall_together(solved):
     )
 
 
-def test_free_knots_without_a_motion_within_the_limits_are_given_up(
-    solved, monkeypatch
-):
-    program = solved.program
-    report = solved.report
-    monkeypatch.setattr(
-        mesh,
-        "refine",
-        lambda *given: dataclasses.replace(refine(*given), violation=0.5),
-    )
-    kept = optimise_knots(solved, solve, 0.1, RefinementOptions())
-    assert kept.program is program
-    assert kept.report is report
-    assert len(kept.reports) > 2
-
-
 def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     program = solved.program
     report = solved.report
@@ -198,21 +181,6 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     assert moved.program.variables == program.variables, (
         "the knots should be fixed again"
     )
-
-
-@pytest.mark.parametrize("intervals", [20, 53, 100])
-def test_coarsest_problem(intervals):
-    program, _ = brachis.transcribe(scara(), task(intervals=intervals))
-    coarse = coarsest(program)
-    assert 12 <= coarse.intervals < 26
-    assert (intervals > 24) == (coarse.variables < program.variables)
-    (whole,), (part,) = program.phases, coarse.phases
-    for fine, rough in ((whole.breaks, part.breaks), (whole.t_norm, part.t_norm)):
-        assert np.isin(rough, fine).all()
-        assert (rough[0], rough[-1]) == (0.0, 1.0)
-    assert np.diff(part.t_norm).max() == pytest.approx(
-        np.diff(part.breaks).max() / 3.0
-    ), "3 points an interval"
 
 
 @pytest.mark.parametrize("intervals", [53, 100])

@@ -73,29 +73,6 @@ def test_the_way_to_x_and_back(phase):
         np.testing.assert_allclose(phase.variables_from(phase.motion(x)), x, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    "phase", ["moving, constant speed, r2", "periodic, r2"], indirect=True
-)
-def test_monotone_rows_say_whether_progress_is_monotone(phase):
-    rng = np.random.default_rng(5)
-    monotone = []
-    for _ in range(200):
-        x = np.append(rng.uniform(0.05, 1.5), rng.normal(size=phase.variables - 1))
-        own = phase.slices[0]
-        x[own] = np.sort(
-            rng.uniform(0.0, 1.0, own.stop - own.start)
-        ) + 0.02 * rng.normal(size=own.stop - own.start)
-        if (
-            phase.boundary.periodic and x[own].min() < 0.0
-        ):  # which bounds on x take care of
-            continue
-        monotone.append(phase._layout.progress.values(x).min() >= 0.0)
-        assert monotone[-1] == (
-            np.diff(phase.motion(x).control_points[0]).min() >= -1e-15
-        )
-    assert 10 < sum(monotone) < len(monotone) - 10
-
-
 @settings(max_examples=50)
 @given(
     degree=st.integers(2, 6),

@@ -106,37 +106,6 @@ def test_the_pattern_covers_all_differences(program, differentiated):
     assert widest <= 1 + (phase.degree + 1) * (1 + phase.joint_map.r) + nearby
 
 
-def test_rows_are_ratios_to_the_limits(program):
-    (phase,) = program.phases
-    x = reachable_points(phase, 1)[0]
-    robot = phase.joint_map.robot
-    state = phase.state(x)
-    parts = blocks(program)
-    values = program.rows(x)
-    n = robot.n
-    np.testing.assert_allclose(
-        values[parts["velocity"]].reshape(-1, n), state.qdot / robot.limits.velocity
-    )
-    np.testing.assert_allclose(
-        values[parts["acceleration"]].reshape(-1, n), state.qddot / 20.0
-    )
-    for kind in ("torque", "velocity", "acceleration"):
-        np.testing.assert_array_equal(phase.upper[parts[kind]], 1.0)
-        np.testing.assert_array_equal(phase.lower[parts[kind]], -1.0)
-    low, high = robot.limits.position_lower, robot.limits.position_upper
-    ratio = values[parts["position"]].reshape(-1, n)
-    np.testing.assert_allclose(
-        low + (ratio + 1.0) * (high - low) / 2.0, state.q, atol=1e-12
-    )
-    assert np.all(phase.lower[parts["branch_margin"]] > 0.0)
-    # Full rest ties three control points of s at each end to 0 and 1, which the bounds 0 <= s <= 1 take care of; rest
-    # in velocity, all that degree 2 can do, ties two.
-    tied = 2 if phase.degree == 2 else 3
-    free = phase.motion(x).control_points[0, tied:-tied]
-    np.testing.assert_allclose(values[parts["progress"]], np.diff(free), atol=1e-15)
-    np.testing.assert_array_equal(phase.lower[parts["progress"]], 0.0)
-
-
 def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
     phase = phase_of("r1", position={"j1": [None, 2.9], "j2": [-3.0, None], "j3": None})
     (limit,) = (each for each in phase.limits if each.kind == "position")
@@ -156,21 +125,3 @@ def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
     np.testing.assert_allclose(
         dense(phase, x)[rows], differences(phase, x)[rows], atol=1e-9
     )
-
-
-def test_state_is_computed_once_for_rows_and_jacobian(monkeypatch):
-    phase = phase_of("r1")
-    first, second = reachable_points(phase, 2)
-    evaluate = phase.evaluator.evaluate
-    states = []
-
-    def count(*curves, t):
-        states.append(t)
-        return evaluate(*curves, t=t)
-
-    monkeypatch.setattr(phase.evaluator, "evaluate", count)
-    phase.rows(first)
-    phase.jacobian(first)
-    assert len(states) == 1
-    phase.rows(second)
-    assert len(states) == 2

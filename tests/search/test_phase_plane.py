@@ -16,7 +16,6 @@ from brachis.search.stations import spread_stations
 from brachis.timing import JointPath, PhasePlane
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
-SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 S = np.linspace(0.0, 1.0, 201)
 
 
@@ -49,51 +48,6 @@ def test_gravity_that_no_torque_holds():
     ).max()
     assert weight > 1.0, "the case asks nothing"
     assert least_time(robot, S, joint_path(0.4)) == np.inf
-
-
-def test_a_curved_course_against_plain_trial():
-    """Joints that turn against each other: the terms with the square of the speed decide."""
-    robot = brachis.Robot.from_urdf(
-        SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None)
-    )
-    q = np.column_stack(
-        [0.5 + np.sin(2.0 * S), -1.5 + 0.8 * S**2, 1.0 + np.cos(3.0 * S)]
-    )
-    assert least_time(robot, S, q) == pytest.approx(
-        least_time_by_trial(robot, S, q), rel=0.02
-    )
-
-
-def least_time_by_trial(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
-    """Least time by trying every x of a grid: backwards whether one can still brake, then forwards at full throttle."""
-    step = s[1] - s[0]
-    q_ds = np.gradient(q, step, axis=0, edge_order=2)
-    q_dds = np.gradient(q_ds, step, axis=0, edge_order=2)
-    limit = robot.limits.torque
-    zero = np.zeros_like(q)
-    a = dynamics.torque(robot, q, zero, q_ds)
-    b = dynamics.torque(robot, q, q_ds, q_dds)
-
-    def accelerations(k: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        bias = b[k] * x[:, None]
-        low, high = np.sort([(-limit - bias) / a[k], (limit - bias) / a[k]], axis=0)
-        return low.max(axis=1), high.min(axis=1)
-
-    grid = np.linspace(0.0, 4.0, 1001)
-    reach = 0.0
-    highest = np.zeros(len(s))
-    for k in range(len(s) - 2, -1, -1):
-        low, high = accelerations(k, grid)
-        good = grid[(low <= high) & (grid + 2 * step * low <= reach)]
-        reach = good.max(initial=0.0)
-        highest[k] = reach
-    x = np.zeros(len(s))
-    for k in range(len(s) - 1):
-        x[k + 1] = np.clip(
-            x[k] + 2 * step * accelerations(k, x[[k]])[1][0], 0.0, highest[k + 1]
-        )
-    speed = np.sqrt(np.maximum(x, 1e-6))
-    return float(np.sum(2 * step / (speed[1:] + speed[:-1])))
 
 
 LENGTH = 0.5

@@ -575,28 +575,6 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monke
     assert ruled.t_end <= every.t_end * (1.0 + 2e-4)
 
 
-@pytest.mark.usefixtures("wall_clock")
-def test_a_motion_no_faster_over_all_knots_is_not_refined(robot, monkeypatch):
-    monkeypatch.setattr(portfolio.Search, "_may_win", lambda *_: True)
-    said: list[str] = []
-    asked = task(start="free", path_start=HERE)
-    one, two = (
-        brachis.plan(robot, asked | {"search": {"jobs": jobs}}, listener=said.append)
-        for jobs in (1, 2)
-    )
-    (first, times), (second, others) = without_times(one), without_times(two)
-    assert first == second
-    np.testing.assert_allclose(others, times, rtol=1e-6)
-    best, *rest = one.candidates
-    slow = [each for each in rest if each.status == SLOW]
-    assert slow
-    assert all(each.adapted > (1.0 - 2e-4) * best.adapted for each in slow)
-    assert f"uno: {SLOW}" in map(str, said)
-    begun = f"best so far: t_E = {best.t_end:.4f} s, "
-    assert [line for line in map(str, said) if line.startswith(begun)]
-    assert f"uno: t_E = {best.t_end:.4f} s, verified" in map(str, said)
-
-
 def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     robot = scara({"jerk": 2000.0})
     finish = pipeline.finish_candidate

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ import brachis
 from brachis.common.deadline import Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
-from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.posture_lattice import PostureLattice
@@ -25,7 +23,6 @@ from support.screw_arms import seven_joints
 from support.spatial import START as RAIL_START
 from support.spatial import rail_arm
 
-ROOT = Path(__file__).parents[2]
 SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
 TURN = 2.0 * math.pi
 
@@ -189,43 +186,6 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
     assert joint_paths[0].length < 1.15 * best
 
 
-def test_a_free_start_of_seven_joints_is_as_good_as_the_best_branch():
-    robot = seven_joints()
-    path_start = pose_of(robot, SEVEN)
-    given = problem(
-        robot,
-        "pose",
-        start="free",
-        path_start=path_start,
-        path=[{"line": {"by": [0.0, 0.15, 0.05]}}],
-    )
-    decompositions = [one for one in decompositions_of(given) if one.redundant == (2,)]
-    found = PostureLattice(given, decompositions, cells_per_turn=24).joint_paths(8)
-    best = [
-        ClosedFormLattice(one, cells_per_turn=24).joint_paths(8)
-        for one in decompositions
-    ]
-    lengths = [
-        joint_paths[0].length
-        for joint_paths in best
-        if not isinstance(joint_paths, DeadEnd)
-    ]
-    assert lengths
-    assert found[0].length < 1.15 * min(lengths)
-    assert len({tuple(np.sign(joint_path.q[0, [1, 3, 5]])) for joint_path in found}) > 1
-
-
-def pose_of(robot: brachis.Robot, q: Any) -> dict[str, list[float]]:
-    from scipy.spatial.transform import Rotation
-
-    placement = robot.tool_placement(np.array(q, dtype=float))
-    turn = Rotation.from_matrix(placement.rotation).as_quat()
-    return {
-        "position": placement.translation.tolist(),
-        "quaternion_xyzw": turn.tolist(),
-    }
-
-
 CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
 COARSE = {"cells_per_turn": 24, "density": 0.2}
 
@@ -297,66 +257,6 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
     assert isinstance(dead, DeadEnd)
     assert 1.8 / 2.1 < dead.s < 1.0
     assert "the range of joint 'j1' ends" in dead.cause
-
-
-@pytest.mark.parametrize(
-    "turned",
-    [{"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}],
-    ids=str,
-)
-def test_back_from_a_given_end_in_its_own_turns(turned):
-    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
-    robot = robot_from_settings(brachis.load_task(task).robot)
-    end = np.array(task["start"]["joints"])
-    for joint, turns in turned.items():
-        end[robot.joint_names.index(joint)] += TURN * turns
-    by = np.array([0.0, 0.4, 0.0])
-    place = pose_of(robot, end)
-    place["position"] = (np.array(place["position"]) - by).tolist()
-    path = {"start": "free", "path_start": place, "path": [{"line": {"by": by}}]}
-    task |= path | {
-        "end": {"joints": end.tolist()},
-        "redundant_joints": "auto",
-        "branch": "auto",
-    }
-    joint_paths = joint_paths_of(Problem.of(robot, brachis.load_task(task)))
-    assert joint_paths
-    for joint_path in joint_paths:
-        np.testing.assert_array_equal(joint_path.q[-1], end)
-        assert np.all(joint_path.q >= robot.limits.position_lower - 1e-9)
-
-
-def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns():
-    """Four redundant joints, all but one of which may be in two turns: the end stays in the turn that is given."""
-    robot = seven_joints()
-    end = SEVEN + TURN * (np.eye(7)[0] - np.eye(7)[2])
-    wide = {name: [-TURN - 1.0, TURN + 1.0] for name in robot.joint_names}
-    robot = brachis.Robot.from_urdf(
-        "wide", urdf_text=robot.urdf, limits=brachis.LimitSpec(position=wide)
-    )
-    here = robot.tool_placement(end).translation
-    path = [
-        {
-            "circle": {
-                "center": np.add(here, [0.05, 0.03, 0.0]).tolist(),
-                "turns": -1.0,
-                "normal": [0.0, 0.0, 1.0],
-            }
-        }
-    ]
-    given = problem(
-        robot,
-        "position",
-        start="free",
-        path_start=here.tolist(),
-        end={"joints": end.tolist()},
-        path=path,
-    )
-    joint_paths = joint_paths_of(given, nodes=40)
-    assert joint_paths
-    for joint_path in joint_paths:
-        np.testing.assert_array_equal(joint_path.q[-1], end)
-        assert np.abs(np.diff(joint_path.q, axis=0)).max() <= 0.8
 
 
 def test_the_same_seed_gives_the_same_joint_paths():

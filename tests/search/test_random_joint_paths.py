@@ -62,20 +62,6 @@ def test_they_are_on_the_path_from_given_ends_within_the_ranges(given):
         assert is_same == (name == given)
 
 
-def test_they_are_the_same_for_the_same_seed():
-    first, again, other = (
-        np.array(
-            [
-                each.q
-                for each in random_joint_paths(problem_of(search={"seed": seed}), 3)
-            ]
-        )
-        for seed in (0, 0, 1)
-    )
-    np.testing.assert_array_equal(first, again)
-    assert np.abs(first - other).max() > 0.01
-
-
 def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     """The lattice ends in one node there, and has few joint paths."""
     monkeypatch.setattr(module, "screen", lambda guesses, *_others: guesses)

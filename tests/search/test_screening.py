@@ -117,16 +117,6 @@ def test_few_guesses_are_improved_where_most_of_the_time_is_given(guesses, monke
     assert len(tried) <= (screening._MOST + 2) * screening._FEWEST < len(3 * untimed)
 
 
-def test_guesses_say_whose_closed_form_they_begin_with(guesses):
-    names = {
-        decomposition.name for decomposition in decompositions_of(guesses[0].problem)
-    }
-    for guess in guesses:
-        number, _, seed = guess.origin.partition(", from ")
-        assert number.startswith("lattice ")
-        assert seed in names
-
-
 def test_no_further_guess_is_looked_at_where_the_least_end_time_is_met_again(
     guesses, monkeypatch
 ):
@@ -208,15 +198,3 @@ def test_large_programs_over_the_path_go_to_an_interior_point_first(
     again = screening.screen(guesses[:2], MOST, NEVER, quiet)
     assert set(solvers) == {"uno"}
     assert again[0].estimate == pytest.approx(plain[0].estimate, rel=1e-2)
-
-
-def test_guesses_are_looked_at_the_farthest_from_each_other_first(guesses):
-    first, second, *others = screening._spread_out([*guesses, guesses[0]])
-    assert first is guesses[0]
-    assert {guess.origin for guess in (first, second, *others)} <= {
-        guess.origin for guess in guesses
-    }
-    paths = [guess.postures_at(np.linspace(0.0, 1.0, 49)) for guess in guesses]
-    distances = [np.abs(path - paths[0]).max() for path in paths]
-    assert second is guesses[int(np.argmax(distances))]
-    assert len(others) + 2 == len({path.tobytes() for path in map(np.array, paths)})

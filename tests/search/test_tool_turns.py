@@ -65,16 +65,6 @@ def test_no_step_of_the_stations_turns_far(case):
         assert given.task_map.norms(step)[1].max() < 0.26
 
 
-def test_stations_of_a_line_are_even():
-    line = {"line": {"by": [0.0, 0.4, 0.0]}}
-    asked = task(*TURNS[0]).model_dump(mode="json") | {"path": [line]}
-    given = problem(TURNS[0]).of(
-        robot_for(None, task(*TURNS[0]).robot), brachis.load_task(asked)
-    )
-    even = np.linspace(0.0, 1.0, 25)
-    np.testing.assert_allclose(stations(given.path, given.task_map), even, atol=1e-12)
-
-
 @pytest.mark.parametrize("case", TURNS)
 def test_lattices_follow_quick_turns(case):
     given = problem(case)

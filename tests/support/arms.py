@@ -270,5 +270,5 @@ class PoseBench:
                     self.solver.branch_margins(q + s, branch) for s in (step, -step)
                 )
                 np.testing.assert_allclose(
-                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7
+                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-8
                 )

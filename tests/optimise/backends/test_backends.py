@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import UnknownNameError, UnreachableError
+from brachis.errors import UnknownNameError
 from brachis.optimise.backends import (
     NAMES,
     TABLE,
@@ -242,19 +242,6 @@ def test_residual_is_the_worst_of_rows_and_bounds(problem, x, expected):
     assert residual(problem, np.array(x)) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
-def test_backends_get_finite_numbers_only(bad):
-    for wrong in (
-        {"row_values": lambda _x: np.array([bad])},
-        {"row_slopes": lambda _x: np.array([[1.0, bad]])},
-    ):
-        watch = SolveMonitor(dataclasses.replace(disc(), **wrong), OPTIONS, None)
-        with pytest.raises(UnreachableError, match="not a finite number"):
-            _ = watch.rows(np.zeros(2)), watch.jacobian(np.zeros(2))
-    with pytest.raises(UnreachableError, match="not finite"):
-        SolveMonitor(disc(), OPTIONS, None).rows(np.array([bad, 0.0]))
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_backs_off_from_points_whose_rows_are_not_finite(name, bad):
     seen = []
@@ -282,6 +269,7 @@ def rows_of(bad):
         ({}, 1e300),
         (rows_of(np.nan), 4.0),
         (rows_of(np.inf), 4.0),
+        ({"row_slopes": lambda _x: np.array([[1.0, np.nan]])}, 4.0),
         ({"upper": np.array([np.nan])}, 4.0),
         ({"reachable": lambda _x: False}, 4.0),
     ],
