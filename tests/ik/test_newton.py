@@ -96,11 +96,3 @@ def test_singular_matrices_do_not_raise_and_leave_the_others_alone():
     found = Newton(task_map).solve(targets, q, rows, np.zeros((3, 1)))
     assert np.isnan(found[[0, 2]]).all()
     np.testing.assert_allclose(found[1], [0.05, 0.05, 0.1], atol=1e-14)
-
-
-def test_no_postures_at_all():
-    _, task_map = bind(planar_robot("RRR"), ["x", "y"])
-    found = Newton(task_map).solve(
-        np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 1, 3)), np.zeros((0, 1))
-    )
-    assert found.shape == (0, 3)

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import brachis
 from brachis.apps.cli.inspection import inspect
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, Family, find, find_all
@@ -21,12 +20,10 @@ from brachis.robot import Robot, task_map_of
 from support.arms import PoseBench
 from support.chains import Joint, chain_urdf
 from support.closed_forms import wrapped
-from support.effort import QUICK
 from support.rounded import ANY_DIGITS, ARMS, by_angles
 
 ROUNDED, EXACT = 4, ANY_DIGITS
 XARM = "cmeel.prefix/share/example-robot-data/robots/xarm_description/urdf/xarm7.urdf"
-XARM_START = (-0.2, -0.3, 0.2, 1.4, 0.3, 1.2, 0.1)
 
 
 @functools.cache
@@ -259,25 +256,3 @@ def test_inspect_names_the_families_and_says_which_solvers_are_refined(
     assert remarks["joint1"] == ""
     inspect(xarm(), task_space="pose")
     assert capsys.readouterr().out.count("solutions are refined numerically") == 4
-
-
-@pytest.mark.parametrize("joint", ["joint4", "joint7"])
-def test_xarm7_plans_as_the_ideal_arm_does(joint):
-    task = {
-        "brachis": 1,
-        "task_space": "pose",
-        "start": {"joints": XARM_START},
-        "path": [{"line": {"by": [0.0, 0.2, -0.1]}}],
-        "redundant_joints": [joint],
-        "spline": {"intervals": 10},
-        "search": QUICK,
-    }
-    text = xarm().read_text()
-    results = [
-        brachis.plan(
-            Robot.from_urdf("xarm7", urdf_text=given, tool_frame="link_eef"), task
-        )
-        for given in (text, text.replace("1.5708", repr(np.pi / 2)))
-    ]
-    assert all(result.verified for result in results)
-    assert results[0].t_end == pytest.approx(results[1].t_end, rel=1e-3)

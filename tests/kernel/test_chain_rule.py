@@ -9,14 +9,11 @@ import pytest
 
 from brachis.kernel import (
     CurvePattern,
-    Formula,
-    FormulaQuantity,
     MotionSlopes,
     ScaledQuantity,
     ValueGroups,
     VariableSlopes,
     differentiate,
-    formula,
 )
 from kernel.test_chain import chain_of, random_model
 
@@ -84,20 +81,6 @@ def test_the_chain_rule(with_jerk, width):
     np.testing.assert_array_equal(again[1], entries)
 
 
-def test_orders_that_values_do_not_depend_on_are_left_out():
-    rng = np.random.default_rng(2)
-    found = rng.normal(size=(3, POINTS, 2, 2))
-    places = CurvePattern(np.array([3]), np.array([1]), POINTS, 2)
-    shared = rng.normal(size=(1, 4, POINTS, 2))
-    basis = rng.normal(size=(4, 1))
-    whole = VariableSlopes(shared, places, basis).find_entries(found)
-    part = VariableSlopes(shared[:, :3], places, basis[:3]).find_entries(found)
-    np.testing.assert_array_equal(whole, part)
-    fewer = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found)
-    known = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found[:2])
-    np.testing.assert_array_equal(fewer, known)
-
-
 @pytest.mark.parametrize("quantity", ["q", "qdot", "qddot", "qdddot", "torque"])
 def test_scaled_quantities(chain, quantity):
     """Each is its partials, which are rows of the unit matrix or derivatives of the torque, times the factors."""
@@ -126,33 +109,6 @@ def test_scaled_quantities(chain, quantity):
     found, _ = differentiate(groups, motion, states[:3], [])
     known = slopes_of(partials, parts, has_jerk)
     np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
-
-
-def test_formulas_of_the_posture():
-    """Margins are such: numbers of a formula, times signs."""
-    rng = np.random.default_rng(7)
-    states = rng.normal(size=(3, POINTS, N))
-
-    def function(q):
-        return np.stack([q[:, 0] * q[:, 2], formula.sin(q[:, 4])], axis=1)
-
-    factors = np.array([2.0, -1.0])
-    margins = FormulaQuantity(
-        Formula.of(function, N), Formula.gradient(function, N), factors
-    )
-    groups = ValueGroups([None, margins], [1, 2])
-    values = groups.values(states)[1]
-    np.testing.assert_allclose(values, function(states[0]) * factors, atol=1e-14)
-    parts = rng.normal(size=(5, POINTS, N, 3))
-    by_q = margins.slopes_of(states[0]) * factors[:, None]
-    zero = np.zeros_like(by_q)
-    given = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
-    motion = MotionSlopes(*parts[:4])
-    found, _ = differentiate(groups, motion, states, given)
-    known = slopes_of((by_q, zero, zero, zero), parts, with_jerk=False)
-    np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
-    with pytest.raises(ValueError, match="have the shapes"):
-        ValueGroups([margins], [3])
 
 
 def test_groups_can_be_sent_to_another_process(chain):

@@ -1,8 +1,7 @@
-"""Motion along a path, its derivatives and the chain rule against NumPy's formulas, on random chains."""
+"""Motion along a path on random chains: what is refused, copied and kept; `tests/kinematics` has the differences."""
 
 import copy
 import pickle
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from brachis.kernel import (
     Prescribed,
     find_least_singular,
     largest_parts,
-    tool_derivatives,
 )
 from brachis.robot.chain import chain_of
 from support.random_chains import random_model
@@ -22,16 +20,11 @@ POINTS = 11
 CURVES_AND_PATH = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds")
 CASES = {
     "pose, r = 0": (6, Prescribed((0, 1, 2), 3, in_tool_axes=True)),
-    "pose, r = 2": (8, Prescribed((0, 1, 2), 3, in_tool_axes=True)),
     "position, r = 4": (7, Prescribed((0, 1, 2))),
-    "one row, r = 2": (3, Prescribed((2,))),
     "two rows and pitch, r = 1": (
         4,
         Prescribed((0, 2), 1, heading=(1, 0, 2), sign=-1.0),
     ),
-    "three rows and yaw, r = 0": (4, Prescribed((2, 0, 1), 1)),
-    "two rows and orientation, r = 1": (6, Prescribed((2, 0), 3)),
-    "orientation, r = 2": (5, Prescribed((), 3)),
 }
 
 
@@ -47,131 +40,23 @@ def motion_in(chain, asked, q, path, tables, curves):
     return motion
 
 
-def rates_of(asked, twists):
-    """Prescribed rows, (K, m, n), of columns (6, K, n)."""
-    turning = [3, 4, 5]
-    if asked.turns == 1:
-        turning = [6 - sum(asked.heading[1:])]
-    rows = [*asked.axes, *turning[: asked.turns]]
-    return np.moveaxis(twists[rows], 0, 1)
-
-
 @pytest.fixture(
     params=[(name, turns) for name in CASES for turns in (False, True)], ids=str
 )
-def case(request):
-    """Everything that a motion is computed from, at random."""
+def motion(request):
+    """From everything that a motion is computed from, at random."""
     name, turns = request.param
     n, asked = CASES[name]
     rng = np.random.default_rng(n)
     chain = chain_of(*random_model(n, n))
-    m = asked.count
-    r = n - m
-    path = tuple(rng.normal(size=(3, POINTS, m)))
+    r = n - asked.count
+    path = tuple(rng.normal(size=(3, POINTS, asked.count)))
     tables = [rng.normal(size=(POINTS, r, n + 1))]
-    q = rng.normal(size=(POINTS, n))
-    conditions = SimpleNamespace(rows=tables[0][..., :n], turning=None, drift=None)
     if turns and r:
         tables.append(rng.normal(size=(3, POINTS, r, n + 1)))
-        conditions.turning = tables[1][:2, ..., :n]
-        drift = np.einsum("okij,kj->oki", tables[1][..., :n], q)
-        conditions.drift = drift - tables[1][..., n]
+    q = rng.normal(size=(POINTS, n))
     curves = tuple(rng.normal(size=(2, POINTS, 1 + r)))
-    motion = motion_in(chain, asked, q, path, tables, curves)
-    return chain, asked, q, path, conditions, curves, motion
-
-
-def test_motion(case):
-    chain, asked, q, (xi, xi_ds, _), conditions, (ydot, yddot), found = case
-    m = asked.count
-    _, _, twists = chain.tool(q, in_tool_axes=asked.in_tool_axes)
-    np.testing.assert_allclose(found.twists, twists, atol=1e-12)
-    augmented = np.concatenate([rates_of(asked, twists), conditions.rows], axis=1)
-    inverse = np.linalg.inv(augmented)
-    np.testing.assert_allclose(found.inverse, inverse, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(found.determinants, np.linalg.det(augmented), rtol=1e-10)
-    inverse = found.inverse
-    right = np.concatenate([xi, np.zeros((POINTS, len(q[0]) - m))], axis=1)
-    if conditions.drift is not None:
-        right[:, m:] = -conditions.drift[0]
-    gradient = np.concatenate([inverse @ right[:, :, None], inverse[:, :, m:]], axis=2)
-    np.testing.assert_allclose(found.gradient, gradient, atol=1e-10)
-    qdot = np.einsum("kij,kj->ki", gradient, ydot)
-    np.testing.assert_allclose(found.qdot, qdot, atol=1e-10)
-    slopes = tool_derivatives(twists, qdot, 0.0 * qdot, in_tool_axes=asked.in_tool_axes)
-    bias = np.einsum("kij,kj->ki", rates_of(asked, slopes[0]), qdot)
-    sdot = ydot[:, :1]
-    wanted = np.concatenate([xi_ds * sdot**2 - bias, 0.0 * right[:, m:]], axis=1)
-    if conditions.turning is not None:
-        turned = np.einsum("kij,kj->ki", conditions.turning[0], qdot)
-        wanted[:, m:] = -2.0 * sdot * turned - conditions.drift[1] * sdot**2
-    qddot = np.einsum("kij,kj->ki", gradient, yddot)
-    qddot += np.einsum("kij,kj->ki", inverse, wanted)
-    scale = np.abs(qddot).max()
-    np.testing.assert_allclose(found.qddot / scale, qddot / scale, atol=1e-11)
-
-
-def test_derivatives(case):
-    """The module's formulas in NumPy."""
-    _, asked, _, (_, xi_ds, xi_dds), conditions, (ydot, yddot), motion = case
-    m = asked.count
-    slopes = tool_derivatives(
-        motion.twists, motion.qdot, motion.qddot, in_tool_axes=asked.in_tool_axes
-    )
-    V_q, A_q, A_v = (rates_of(asked, own) for own in slopes)  # noqa: N806  (the field's letters)
-    gradient = motion.gradient
-    upper = motion.inverse[:, :, :m]
-    lower = motion.inverse[:, :, m:]
-    sdot = ydot[:, :1]
-    sddot = yddot[:, :1]
-
-    right = -V_q @ gradient
-    right[:, :, 0] += xi_ds * sdot
-    qdot_y = upper @ right
-    right = -A_v @ gradient
-    right[:, :, 0] += 2.0 * xi_ds * sdot
-    qddot_ydot = upper @ right
-    if conditions.turning is not None:
-        first, second = conditions.turning
-        _, e_ds, e_dds = conditions.drift
-        rows = first @ gradient * sdot[:, :, None]
-        rows[:, :, 0] += np.einsum("kij,kj->ki", first, motion.qdot) + e_ds * sdot
-        qdot_y -= lower @ rows
-        qddot_ydot -= 2.0 * lower @ rows
-    right = -A_q @ gradient - A_v @ qdot_y
-    right[:, :, 0] += xi_dds * sdot**2 + xi_ds * sddot
-    qddot_y = upper @ right
-    if conditions.turning is not None:
-        rows = 2.0 * sdot[:, :, None] * (first @ qdot_y)
-        rows += (second * sdot[:, :, None] ** 2 + first * sddot[:, :, None]) @ gradient
-        rows[:, :, 0] += np.einsum("kij,kj->ki", first, motion.qddot)
-        rows[:, :, 0] += 2.0 * sdot * np.einsum("kij,kj->ki", second, motion.qdot)
-        rows[:, :, 0] += e_dds * sdot**2 + e_ds * sddot
-        qddot_y -= lower @ rows
-    known = (qdot_y, qddot_y, qddot_ydot)
-    for found, own in zip(motion.derivatives(), known, strict=True):
-        scale = max(np.abs(own).max(), 1.0)
-        np.testing.assert_allclose(found / scale, own / scale, atol=1e-11)
-
-
-def test_singular_slopes(case):
-    """The left singular vector, by the change of J_aug, by the right one."""
-    _, asked, q, _, conditions, _, motion = case
-    values, vectors = find_least_singular(motion.inverse)
-    found, found_s = motion.singular_slopes(values, vectors)
-    left = values[:, None] * np.einsum("kji,kj->ki", motion.inverse, vectors)
-    rest = np.zeros_like(q)
-    slopes, _, _ = tool_derivatives(
-        motion.twists, vectors, rest, in_tool_axes=asked.in_tool_axes
-    )
-    m = asked.count
-    known = np.einsum("ki,kij->kj", left[:, :m], rates_of(asked, slopes))
-    np.testing.assert_allclose(found, known, atol=1e-11 * max(1.0, np.abs(known).max()))
-    known = np.zeros(POINTS)
-    if conditions.turning is not None:
-        turned = np.einsum("kij,kj->ki", conditions.turning[0], vectors)
-        known = np.sum(left[:, m:] * turned, axis=1)
-    np.testing.assert_allclose(found_s, known, atol=1e-11)
+    return motion_in(chain, asked, q, path, tables, curves)
 
 
 def test_rows_that_are_the_same_everywhere_are_given_once():
@@ -246,8 +131,7 @@ def test_what_the_library_would_read_beyond_its_end_is_refused():
         PathMotion.prepare(chain, asked, given).evaluate()
 
 
-def test_derivatives_are_those_of_the_last_evaluation(case):
-    *_, motion = case
+def test_derivatives_are_those_of_the_last_evaluation(motion):
     known = [own.copy() for own in motion.derivatives()]
     q = motion.q.copy()
     motion.q[:] = q + 0.1
@@ -263,8 +147,7 @@ def test_derivatives_are_those_of_the_last_evaluation(case):
     "send",
     [copy.copy, copy.deepcopy, lambda own: pickle.loads(pickle.dumps(own))],  # noqa: S301  (our own)
 )
-def test_a_motion_can_be_copied_and_sent(case, send):
-    *_, motion = case
+def test_a_motion_can_be_copied_and_sent(motion, send):
     again = send(motion)
     for name in ("q", "qdot", "gradient", "inverse"):
         np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))

@@ -14,7 +14,6 @@ from brachis.limits import (
     Limit,
     Moments,
     Partials,
-    limits_of,
 )
 from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
@@ -148,27 +147,6 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
         on = np.isfinite(at)
         np.testing.assert_allclose(limit.ratio(values)[0, on], sign)
         np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
-
-
-def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
-    kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
-    assert kinds == [
-        kind
-        for kind in TABLE
-        if kind not in ("acceleration", "jerk", "torque_rate", *OF_TOLERANCES)
-    ]
-    open_task = SimpleNamespace(
-        tool_limits=ToolLimits(),
-        custom_limits={},
-        scene=(),
-        frames={},
-        collisions=CollisionSettings(),
-        collision_mode="off",
-        tolerances=Tolerances(),
-        margins=Margins(),
-    )
-    kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
-    assert kinds == ["torque", "velocity", "position"]
 
 
 @pytest.mark.parametrize(

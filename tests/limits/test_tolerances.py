@@ -316,21 +316,6 @@ def test_the_verification_sees_a_tool_that_leaves_its_range(leaning):
     )
 
 
-def test_labels_name_the_keys_of_the_task():
-    every = limits_of(robot_with(EVERYTHING), task_with(EVERYTHING))
-    keys = {
-        label.key
-        for limit in every
-        for label in limit.labels
-        if label.subject.startswith("tool")
-    }
-    parts = ("orientation.tilt", "orientation.roll", "position.sphere")
-    assert keys >= {f"tolerances.{part}" for part in parts}
-    (tilt,) = [limit for limit in every if limit.kind == "tool_tilt"]
-    (bound,) = tilt.bounds
-    assert tilt.relax(bound, 15.0).upper == pytest.approx(2.0)
-
-
 def test_saved_motions_come_back(leaning, tmp_path):
     _, result = leaning
     result.save(tmp_path / "motion.npz")

@@ -63,25 +63,6 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
         )
 
 
-def test_a_feasible_motion_stays_feasible_at_old_points():
-    phase = phase_of("r1", intervals=6)
-    x = reachable_points(phase, 1, spread=0.0)[0]
-    fine = finer(phase).with_points(phase.t_norm)
-    there = fine.variables_from(phase.motion(x).with_knots(fine.knots))
-    # A mean over time is one of the values at the points, weighted by the intervals that they are in.
-    rows = np.concatenate(
-        [
-            phase.rows_of(limit).ravel()
-            for limit in phase.limits
-            if not limit.guarantee.is_mean
-        ]
-    )
-    np.testing.assert_allclose(fine.rows(there)[rows], phase.rows(x)[rows], atol=1e-10)
-    assert np.diff(there[fine.slices[0]]).min() >= -1e-15, (
-        "s(t) should still be monotone in its control points"
-    )
-
-
 @pytest.mark.parametrize("degree", [2, 3, 5])
 def test_free_knots_where_they_are_given_change_nothing(degree):
     phase = phase_of("r1", degree=degree, rest="velocity")

@@ -79,13 +79,6 @@ def plan(
     return brachis.plan(urdf, task)
 
 
-def fastest(result) -> np.ndarray:
-    """Largest speed of every joint on a dense grid."""
-    return np.abs(result.trajectory.velocity(np.linspace(0.0, result.t_end, 4001))).max(
-        axis=0
-    )
-
-
 def bang_bang(mass: float) -> float:
     return 2.0 * np.sqrt(mass * LENGTH / FORCE)
 
@@ -213,41 +206,6 @@ def test_diagonal_line_is_as_fast_as_its_slower_slide(slides):
     result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, LENGTH])
     assert result.verified
     assert bang_bang(2.0 * MASS) < result.t_end < 1.01 * bang_bang(2.0 * MASS)
-
-
-def test_velocity_limit_gives_the_trapezoid(slides):
-    urdf, mass, limit = slides([X, Y], [FORCE, FORCE]), 2.0 * MASS, 2.0
-    free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
-    assert fastest(free)[0] > 1.5 * limit, (
-        "without the limit the slide is faster than the limit"
-    )
-    result = plan(
-        urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"velocity": limit}}
-    )
-    assert result.verified
-    assert fastest(result)[0] == pytest.approx(limit, rel=SLACK)
-    trapezoid = LENGTH / limit + limit * mass / FORCE
-    assert trapezoid <= result.t_end < 1.01 * trapezoid
-    assert result.t_end > 1.1 * free.t_end
-
-
-def test_acceleration_limit(slides):
-    urdf, limit = slides([X, Y], [FORCE, FORCE]), 6.0
-    t = np.linspace(0.0, 1.0, 2001)
-    free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
-    assert np.abs(free.trajectory.acceleration(t * free.t_end)).max() > 2.0 * limit
-    result = plan(
-        urdf,
-        ["x", "y"],
-        [LENGTH, 0.0],
-        robot={"limits": {"acceleration": limit, "torque": None}},
-    )
-    assert result.verified
-    assert np.abs(result.trajectory.acceleration(t * result.t_end)).max() <= limit * (
-        1.0 + SLACK
-    )
-    best = 2.0 * np.sqrt(LENGTH / limit)
-    assert best <= result.t_end < 1.01 * best
 
 
 JERK = 50.0

@@ -93,20 +93,6 @@ def test_a_motion_along_a_branch_boundary_is_verified_too():
     assert len(result.trajectory.times) < 1500
 
 
-def test_intervals_are_refined_where_the_motion_switches(solved):
-    program = solved.program
-    finer = refine_mesh(
-        solved, solve, SplineSettings(intervals="auto", tolerance=0.02), NEVER
-    ).program
-    lengths = np.diff(finer.phases[0].breaks)
-    assert len(lengths) < 60
-    assert lengths.max() >= 4.0 * lengths.min()
-    np.testing.assert_allclose(lengths[[0, -1]], lengths.min(), rtol=1e-9)
-    assert set(np.round(program.phases[0].breaks, 12)) <= set(
-        np.round(finer.phases[0].breaks, 12)
-    )
-
-
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     program = solved.program
     report = solved.report

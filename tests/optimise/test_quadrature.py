@@ -32,15 +32,6 @@ def test_polynomials_are_integrated_exactly_in_every_interval(case, degree):
         assert weights @ t_norm**power == pytest.approx(1.0 / (power + 1), abs=1e-10)
 
 
-def test_what_bends_at_knots_is_no_worse():
-    t_norm = spread(BREAKS, 3)
-    weights = FixedGrid(clamped_knots(3, BREAKS), 3, t_norm).mean_weights(np.empty(0))
-    values = np.abs(t_norm - 0.5) * np.abs(t_norm - 0.6)
-    dense = np.linspace(0.0, 1.0, 1_000_001)
-    expected = np.trapezoid(np.abs(dense - 0.5) * np.abs(dense - 0.6), dense)
-    assert weights @ values == pytest.approx(expected, abs=1e-10)
-
-
 def test_free_knots_carry_their_points_along():
     t_norm = spread(BREAKS, 3)
     free, h = (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
@@ -84,21 +83,6 @@ def test_without_time_or_motion_guesses_are_kept_that_differ(guesses, monkeypatc
     monkeypatch.setattr(screening, "improve_guess", missing)
     without = screening.screen(guesses, MOST, NEVER, quiet)
     assert [guess.origin for guess in without] == [guess.origin for guess in late]
-
-
-def test_those_for_which_there_was_no_time_come_after_the_others(guesses, monkeypatch):
-    solved = itertools.chain([True], itertools.cycle([False]))
-    honest = screening.improve_guess
-
-    def once(*arguments: object) -> object:
-        if next(solved):
-            return honest(*arguments)
-        raise UnreachableError("out of reach")
-
-    monkeypatch.setattr(screening, "improve_guess", once)
-    first, *others = screening.screen(guesses, MOST, NEVER, quiet)
-    assert first.origin == guesses[0].origin
-    assert others == [], "what was not solved is slower for all that is known"
 
 
 def test_few_guesses_are_improved_where_most_of_the_time_is_given(guesses, monkeypatch):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import PathError
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_for
 from brachis.search.closed_form_lattice import ClosedFormLattice
@@ -92,16 +91,3 @@ def test_a_lattice_that_is_too_coarse_does_not_say_out_of_reach():
     assert isinstance(found, DeadEnd)
     assert found.cause != NO_ANSWER
     assert reaches(given, found.s)
-
-
-def test_out_of_reach_is_out_of_reach():
-    robot, position, turned, _, *others = TURNS[0]
-    given = problem((robot, position, turned, [2.5, 0.0, 0.0], *others))
-    assert reaches(given, 0.0)
-    assert not reaches(given, 1.0)
-    (first, *_) = decompositions_of(given)
-    found = ClosedFormLattice(first).joint_paths(1)
-    assert isinstance(found, DeadEnd)
-    assert found.cause == NO_ANSWER
-    with pytest.raises(PathError, match="out of reach"):
-        brachis.plan(given.task)
