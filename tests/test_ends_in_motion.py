@@ -201,22 +201,6 @@ def test_a_turn_on_the_spot_ends_at_an_angular_speed():
     )
 
 
-def test_a_speed_that_no_limit_allows_is_told():
-    path, spline = [{"line": {"length": 0.6, "angle_deg": 90}}], {"intervals": 8}
-    task = variant(
-        path=path,
-        boundary={"end_speed": 20.0},
-        redundant_joints=["j1"],
-        search=QUICK,
-        spline=spline,
-    )
-    with pytest.raises(
-        brachis.PlanningError,
-        match=r"boundary\.end_speed: .* found 20 m/s; allowed: about 0\.\d+ m/s along the best joint path",
-    ):
-        brachis.plan(task)
-
-
 def test_path_of_joints_with_speeds_takes_as_long_as_in_toppra():
     pytest.importorskip("toppra")
     waypoints = np.random.default_rng(3).uniform(-1.0, 1.0, (4, 7))

@@ -250,16 +250,6 @@ def test_many_plans_keep_their_order_and_failures_are_values():
     assert outcomes[2].bottleneck().sensitivities.limits
 
 
-def test_one_task_is_no_list_of_tasks():
-    for one in (
-        brachis.examples.scara_line,
-        str(brachis.examples.scara_line),
-        {"brachis": 1},
-    ):
-        with pytest.raises(InputError, match="a list of tasks"):
-            brachis.plan_many(one)
-
-
 def test_a_line_tells_of_many_plans(capsys):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

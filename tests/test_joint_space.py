@@ -126,28 +126,6 @@ def test_every_limit_is_violated_without_it_and_met_with_it(planned, limit):
     assert 0.99 < found.value <= 1.0001
 
 
-def test_saved_motion_is_verified_again_and_tampering_is_seen(planned, tmp_path):
-    planned.trajectory.save(tmp_path / "motion.npz")
-    loaded = brachis.Trajectory.load(tmp_path / "motion.npz")
-    assert verify_trajectory(loaded).passed
-    q = np.array(loaded.q)
-    q[len(q) // 2, 3] += 1e-6
-    failed = {
-        check.name
-        for check in verify_trajectory(replace(loaded, q=q)).checks
-        if not check.passed
-    }
-    assert "path error" in failed
-    other = np.array(loaded.control_points)
-    other[0, 8] += 1e-6
-    failed = {
-        check.name
-        for check in verify_trajectory(replace(loaded, control_points=other)).checks
-        if not check.passed
-    }
-    assert "path error" in failed
-
-
 def test_a_spline_of_scipys_is_the_path():
     from scipy.interpolate import make_interp_spline
 

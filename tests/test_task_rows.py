@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import TaskError
 from brachis.ik import default_task_space, find_all
 from brachis.path import build_path
 from brachis.robot import Robot, bind, task_map_of
@@ -283,19 +282,6 @@ def test_rows_that_are_refused(word, space, path, texts):
         plan(robot, [0.3] * robot.n, space, path)
     for text in texts:
         assert text in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ["position", "orientation"])
-def test_tolerances_are_refused_where_they_do_not_apply(name):
-    tolerances = {"position": {"sphere": 0.001}, "orientation": {"tilt": 3.0}}
-    with pytest.raises(TaskError, match=f"tolerances.{name}"):
-        plan(
-            chain(SCARA),
-            [0.3, 1.2, 0.1, 0.2],
-            YAWING,
-            [{"line": {"by": [0.1, 0.0, 0.0, 0.0]}}],
-            tolerances={name: tolerances[name]},
-        )
 
 
 def test_rows_with_the_axis_have_one_name():

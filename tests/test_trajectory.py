@@ -147,22 +147,6 @@ def test_headers_of_arrays_that_are_broken(header, trajectory, tmp_path):
         Trajectory.load(path)
 
 
-def test_numbers_and_arrays_of_times(trajectory):
-    t = np.linspace(0.0, trajectory.t_end, 7)
-    for curve in (
-        trajectory.position,
-        trajectory.velocity,
-        trajectory.acceleration,
-        trajectory.torque,
-    ):
-        assert curve(t).shape == (7, 3)
-        assert curve(float(t[3])).shape == (3,)
-        np.testing.assert_allclose(
-            curve(t)[3], curve(float(t[3])), rtol=1e-12, atol=1e-12
-        )
-    assert trajectory.path_coordinate(t).shape == (7,)
-
-
 def test_samples(trajectory):
     samples = trajectory.sample(0.01)
     assert samples.t[-1] == trajectory.t_end

@@ -12,7 +12,6 @@ import yaml
 
 import brachis
 from brachis.apps import bottleneck
-from brachis.apps.compose import Rail, on_rail
 from brachis.apps.export import write
 from brachis.apps.plots import PLOTS
 from brachis.apps.plots.panels import joint_rows_of
@@ -266,34 +265,6 @@ def test_the_commands(tmp_path, capsys):
     limits = yaml.safe_load(starter.text)["robot"]["limits"]
     assert set(limits["torque"].values()) == {None}
     assert set(limits["acceleration"].values()) == {1.0}
-
-
-def test_an_arm_without_masses_on_a_rail(tmp_path):
-    (tmp_path / "arm.urdf").write_text(six_axes())
-    rail = Rail(range=(-2.0, 2.0), velocity=2.0, force=1500.0, mass=50.0)
-    text = on_rail(tmp_path / "arm.urdf", rail)
-    with pytest.raises(
-        UrdfError, match=r"robot\.limits\.torque\.rail; found .* moved by a1"
-    ):
-        robot_of(text)
-    robot = robot_of(text, limits={"torque": None, "acceleration": 8.0})
-    assert robot.n == 7
-
-
-@pytest.mark.parametrize("angle", [20.0, -20.0])
-def test_a_joint_without_range_may_have_turned_three_times(angle, recwarn):
-    text = """<robot name='c'><link name='base'/><link name='l1'/><link name='l2'/><link name='tool0'/>
-        <joint name='a1' type='continuous'><parent link='base'/><child link='l1'/><axis xyz='0 0 1'/>
-        <limit effort='0' velocity='2.6'/></joint>
-        <joint name='a2' type='continuous'><origin xyz='0.5 0 0'/><parent link='l1'/><child link='l2'/>
-        <axis xyz='0 0 1'/><limit effort='0' velocity='2.6'/></joint>
-        <joint name='f' type='fixed'><origin xyz='0.4 0 0'/><parent link='l2'/><child link='tool0'/></joint></robot>"""
-    line = [{"line": {"by": [-0.05, 0.05]}}]
-    task = TASK | {"start": {"joints": [angle, 1.0]}, "task_space": ["x", "y"]}
-    planned = brachis.plan(robot_of(text), task | {"path": line})
-    assert planned.verified
-    assert planned.trajectory.q[0, 0] == pytest.approx(angle)
-    assert not recwarn.list
 
 
 def _benchmark():

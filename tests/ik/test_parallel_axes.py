@@ -18,7 +18,6 @@ from support.arms import (
     TOOL,
     UR10_D,
     Arm,
-    PoseBench,
     X,
     Y,
     Z,
@@ -30,6 +29,7 @@ from support.arms import (
     tx90l,
     ur10,
 )
+from support.factored_bench import Bench
 
 WRIST = ("noflip", "flip")
 ELBOW = ("up", "down")
@@ -104,7 +104,7 @@ CASES = {
 
 def bench_of(name):
     robot, redundant, _ = CASES[name]
-    return PoseBench(parallel_axes, robot, redundant)
+    return Bench(robot, redundant, 800, family=parallel_axes)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -114,29 +114,7 @@ def test_every_branch_is_right(name):
     assert bench.solver.branches == tuple(
         "_".join(label) for label in itertools.product(*words)
     )
-    solved = bench.answers(bench.q)
-    sample, branch, postures = bench.check_answers(solved)
-
-    margins = bench.margins(bench.q)
-    assert np.all(np.abs(margins).max(axis=(0, 1)) > 0.8)
-    assert np.all(np.abs(margins).max(axis=(0, 1)) < 3.0), (
-        "margins are of the order of one"
-    )
-    inside = (margins > 0.0).all(axis=2)
-    assert np.all(inside.sum(axis=1) == 1), "a posture is in exactly one branch"
-    own = np.argmax(inside, axis=1)
-    assert set(own) == set(range(len(bench.solver.branches)))
-    product = np.abs(margins[:, 0]).prod(axis=1)
-    regular = product > 1e-5
-    found = bench.distance(solved[np.arange(len(own)), own], bench.q)
-    assert (found * product)[regular].max() < 1e-10
-    for b in range(len(bench.solver.branches)):
-        assert bench.solver.branch_margins(postures[branch == b], b).min() > -1e-7
-    assert len(set(zip(sample, branch, strict=True))) == len(sample)
-
-    ratio = bench.determinant(bench.q)[regular] / margins[regular, 0].prod(axis=1)
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-7)
-    bench.check_gradient()
+    bench.check()
 
 
 def test_rail_answers_change_sides_where_the_rail_stops_helping():
@@ -152,8 +130,7 @@ def test_rail_answers_change_sides_where_the_rail_stops_helping():
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
 def test_arms_as_their_urdf_states_them(name):
     robot = example_robot(name)
-    bench = PoseBench(parallel_axes, robot, ())
-    bench.check_answers(bench.answers(bench.q))
+    Bench(robot, (), 800, family=parallel_axes).check()
     match = find(robot, task_map_of(robot, "pose"), [], families=[parallel_axes])
     assert match.family == "parallel_axes"
 

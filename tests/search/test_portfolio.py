@@ -258,35 +258,6 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
     )
 
 
-def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
-    honest, finished, calls = (
-        pipeline.rank_candidate,
-        pipeline.finish_candidate,
-        [],
-    )
-
-    def interrupted(*arguments: Any) -> Any:
-        if "verified" in calls:
-            raise KeyboardInterrupt
-        calls.append("solved")
-        return honest(*arguments)
-
-    def noted(*arguments: Any) -> Any:
-        done = finished(*arguments)
-        calls.extend(["verified"] * done.verified)
-        return done
-
-    monkeypatch.setattr(pipeline, "rank_candidate", interrupted)
-    monkeypatch.setattr(pipeline, "finish_candidate", noted)
-    result = brachis.plan(robot, task(search={"effort": "thorough"}))
-    assert result.interrupted
-    assert result.verified
-    assert calls.count("verified") == 1
-    assert calls[0] == "solved"
-    with pytest.raises(KeyboardInterrupt):
-        brachis.plan(robot, task())
-
-
 @pytest.mark.usefixtures("wall_clock")
 def test_a_real_ctrl_c_ends_worker_processes(robot):
     """Pressed as soon as a motion is verified, while another process plans on."""

@@ -89,7 +89,7 @@ class Bench:
         back = wrapped(
             solved[np.arange(len(own)), own] - self.q[:, self.rest], self.turning
         )
-        assert (np.abs(back).max(axis=1) * product)[product > 1e-6].max() < 1e-9
+        assert (np.abs(back).max(axis=1) * product)[product > 1e-6].max() < 1e-10
         for b in range(len(self.solver.branches)):
             assert (
                 self.solver.branch_margins(postures[sample[branch == b], b], b).min(
