@@ -83,6 +83,8 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     assert solver.alternatives == PER_SIGN
     solved = bench.answers(q)
     sample, answer, postures = bench.check_answers(solved)
+    assert np.nanmax(solved) <= np.pi
+    assert np.nanmin(solved) > -np.pi
     branch = answer // PER_SIGN
 
     margin = margin_of(bench, postures)

@@ -137,22 +137,6 @@ def test_transversality_of_several_rows_is_that_of_the_worst_direction():
     np.testing.assert_allclose(transversality(rows[None], null), [0.6], atol=1e-12)
 
 
-def test_without_redundancy_there_is_nothing_to_be_transversal_to(scara):
-    start = [0.2, 1.6, 0.5]
-    task_map, path = path_from(
-        scara, ["x", "y", "yaw"], [{"line": {"by": [0.0, 0.2, 0.3]}}], start
-    )
-    s = np.linspace(0.0, 1.0, 20)
-    q = least_motion(task_map, path, start, s)
-    assert np.all(
-        transversality(np.zeros((20, 0, 3)), null_spaces(jacobian(task_map, q)))
-        == np.inf
-    )
-    chart = chart_around(task_map, path, s, q)
-    assert chart.r == 0
-    np.testing.assert_allclose(chart.postures(s[:, None]), q, atol=1e-12)
-
-
 def test_a_joint_path_may_stand_still_in_s(once_around):
     """Self-motion while the tool waits: the first posture at a place counts, and the last one of all."""
     task_map, path, s, q = once_around

@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import brachis
-from brachis.limits import limits_of
 from brachis.verify import verify_trajectory
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.effort import QUICK
@@ -281,68 +280,3 @@ def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(
         label.split()[0] in str(line.label) and line.share > 0.01
         for line in report.saturations
     )
-
-
-def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
-    task, free = arm
-    figures = 0.95 * peaks(free.trajectory)["rms_torque"]
-    joints = {
-        **task["robot"]["limits"],
-        "rms_torque": {"j1": figures[0], "j2": figures[1]},
-    }
-    # The end time is flat around the optimum: only a close solve finds the multipliers.
-    own = {"robot": {**task["robot"], "limits": joints}, "solver": {"tolerance": 1e-7}}
-    result = brachis.plan({**task, **own})
-    assert result.verified, result.verification
-    assert result.t_end > free.t_end * 1.001
-    assert 0.999 < peaks(result.trajectory)["rms_torque"][0] / figures[0] < 1.0 + 1e-4
-    assert result.sensitivities.residual < 1e-4
-    unaware = dataclasses.replace(free.trajectory, task=result.task)
-    verification = verify_trajectory(unaware, robot=result.trajectory.robot)
-    assert [each.name for each in verification.checks if not each.passed] == [
-        "rms torque ratio"
-    ]
-
-
-def test_what_is_a_torque_of_revolute_joints_is_a_force_of_prismatic_ones():
-    limits = brachis.LimitSpec(
-        torque=9.0,
-        rms_torque=8.0,
-        torque_rate=7.0,
-        torque_speed={"j1": [[0, 9], [1, 8], [2, 5]]},
-    )
-    for kind, unit, word in (("revolute", "Nm", "torque"), ("prismatic", "N", "force")):
-        limit = {"lower": -1.0, "upper": 1.0, "velocity": 5.0, "effort": 9.0}
-        joint = Joint(
-            kind, axis=(0.0, 0.0, 1.0), limit=limit, inertial=INERTIAL.format(mass=1.0)
-        )
-        robot = brachis.Robot.from_urdf(
-            "one.urdf", urdf_text=chain_urdf([joint]), limits=limits
-        )
-        task = brachis.load_task(
-            {
-                "brachis": 1,
-                "start": {"joints": [0.0]},
-                "task_space": ["x"],
-                "path": [{"line": {"by": [0.1]}}],
-            }
-        )
-        labels = {
-            label
-            for found in limits_of(robot, task)
-            for label in found.labels
-            if label.unit.startswith("N")
-        }
-        assert {label.kind for label in labels} == {
-            word,
-            f"rms {word}",
-            f"{word} rate",
-            f"{word} at speed",
-        }
-        assert {label.unit for label in labels} == {unit, f"{unit}/s"}
-        assert {label.key.split(".")[2] for label in labels} == {
-            "torque",
-            "rms_torque",
-            "torque_rate",
-            "torque_speed",
-        }

@@ -13,18 +13,15 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.common.deadline import NEVER
 from brachis.errors import PathError, PlanningError
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
-from brachis.search.failure import explain_no_motion
 from brachis.search.guesses import SEARCH_LEVELS, lattice_guesses
 from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import stations
 from brachis.search.posture_lattice import PostureLattice
-from support.pose_arms import panda
 from support.scara import START, scara
 from support.scara import problem as scara_problem
 
@@ -111,30 +108,6 @@ def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
     assert all(other.length >= first.length for other in others)
 
 
-def test_an_end_posture_is_reached():
-    free = ClosedFormLattice(
-        decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]
-    ).joint_paths(3)
-    end = free[-1].q[-1]
-    given = problem(scara(), redundant_joints=["j1"], end={"joints": end})
-    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
-    assert all(np.abs(joint_path.q[-1] - end).max() < 0.2 for joint_path in joint_paths)
-
-
-def test_lifts_follow_the_course():
-    """Three turns about the base: the joint leaves (-pi, pi]."""
-    arm = scara(locked_joints={"j3": 0.4})
-    given = problem(
-        arm,
-        start={"joints": [0.3, 0.9]},
-        path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}],
-    )
-    (joint_path,) = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
-    assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(
-        6 * math.pi, abs=1e-6
-    )
-
-
 REASONS = {
     "out of reach": (
         {},
@@ -202,21 +175,6 @@ def test_advice_names_what_was_kept_low():
     assert "effort" not in str(caught.value)
 
 
-def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
-    """With another redundant joint the motion might go on."""
-    monkeypatch.setattr("brachis.ik.eaik.is_installed", lambda: False)
-    task = {
-        "start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]},
-        "task_space": "pose",
-    }
-    given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    dead_ends = {"panda_joint4": DeadEnd(0.4, "the branch ends")}
-    reason = explain_no_motion(given, decompositions_of(given), [], dead_ends, NEVER)
-    assert isinstance(reason, PathError)
-    assert "EAIK is not installed" in str(reason)
-    assert "[panda_joint5], [panda_joint6]" in str(reason)
-
-
 def rail_task(**changes: object) -> dict[str, object]:
     return (
         brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict() | changes
@@ -280,19 +238,6 @@ def test_a_free_start_that_no_torque_holds_says_so():
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
     assert "the torque limit of j1 cannot hold the arm against gravity" in end.cause
-
-
-def test_acceleration_limits_alone_have_shortest_courses():
-    robot = scara({"torque": None, "acceleration": 3.0})
-    line = [{"line": {"length": 1.0, "angle_deg": 90}}]
-    given = problem(
-        robot, start={"joints": [0.5, -2.0, 2.0]}, path=line, redundant_joints=["j1"]
-    )
-    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
-    assert len(joint_paths) == 3
-    assert joint_paths[0].length > 0.0
-    steps = np.abs(np.diff(joint_paths[0].q[:, 0], n=2))
-    assert steps.max() < 0.2, "the shortest joint path does not zigzag"
 
 
 @pytest.mark.parametrize(("turns", "joints"), [(4, ["j1"]), (30, ["j2"]), (30, ["j3"])])

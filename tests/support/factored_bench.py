@@ -7,7 +7,7 @@ import numpy as np
 from brachis.ik import ChainGeometry
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import task_map_of
-from support.closed_forms import wrapped
+from support.closed_forms import check_margin_gradient, margins_of, wrapped
 
 
 class Bench:
@@ -46,13 +46,7 @@ class Bench:
 
     def margins(self, q):
         """Margins (K, B, k) of all branches."""
-        return np.stack(
-            [
-                self.solver.branch_margins(q, b)
-                for b in range(len(self.solver.branches))
-            ],
-            axis=1,
-        )
+        return margins_of(self.solver, q)
 
     def determinant(self, q):
         return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
@@ -106,16 +100,8 @@ class Bench:
         return self
 
     def check_gradient(self):
-        q, h = self.q[:20], 1e-5
-        for branch in (0, len(self.solver.branches) - 1):
-            exact = self.solver.margin_gradient(q, branch)
-            for joint, step in enumerate(h * np.eye(self.robot.n)):
-                upper, lower = (
-                    self.solver.branch_margins(q + s, branch) for s in (step, -step)
-                )
-                np.testing.assert_allclose(
-                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-8
-                )
+        """Compare the margins' derivatives with differences."""
+        check_margin_gradient(self.solver, self.q[:20], atol=1e-8)
 
     def check_labels_along_curves(self):
         """Labels follow their branch along smooth curves, and determinants change sign where margins do."""

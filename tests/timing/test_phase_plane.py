@@ -10,12 +10,11 @@ import pytest
 import brachis
 from brachis.limits.joint import (
     AccelerationLimit,
-    JerkLimit,
     PowerLimit,
     TorqueLimit,
     VelocityLimit,
 )
-from brachis.timing import JointPath, PhasePlane, divide_turns, is_left_out
+from brachis.timing import JointPath, PhasePlane, divide_turns
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
 LENGTH = 0.4  # m
@@ -167,13 +166,6 @@ def test_steps_are_divided_where_the_path_turns():
     inside = (found > 0.4) & (found < 0.5)
     assert inside.sum() > 20
     assert len(found) == len(p) + inside.sum()
-
-
-def test_what_the_phase_plane_leaves_out():
-    robot = gantry(acceleration=3.0, jerk=10.0)
-    jerk = JerkLimit.build(robot, None)
-    assert is_left_out(jerk)
-    assert not is_left_out(AccelerationLimit.build(robot, None))
 
 
 def there_and_back(p, *, bend=0.0, aside=0.0):
