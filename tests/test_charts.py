@@ -13,7 +13,6 @@ from scipy.linalg import null_space
 import brachis
 from brachis.errors import (
     DecompositionError,
-    InputError,
     ResultFileError,
     StartError,
 )
@@ -211,18 +210,6 @@ def test_a_singular_start_is_refused(urdf, start, space, line):
     }
     with pytest.raises(StartError, match="singular"):
         brachis.plan(ROOT / "robots" / urdf / "robot.urdf", task)
-
-
-def test_directions_that_the_arm_lacks_are_refused():
-    line = {"line": {"by": [-0.1, 0.1, 0.0]}}
-    task = {
-        "brachis": 1,
-        "start": {"joints": [0.2, 0.6, 0.4]},
-        "task_space": "position",
-        "path": [line],
-    }
-    with pytest.raises(InputError, match="no joint changes z of the tool"):
-        brachis.plan(ROOT / "robots" / "scara3/robot.urdf", task)
 
 
 def test_numeric_guesses_need_a_closed_form():

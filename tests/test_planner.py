@@ -51,16 +51,6 @@ def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
         )
 
 
-def test_a_coordinate_that_no_joint_changes_is_named():
-    with pytest.raises(brachis.InputError, match="no joint changes z of the tool"):
-        brachis.plan(
-            "scara3",
-            start=[0.5, -2.0, 2.0],
-            path=brachis.Line(by=[0.1, 0.1]),
-            task_space=["x", "z"],
-        )
-
-
 def test_task_of_the_result_repeats_the_plan():
     result = brachis.plan(scara({"torque": 12.0}), task())
     assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
@@ -100,19 +90,6 @@ def test_without_refinement_the_answer_is_left_as_it_is():
     assert result.verification.worst_ratio > 1.01
     assert result.candidate.time_scaled == 1.0
     assert sum(np.isfinite(candidate.t_end) for candidate in result.candidates) == 1
-
-
-def test_every_solve_is_reported():
-    result = brachis.plan(
-        scara(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}])
-    )
-    reports = result.candidate.reports
-    assert len(reports) == 2 + result.candidate.refinement_rounds, (
-        "the branch margin holds this motion back"
-    )
-    assert result.to_dict()["iterations"] == sum(
-        report.iterations for report in reports
-    )
 
 
 @pytest.mark.parametrize("name", ["auto", "uno_interior"])

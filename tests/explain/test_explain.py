@@ -71,21 +71,6 @@ def test_phases_and_motion_have_the_share_of_their_process_speed(seams):
     assert shares["process speed of 0.2 m/s"] == pytest.approx(part / 100.0, rel=1e-3)
 
 
-def test_without_its_stop_a_motion_gains_no_more_than_is_said(seams):
-    (stop,) = [row for row in seams.sensitivities.task if "stop" in row.change]
-    assert stop.accuracy == "bound"
-    task = seams.task.to_dict()
-    first, second = task["path"]
-    # The corner is passed on an arc, as far as the leads to the seams are long.
-    path = [{"line": {"by": first["line"]["by"]}, "blend": 0.01}, second]
-    moving = brachis.plan({**task, "path": path})
-    least = seams.t_end - 0.5 - stop.saved
-    assert moving.t_end > least - 0.01
-    saved = f"no more than {100 * stop.saved / seams.t_end:.2g} %"
-    text = "with a blend in place of the stop at s = 0.6025 saves, along the same joint path,"
-    assert f"{text} {saved}" in str(seams.bottleneck())
-
-
 def test_a_cause_has_one_row(seams):
     entries = seams.sensitivities.limits
     rows = [(entry.label, entry.side) for entry in entries]

@@ -171,34 +171,3 @@ def test_a_motion_without_stored_figures_has_about_the_same_costliest_one(corner
     entry = result.sensitivities.limits[0]
     other = again.of(entry.label.subject, entry.label.kind, entry.side)
     assert other.change(STEP) == pytest.approx(entry.change(STEP), rel=0.05)
-
-
-def test_segments_with_speeds_and_a_blend_between_them():
-    seams = brachis.load_task(brachis.examples.weld_seams).to_dict()
-    speeds = (0.3, 0.15)
-
-    def welded(
-        *speeds: float, blend: float = 0.06, known: brachis.Result | None = None
-    ) -> brachis.Result:
-        lines = [{"by": [0.1, 0.45, 0.0]}, {"by": [0.3, 0.0, 0.05]}]
-        path = [
-            {"line": line, "speed": speed}
-            for line, speed in zip(lines, speeds, strict=True)
-        ]
-        path[0]["blend"] = blend
-        task = {**seams, "path": path, "tool_limits": {}}
-        return brachis.plan(task, start_from=known)
-
-    result = welded(*speeds)
-    costs = result.sensitivities
-    assert all(entry.change(STEP) <= 0.0 for entry in costs.limits)
-    for number, speed in enumerate(speeds):
-        faster = [*speeds]
-        faster[number] *= 1.0 + STEP
-        gained = welded(*faster, known=result).t_end - result.t_end
-        entry = costs.of("tool", f"process speed of {speed} m/s")
-        assert entry.change(STEP) == pytest.approx(gained, rel=0.05)
-        assert entry.label.key == f"path[{number}].speed"
-    larger = welded(*speeds, blend=0.06 * (1.0 + STEP), known=result)
-    entry = costs.of("path", "blend, 0.06 m")
-    assert entry.change(STEP) == pytest.approx(larger.t_end - result.t_end, rel=0.05)

@@ -62,17 +62,6 @@ def scara(tool=(0.1, 0.05, 0.0)):
     )
 
 
-def crane():
-    """A rail, and an arm that turns, tilts and reaches."""
-    joints = [
-        Joint("prismatic", axis=(0.0, 1.0, 0.0), limit=SLIDE),
-        Joint("revolute", xyz=(0.0, 0.0, 0.6)),
-        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.3)),
-        Joint("prismatic", axis=(1.0, 0.0, 0.0), xyz=(0.9, 0.0, 0.1), limit=SLIDE),
-    ]
-    return Robot.from_urdf("crane", urdf_text=chain_urdf(joints, tool=(0.1, 0.0, 0.0)))
-
-
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("arrangement", ["alone", "carried", "carried backwards"])
 def test_every_recipe(name, arrangement):
@@ -102,7 +91,6 @@ def test_every_recipe_is_tried():
 ARMS = {
     "three joints": (three_joints, 1),
     "scara": (scara, 3),
-    "crane": (crane, 4),
     "tx90l_rail": (lambda: built("tx90l_rail"), 14),
     "ur10_rail": (lambda: built("ur10_rail"), 16),
     "iiwa14": (lambda: built("iiwa14"), 16),

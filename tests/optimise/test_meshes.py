@@ -263,25 +263,6 @@ def test_many_intervals_are_planned_from_few_where_the_timing_leaves_a_limit_out
     assert len(reports[0].x) < 0.6 * len(reports[-1].x)
 
 
-def test_settings_choose_what_is_done(solved):
-    program = solved.program
-    report = solved.report
-    options = RefinementOptions()
-    given = SplineSettings(intervals=10)
-    assert adapt_mesh(solved, solve, given, options).reports == (report,)
-    unusable = SolvedProgram(program, (report, failing(program, report.x)))
-    freed = SplineSettings(knots="free", intervals=10)
-    assert adapt_mesh(unusable, solve, freed, options) is unusable
-    before = dataclasses.replace(report)
-    known = SolvedProgram(program, (before, report))
-    free = adapt_mesh(known, solve, freed, options)
-    assert free.reports[0] is before
-    assert free.program.intervals == program.intervals
-    auto = SplineSettings(intervals="auto", tolerance=0.1)
-    finer = adapt_mesh(known, solve, auto, options)
-    assert finer.program.intervals > program.intervals
-
-
 def test_a_mesh_is_refined_where_a_mean_torque_holds_the_motion():
     slow = scara().with_limits(rms_torque=9.0)
     short = {"path": [brachis.Line(by=[0.0, 0.6])], "redundant_joints": "auto"}

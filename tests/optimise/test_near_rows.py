@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from brachis.optimise import near_rows
 from brachis.optimise.backends import (
     Curvature,
     SolverOptions,
@@ -136,14 +135,6 @@ def test_rows_that_an_answer_violates_come_back(solve):
     report = solve_near_rows(Cut(), np.array([-0.3, 0.95, 0.0]), solve)
     assert report.x[0] == pytest.approx(0.3, abs=1e-8)
     assert report.violation <= 1e-8
-
-
-def test_never_fewer_than_a_fifth_of_the_rows(solve, monkeypatch):
-    monkeypatch.setattr(near_rows, "_NEAR", 1e-6)
-    start = 0.999 * np.array([np.cos(-1.3), np.sin(-1.3), 0.0])
-    report = solve_near_rows(Disc(), start, solve)
-    assert COUNT / 5 <= solve.rows[0] < COUNT / 4
-    assert report.objective == pytest.approx(-1.0, abs=1e-8)
 
 
 def test_rows_may_stay_whatever_their_distance(solve):

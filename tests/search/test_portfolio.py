@@ -518,13 +518,6 @@ def end_time(robot: brachis.Robot, asked: dict[str, Any]) -> float:
     return brachis.plan(robot, asked).t_end
 
 
-def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
-    monkeypatch.setattr("joblib.cpu_count", lambda: 1)
-    assert brachis.plan(
-        robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])
-    ).verified
-
-
 def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monkeypatch):
     ruled = usual
     (fast,) = SEARCH_LEVELS["fast"]
