@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 import brachis
 from brachis.verify import verify_trajectory
-from support.chains import INERTIAL, Joint, chain_urdf
 from support.effort import QUICK
+from support.slides import X, plan_slides, slides
 
 ROOT = Path(__file__).parents[2]
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
@@ -21,42 +21,20 @@ NEAR = 1e-3
 """Optima are met to 0.1 %."""
 
 
-@pytest.fixture
-def slide(tmp_path):
+def slide(*forces, limits=None, tool=None, intervals=40, **spline):
     """Plan a slide, or one slide that carries another along the same line, over LENGTH from rest to rest."""
-
-    def plan(*forces, limits=None, tool=None, intervals=40, **spline):
-        ends = [
-            {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force}
-            for force in forces
-        ]
-        joints = [
-            Joint(
-                "prismatic",
-                axis=(1, 0, 0),
-                limit=end,
-                inertial=INERTIAL.format(mass=MASS),
-            )
-            for end in ends
-        ]
-        file = tmp_path / "slides.urdf"
-        file.write_text(chain_urdf(joints), encoding="utf-8")
-        task = {
-            "brachis": 1,
-            "robot": {"gravity": [0, 0, 0], "limits": limits or {}},
-            "start": {"joints": [0.0] * len(forces)},
-            "task_space": ["x"],
-            "path": [{"line": {"by": [LENGTH]}}],
-            "redundant_joints": ["j1"] if len(forces) > 1 else [],
-            "tool_limits": tool or {},
-            "spline": {"intervals": intervals, "rest": "velocity", **spline},
-            "search": QUICK,
-        }
-        result = brachis.plan(str(file), task)
-        assert result.verified, result.verification
-        return result
-
-    return plan
+    result = plan_slides(
+        slides([X] * len(forces), forces, MASS),
+        ["x"],
+        [LENGTH],
+        settings={"limits": limits or {}},
+        spline={"intervals": intervals, **spline},
+        redundant_joints=["j1"] if len(forces) > 1 else [],
+        tool_limits=tool or {},
+        search=QUICK,
+    )
+    assert result.verified, result.verification
+    return result
 
 
 def ratio(result, kind) -> float:
@@ -65,7 +43,7 @@ def ratio(result, kind) -> float:
     ]
 
 
-def test_power_limited_slide(slide):
+def test_power_limited_slide():
     """Full force up to the speed at which it takes the whole power, then m v^2 dv = P dx; braking is the mirror."""
     power = 100.0
     v = power / FORCE
@@ -88,7 +66,7 @@ CURVES = {
 
 
 @pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
-def test_torque_that_falls_with_speed(slide, curve):
+def test_torque_that_falls_with_speed(curve):
     """The slide's equation of motion under full force, up to the middle; braking is the mirror."""
     speed, force = np.transpose(curve)
 
@@ -132,7 +110,7 @@ def test_torque_that_falls_with_speed(slide, curve):
     assert failed.value == pytest.approx(1.0 + excess(unaware), abs=1e-3)
 
 
-def test_rms_force_makes_a_parabola_of_the_speed(slide):
+def test_rms_force_makes_a_parabola_of_the_speed():
     """The least mean square of the force over a time T is that of F = F0 (1 - 2 t / T): F0^2 / 3."""
     rms = 20.0
     result = slide(FORCE, limits={"rms_torque": rms}, intervals=12)
@@ -146,12 +124,12 @@ def test_rms_force_makes_a_parabola_of_the_speed(slide):
     assert entry.deviation < 0.05
 
 
-def test_tool_acceleration_is_bang_bang(slide):
+def test_tool_acceleration_is_bang_bang():
     result = slide(FORCE, tool={"acceleration": 10.0})
     assert result.t_end == pytest.approx(2.0 * np.sqrt(LENGTH / 10.0), rel=NEAR)
 
 
-def test_a_macro_slide_spares_the_power_of_the_mini_slide(slide):
+def test_a_macro_slide_spares_the_power_of_the_mini_slide():
     """The mini slide's force moves the tool; a strong macro slide takes all the speed, so that no power is needed."""
     expected = 2.0 * np.sqrt(LENGTH * MASS / FORCE)
     limits = {"power": {"j2": 40.0}}
@@ -161,7 +139,7 @@ def test_a_macro_slide_spares_the_power_of_the_mini_slide(slide):
     assert slide(FORCE, limits={"power": 40.0}).t_end > 1.3 * expected
 
 
-def test_a_speed_table_is_a_staircase_of_cruises(slide):
+def test_a_speed_table_is_a_staircase_of_cruises():
     a, fast, slow, step = FORCE / MASS, 1.5, 0.5, 0.6
     table = {"s": [0.0, step, step, 1.0], "speed": [fast, fast, slow, slow]}
     way = step * LENGTH - (fast**2 + fast**2 - slow**2) / (2.0 * a)

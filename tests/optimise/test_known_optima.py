@@ -19,63 +19,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import brachis
-from support.chains import INERTIAL, Joint, chain_urdf
+from support.slides import X, Y, Z, plan_slides, slides
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 SLACK = 2e-4  # refinement may lengthen the time by its tolerance
 
 
-@pytest.fixture
-def slides(tmp_path):
-    """Write the URDF of slides, each with MASS, and return its path."""
-
-    def write(axes, forces) -> str:
-        limits = [
-            {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force}
-            for force in forces
-        ]
-        joints = [
-            Joint(
-                "prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS)
-            )
-            for axis, limit in zip(axes, limits, strict=True)
-        ]
-        file = tmp_path / "slides.urdf"
-        file.write_text(chain_urdf(joints, tool=(0.1, 0.2, 0.3)), encoding="utf-8")
-        return str(file)
-
-    return write
-
-
-def plan(
-    urdf,
-    rows,
-    by,
-    *,
-    redundant=(),
-    robot=None,
-    joints=None,
-    intervals=20,
-    degree=3,
-    rest="velocity",
-    solver="auto",
-    boundary=None,
-    **spline,
-):
+def plan(robot, rows, by, *, settings=None, intervals=20, rest="velocity", **spline):
+    spline |= {"intervals": intervals, "rest": rest}
     task = {
-        "brachis": 1,
-        "robot": {"gravity": [0, 0, 0], **(robot or {})},
-        "start": {"joints": joints or [0.0] * len(rows)},
-        "task_space": rows,
-        "path": [{"line": {"by": by}}],
-        "redundant_joints": list(redundant),
-        "spline": {"degree": degree, "intervals": intervals, "rest": rest, **spline},
-        "solver": {"name": solver},
-        "boundary": boundary or {},
+        key: spline.pop(key)
+        for key in ("boundary", "solver", "redundant_joints")
+        if key in spline
     }
-    return brachis.plan(urdf, task)
+    return plan_slides(robot, rows, by, settings=settings, spline=spline, **task)
 
 
 def bang_bang(mass: float) -> float:
@@ -86,7 +43,7 @@ def bang_bang(mass: float) -> float:
 @pytest.mark.parametrize(
     ("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)]
 )
-def test_slide_between_speeds(slides, first, last, rest):
+def test_slide_between_speeds(first, last, rest):
     """Full force forwards up to the speed v with 2 v^2 = 2 a L + v0^2 + v1^2, full force back from there."""
     speeds, boundary = (
         np.array([first, last]),
@@ -117,7 +74,7 @@ def test_slide_between_speeds(slides, first, last, rest):
 @pytest.mark.parametrize(
     ("axis", "mass"), [(0, 2.0 * MASS), (1, MASS)], ids=["lower slide", "upper slide"]
 )
-def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
+def test_gantry_approaches_bang_bang_from_above(axis, mass):
     # The lower slide carries the upper one.
     urdf, by = (
         slides([X, Y], [FORCE, FORCE]),
@@ -135,7 +92,7 @@ def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
 
 
 @pytest.mark.parametrize("intervals", [10, 20, 40])
-def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
+def test_rest_in_acceleration_costs_two_more_ramps(intervals):
     result = plan(
         slides([X, Y], [FORCE, FORCE]),
         ["x", "y"],
@@ -152,7 +109,7 @@ def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
-def test_free_knots_leave_the_shortest_ramps(slides, rest):
+def test_free_knots_leave_the_shortest_ramps(rest):
     urdf, by, shortest = slides([X, Y], [FORCE, FORCE]), [LENGTH, 0.0], 0.2
     result = plan(
         urdf,
@@ -172,7 +129,7 @@ def test_free_knots_leave_the_shortest_ramps(slides, rest):
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
-def test_mesh_refinement_comes_near_bang_bang(slides, rest):
+def test_mesh_refinement_comes_near_bang_bang(rest):
     result = plan(
         slides([X, Y], [FORCE, FORCE]),
         ["x", "y"],
@@ -188,7 +145,7 @@ def test_mesh_refinement_comes_near_bang_bang(slides, rest):
 
 # The acceleration jumps at knots: nodes packed closely around one would let rounding spoil the pieces.
 @pytest.mark.parametrize("intervals", [10, 40])
-def test_parabolas_are_bang_bang_itself(slides, intervals):
+def test_parabolas_are_bang_bang_itself(intervals):
     result = plan(
         slides([X, Y], [FORCE, FORCE]),
         ["x", "y"],
@@ -200,7 +157,7 @@ def test_parabolas_are_bang_bang_itself(slides, intervals):
     assert result.verified, result.verification
 
 
-def test_diagonal_line_is_as_fast_as_its_slower_slide(slides):
+def test_diagonal_line_is_as_fast_as_its_slower_slide():
     # Along the diagonal each slide goes LENGTH; the lower one, which carries 2 MASS, sets the pace.
     result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, LENGTH])
     assert result.verified
@@ -213,13 +170,13 @@ JERK = 50.0
 @pytest.mark.parametrize(
     "limit", [{"jerk": JERK}, {"torque_rate": JERK * MASS}], ids=str
 )
-def test_jerk_limit(slides, limit):
+def test_jerk_limit(limit):
     # The jerk is J, -J, -J, J over a quarter of the time each: L = J t^3 / 32.
     urdf, t = slides([X], [FORCE]), np.linspace(0.0, 1.0, 2001)
     free = plan(urdf, ["x"], [LENGTH], intervals=20, rest="full")
     assert np.abs(free.trajectory.jerk(t * free.t_end)).max() > 5.0 * JERK
     result = plan(
-        urdf, ["x"], [LENGTH], intervals=20, rest="full", robot={"limits": limit}
+        urdf, ["x"], [LENGTH], intervals=20, rest="full", settings={"limits": limit}
     )
     assert result.verified
     assert result.t_end == pytest.approx(
@@ -232,7 +189,7 @@ def test_jerk_limit(slides, limit):
 
 
 @pytest.mark.parametrize("acceleration", [None, 8.0])
-def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, acceleration):
+def test_jerk_limit_beside_limits_of_velocity_and_acceleration(acceleration):
     velocity = 1.5
     limits = {"jerk": JERK, "velocity": velocity, "acceleration": acceleration}
     result = plan(
@@ -241,7 +198,7 @@ def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, accelerat
         [LENGTH],
         intervals=48,
         rest="full",
-        robot={"limits": limits},
+        settings={"limits": limits},
     )
     # The velocity is reached in 2 sqrt(v / J), or in v / a + a / J where the acceleration stays at its limit.
     ramp = (
@@ -253,8 +210,8 @@ def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, accelerat
     assert LENGTH / velocity + ramp <= result.t_end < (LENGTH / velocity + ramp) * 1.001
 
 
-def test_rest_in_jerk_too(slides):
-    robot = {"limits": {"jerk": JERK}}
+def test_rest_in_jerk_too():
+    settings = {"limits": {"jerk": JERK}}
     result = plan(
         slides([X], [FORCE]),
         ["x"],
@@ -262,7 +219,7 @@ def test_rest_in_jerk_too(slides):
         intervals=40,
         degree=4,
         rest="jerk",
-        robot=robot,
+        settings=settings,
     )
     assert result.verified
     names = [check.name for check in result.verification.checks]
@@ -275,7 +232,7 @@ def test_rest_in_jerk_too(slides):
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0], ids=["up", "down"])
-def test_lifting_against_gravity(slides, way):
+def test_lifting_against_gravity(way):
     # Full force up gives F/m - g, full force down F/m + g; from rest to rest t^2 = 2 L (a + b) / (a b).
     force = 30.0
     up, down = force / MASS - 9.81, force / MASS + 9.81
@@ -285,13 +242,13 @@ def test_lifting_against_gravity(slides, way):
         slides([X, Z], [200.0, force]),
         ["x", "z"],
         [0.0, way * LENGTH],
-        robot={"gravity": [0, 0, -9.81]},
+        settings={"gravity": [0, 0, -9.81]},
     )
     assert result.verified
     assert best <= result.t_end < 1.01 * best
 
 
-def test_two_slides_along_one_line_recoil_against_each_other(slides):
+def test_two_slides_along_one_line_recoil_against_each_other():
     # The upper slide's force alone moves the tool: a = F / m. The lower slide is too weak to hold still (30 N against
     # 50 N) and has to give way, which costs no time: the best is that of the upper slide alone.
     weak = 30.0
@@ -302,12 +259,11 @@ def test_two_slides_along_one_line_recoil_against_each_other(slides):
         urdf,
         ["x"],
         [LENGTH],
-        redundant=["j1"],
-        joints=[0.0, 0.0],
-        robot=held,
-        solver="uno_interior",
+        redundant_joints=["j1"],
+        settings=held,
+        solver={"name": "uno_interior"},
     )
-    result = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0])
+    result = plan(urdf, ["x"], [LENGTH], redundant_joints=["j1"])
     assert result.verified
     assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
     assert (

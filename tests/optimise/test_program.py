@@ -29,10 +29,9 @@ from brachis.optimise.mesh import (
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.robot import Robot
 from brachis.task import SplineSettings
-from support.chains import INERTIAL, Joint, chain_urdf
 from support.direct_map import DirectJointMap
+from support.slides import X, slides
 from support.solvers import INSTALLED
 
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
@@ -40,18 +39,7 @@ FREE = np.nan
 ALONE = (0,)
 
 
-def slide(lower=-5.0, upper=5.0) -> Robot:
-    limit = {"lower": lower, "upper": upper, "velocity": 100.0, "effort": FORCE}
-    joint = Joint(
-        "prismatic",
-        axis=(1.0, 0.0, 0.0),
-        limit=limit,
-        inertial=INERTIAL.format(mass=MASS),
-    )
-    return Robot.from_urdf("slide", urdf_text=chain_urdf([joint], tool=(0.1, 0.2, 0.3)))
-
-
-ROBOT = slide()
+ROBOT = slides([X], [FORCE], MASS)
 TORQUE = TorqueLimit(ROBOT, np.array(ALONE))
 
 
@@ -66,7 +54,8 @@ def move(start, end, *further, degree=2, intervals=8, points=3) -> Phase:
 
 
 def within(lower, upper) -> PositionLimit:
-    return PositionLimit(slide(lower, upper), np.array(ALONE))
+    robot = ROBOT.with_limits(position={"j1": [lower, upper]})
+    return PositionLimit(robot, np.array(ALONE))
 
 
 def two_moves(stop=0.5, **options) -> Program:
