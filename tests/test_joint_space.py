@@ -7,7 +7,6 @@ import importlib.util
 import json
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from brachis.apps.bottleneck import check_sensitivities, plan_again
 from brachis.errors import InputError, PathError, StartError
 from brachis.robot import dynamics
 from brachis.task import LimitSpec, task_with
-from brachis.verify import verify_trajectory
 from support.chains import Joint, chain_urdf, planar_robot
 from support.effort import QUICK
 
@@ -93,37 +91,6 @@ def test_result_is_verified_and_follows_the_path(planned):
     np.testing.assert_allclose(
         planned.trajectory.position(planned.t_end), WAYPOINTS[-1], atol=1e-12
     )
-
-
-@pytest.mark.parametrize("limit", ["torque", "velocity", "acceleration", "tool speed"])
-def test_every_limit_is_violated_without_it_and_met_with_it(planned, limit):
-    """On the dense grid of the verification, which has formulas of its own."""
-    scale = {
-        "torque": {"scale": {"torque": 0.2}},
-        "velocity": {"velocity": 0.6},
-        "acceleration": {"acceleration": 2.0},
-    }
-    given = (
-        {"tool_limits": {"speed": 0.5}}
-        if limit == "tool speed"
-        else {"limits": scale[limit]}
-    )
-    held = brachis.plan(task(**given))
-    assert held.verified
-    assert held.t_end > 1.01 * planned.t_end
-    before = replace(
-        planned.trajectory, task=held.trajectory.task, robot=held.trajectory.robot
-    )
-    (found,) = [
-        check
-        for check in verify_trajectory(before).checks
-        if check.name == f"{limit} ratio"
-    ]
-    assert found.value > 1.05
-    (found,) = [
-        check for check in held.verification.checks if check.name == f"{limit} ratio"
-    ]
-    assert 0.99 < found.value <= 1.0001
 
 
 def test_a_spline_of_scipys_is_the_path():

@@ -9,9 +9,9 @@ import pytest
 
 from brachis.ik import find
 from brachis.ik.snapping import PolishedSolver
-from brachis.robot import task_map_of
+from brachis.robot import Robot, task_map_of
 from support.arms import TOOL, Y, ur10
-from support.chains import gantry_robot, planar_robot
+from support.chains import gantry_robot, planar_robot, planar_urdf
 from support.pose_arms import panda_lengths
 from support.rounded import ARMS, by_angles
 from support.screw_arms import BASES, screw_robot
@@ -19,7 +19,16 @@ from support.spatial import rail_arm
 
 COUNT = 30
 AXES = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)]
+
+
+def almost_upright():
+    """A plane turned by 1.5708 rad."""
+    text = planar_urdf("RRRR", "xz").replace(repr(np.pi / 2), "1.5708")
+    return Robot.from_urdf("rounded", urdf_text=text)
+
+
 CASES = {
+    "planar, rounded": (almost_upright, ["x", "z", "pitch"], (1,)),
     "planar": (lambda: planar_robot("RRR"), ["x", "y"], (1,)),
     "prismatic": (lambda: gantry_robot(AXES), ["x", "y"], (2,)),
     "prismatic, position": (lambda: screw_robot(BASES["P|PP"]), "position", ()),

@@ -14,11 +14,10 @@ import pytest
 
 from brachis.apps.cli.inspection import inspect
 from brachis.errors import DecompositionError
-from brachis.ik import ChainGeometry, Family, find, find_all
-from brachis.ik.snapping import PolishedSolver, snap_axes
-from brachis.robot import Robot, task_map_of
+from brachis.ik import Family, find, find_all
+from brachis.ik.snapping import PolishedSolver
+from brachis.robot import task_map_of
 from support.arms import PoseBench
-from support.chains import Joint, chain_urdf
 from support.closed_forms import wrapped
 from support.rounded import ANY_DIGITS, ARMS, by_angles
 
@@ -108,24 +107,6 @@ def test_no_answer_is_given_twice(name, joints):
         assert np.nanmin(gap, initial=1.0) > 1e-6
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_ideal_arm(name):
-    robot = by_angles(ARMS[name], ROUNDED)
-    space, geometry = task_map_of(robot, "pose"), ChainGeometry.of(robot)
-    ideal = snap_axes(geometry, space)
-    assert 7e-6 < ideal.turned < 8e-6
-    assert 1e-8 < ideal.shifted < 1e-5
-    assert snap_axes(ideal.geometry, space) is None, "nothing is left to do"
-    assert snap_axes(ChainGeometry.of(by_angles(ARMS[name], EXACT)), space) is None
-    q = np.random.default_rng(2).uniform(-np.pi, np.pi, (200, robot.n))
-    given, made = geometry.screws_at(q), ideal.geometry.screws_at(q)
-    assert np.abs(given.tool_position - made.tool_position).max() < 2e-4
-    assert np.abs(given.tool_rotation - made.tool_rotation).max() < 1e-4
-    np.testing.assert_allclose(
-        np.linalg.norm(ideal.geometry.axes, axis=1), 1.0, atol=1e-15
-    )
-
-
 def test_small_offsets_of_a_measured_arm_count_as_rounding():
     rng, arm = np.random.default_rng(4), ARMS["iiwa"]
     steps = [step.copy() for step in arm.steps]
@@ -177,54 +158,6 @@ def test_offsets_that_are_meant_are_no_rounding():
         find(robot, task_map_of(robot, "pose"), ["j3"])
     assert "miss it by 0.005 m" in caught.value.reasons["spherical_wrist"]
     assert "rounds" not in str(caught.value)
-
-
-def planar(quarter):
-    """Three joints in the xz-plane, on a rail."""
-    limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 50.0}
-    joints = [
-        Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=limit),
-        Joint("revolute", rpy=(quarter, 0.0, 0.0)),
-    ]
-    joints += [
-        Joint("revolute", xyz=(0.5, 0.0, 0.1), rpy=(0.0, 0.0, 0.2)),
-        Joint("revolute", xyz=(0.4, 0.0, 0.0)),
-    ]
-    return Robot.from_urdf("planar", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
-
-
-@pytest.mark.parametrize("redundant", range(4))
-def test_rows_and_yaw_of_a_plane_that_is_almost_upright(redundant):
-    robot = planar(1.5708)
-    space = task_map_of(robot, ["x", "z", "pitch"])
-    match = find(robot, space, [robot.joint_names[redundant]])
-    assert match.family == "planar"
-    assert (
-        match.remark
-        == "the axes are within 3.7e-06 rad and 0.0e+00 m of an ideal arm's; solutions are refined numerically"
-    )
-    q = np.random.default_rng(3).uniform(-1.0, 1.0, (2000, 4))
-    rest = [i for i in range(4) if i != redundant]
-    targets = space.values(q)
-    solved = match.solver.solve(targets, q[:, [redundant]])[:, :, 0]
-    sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
-    postures = q[sample]
-    postures[:, rest] = solved[sample, branch]
-    reached = space.values(postures)
-    assert np.abs(space.difference(reached, targets[sample])).max() < 1e-8
-    turning = np.array([i > 0 for i in rest])
-    gap = np.nanmin(
-        np.abs(wrapped(solved - q[:, None, rest], turning)).max(axis=2), axis=1
-    )
-    margin = np.abs(match.solver.branch_margins(q, 0)[:, 0])
-    assert gap[margin > 5e-3].max() < 1e-8
-    exact = planar(np.pi / 2)
-    assert (
-        find(
-            exact, task_map_of(exact, space.rows), [exact.joint_names[redundant]]
-        ).remark
-        == ""
-    )
 
 
 def xarm():

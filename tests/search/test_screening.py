@@ -10,8 +10,6 @@ import pytest
 from brachis import examples
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
-from brachis.optimise import improve
-from brachis.optimise.backends import TABLE, SolverReport, SolveStatus
 from brachis.optimise.retiming import COARSE, ROUGH
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
@@ -19,7 +17,6 @@ from brachis.search import guesses as module
 from brachis.search import screening
 from brachis.task import load_task
 from support.scara import scara
-from support.solvers import INTERIOR
 
 MOST = 2
 
@@ -153,32 +150,3 @@ def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
     (shortest,) = module.lattice_guesses(decomposition, few)
     assert shortest.is_improved
     assert estimates[0] <= shortest.estimate
-
-
-def test_large_programs_over_the_path_go_to_an_interior_point_first(
-    guesses, monkeypatch
-):
-    monkeypatch.setattr(improve, "_LARGE_PROGRAM", 20)
-    solvers = []
-    solved = improve.solve_near_rows
-
-    def near_rows(program, x, solve, **options):
-        report = solved(program, x, solve, **options)
-        solvers.append(report.solver)
-        return report
-
-    monkeypatch.setattr(improve, "solve_near_rows", near_rows)
-    plain = screening.screen(guesses[:2], MOST, NEVER, quiet)
-    assert not solvers
-
-    # What it leaves is solved as any other.
-    def give_up(monitor, x):
-        none = np.zeros(len(monitor.problem.lower))
-        status = SolveStatus.ITERATION_LIMIT
-        return SolverReport(INTERIOR, status, x, 9.0, 9.0, none, 0, 0.0, "given up")
-
-    failing = dataclasses.replace(TABLE[INTERIOR], run=give_up)
-    monkeypatch.setitem(TABLE, INTERIOR, failing)
-    again = screening.screen(guesses[:2], MOST, NEVER, quiet)
-    assert set(solvers) == {"uno"}
-    assert again[0].estimate == pytest.approx(plain[0].estimate, rel=1e-2)
