@@ -127,24 +127,6 @@ def test_a_saved_motion_is_loaded_and_verified(result, saved):
     np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
 
 
-def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(
-    result, saved
-):
-    fresh = brachis.bottleneck.report(result)
-    report = brachis.bottleneck.report(Trajectory.load(saved), check=True)
-    assert report.sensitivities.reliable
-    large = [entry for entry in report.check.entries if entry.predicted < -1e-4]
-    assert len(large) >= 2
-    for entry in large:
-        assert entry.optimal
-        assert entry.predicted == pytest.approx(entry.re_solved, rel=0.05)
-    for entry in fresh.sensitivities.limits:
-        other = report.sensitivities.of(
-            entry.label.subject, entry.label.kind, entry.side
-        )
-        assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-2, abs=1e-5)
-
-
 def with_arrays(path: Path, **changed: Any) -> None:
     with np.load(path) as archive:
         arrays = dict(archive)

@@ -189,23 +189,6 @@ def test_a_robot_whose_tool_rolls_may_have_other_limits():
     assert not robot.with_payload(1.0).tool_joints
 
 
-def test_a_payload_is_carried():
-    robot = brachis.robots.scara3
-    heavy = robot.with_payload(1.5, com=(0.0, 0.0, 0.1)).with_limits(velocity=3.0)
-    assert (
-        sum(body.mass for body in heavy.model.inertias)
-        - sum(body.mass for body in robot.model.inertias)
-        == 1.5
-    )
-    assert heavy.with_payload(None).settings.payload is None
-    given = brachis.plan(heavy, **LINE)
-    same = brachis.plan(
-        robot, **LINE, payload=heavy.settings.payload, limits={"velocity": 3.0}
-    )
-    assert given.t_end == pytest.approx(same.t_end, rel=1e-6)
-    assert given.t_end > brachis.plan(robot, **LINE, limits={"velocity": 3.0}).t_end
-
-
 def test_samples_carry_the_tool():
     result = brachis.plan("scara3", **LINE)
     samples = result.sample(0.01)

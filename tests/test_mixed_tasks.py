@@ -50,17 +50,6 @@ def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(
         assert given is None or np.allclose(given, own, rtol=0.0, atol=1e-9)
 
 
-def test_the_same_arguments_make_the_same_task(bench, tmp_path):
-    make = bench("mixed_cases").case
-    first, again = (
-        make("tx90l_rail", 3, 5, tmp_path / folder).task for folder in ("one", "two")
-    )
-    assert first.read_bytes() == again.read_bytes()
-    assert (
-        first.with_suffix(".csv").read_bytes() == again.with_suffix(".csv").read_bytes()
-    )
-
-
 @pytest.mark.parametrize(("robot", "number"), [("tx90l_rail", 1), ("planar4", 1)])
 def test_derivatives_of_the_plain_transcription(bench, robot, number, folder):
     case = bench("mixed_cases").case(robot, 0, number, folder)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-import signal
 import sys
 
 import numpy as np
@@ -17,7 +15,6 @@ from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
 from support.effort import QUICK
 from support.scara import START, scara
-from support.solvers import INSTALLED
 from support.starts import starting_points
 
 
@@ -36,19 +33,6 @@ def task(**changes) -> dict:
 
 def solve_with_uno(program, x):
     return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
-
-
-def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
-    for torque in (20.0, 5.0):
-        result = brachis.plan(scara({"torque": torque}), task())
-        assert result.verified
-        result.trajectory.save(tmp_path / "result.npz")
-        again = brachis.Trajectory.load(tmp_path / "result.npz")
-        np.testing.assert_array_equal(again.robot.limits.torque, torque)
-        assert np.isinf(again.robot.limits.velocity).all()
-        assert brachis.verify_trajectory(again).worst_ratio == pytest.approx(
-            result.verification.worst_ratio, rel=1e-9
-        )
 
 
 def test_task_of_the_result_repeats_the_plan():
@@ -131,50 +115,6 @@ def test_end_posture_on_another_branch_is_refused():
     )
     with pytest.raises(StartError, match="the end posture is on another branch"):
         brachis.plan(scara(), task(end={"joints": mirrored}))
-
-
-def test_full_turns_are_counted_even_between_few_points():
-    """A limit that is never reached changes nothing, whatever the angles' lifts."""
-    circles = task(
-        start={"joints": [0.3, 0.9]},
-        path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}],
-        redundant_joints=[],
-        spline={"intervals": 12},
-    )
-    times = []
-    for position in (None, {"j1": [-50.0, 50.0]}, {"j1": [-1.0, 50.0]}):
-        limits = {"torque": 100.0, "position": position}
-        arm = scara(limits, locked_joints={"j3": 0.4})
-        result = brachis.plan(arm, circles)
-        assert result.verified
-        turned = result.trajectory.position(result.t_end) - result.trajectory.position(
-            0.0
-        )
-        assert turned[0] == pytest.approx(6 * np.pi, abs=1e-6)
-        times.append(result.t_end)
-    assert times == pytest.approx(times[:1] * 3, rel=1e-3)
-
-
-@pytest.mark.parametrize("name", INSTALLED)
-def test_ctrl_c_reaches_the_user(name):
-    """A real signal while the solver works."""
-    program, _ = brachis.transcribe(
-        scara(), brachis.load_task(task(spline={"intervals": 60}))
-    )
-    x = next(starting_points(program))
-    solver = solvers_for(name)[0]
-    handler = signal.getsignal(signal.SIGINT)
-    iterations = []
-
-    def progress(iteration, _objective):
-        iterations.append(iteration)
-        if iteration == 3:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    with pytest.raises(KeyboardInterrupt):
-        solver.solve(program, x, SolverOptions(), progress)
-    assert iterations == [1, 2, 3]
-    assert signal.getsignal(signal.SIGINT) is handler
 
 
 @pytest.mark.parametrize("size", [0.01, 0.004])

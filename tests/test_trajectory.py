@@ -265,6 +265,9 @@ def test_round_trip(trajectory, tmp_path):
         elif field.name != "robot":
             assert one == other, field.name
     assert again.joint_names == trajectory.joint_names
+    for name in ("torque", "velocity"):
+        limits = (getattr(own.robot.limits, name) for own in (again, trajectory))
+        np.testing.assert_array_equal(*limits)
     t = np.linspace(0.0, trajectory.t_end, 50)
     np.testing.assert_allclose(
         trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12

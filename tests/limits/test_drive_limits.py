@@ -101,13 +101,7 @@ def test_torque_that_falls_with_speed(curve):
         ).max() / FORCE
 
     assert excess(result) <= 1e-4
-    unaware = slide(FORCE)
-    assert excess(unaware) > 0.2
-    checked = dataclasses.replace(unaware.trajectory, task=result.task)
-    found = verify_trajectory(checked, robot=result.trajectory.robot)
-    (failed,) = (check for check in found.checks if not check.passed)
-    assert failed.name == "torque speed ratio"
-    assert failed.value == pytest.approx(1.0 + excess(unaware), abs=1e-3)
+    assert excess(slide(FORCE)) > 0.2
 
 
 def test_rms_force_makes_a_parabola_of_the_speed():

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.apps.bottleneck import check_sensitivities, limit_ratios
-from brachis.apps.plots import plot_timeline
+from brachis.apps.bottleneck import check_sensitivities
 from brachis.errors import InputError
 from brachis.limits import Label, Limit, Partials
 from brachis.verify import verify_trajectory
@@ -123,22 +122,6 @@ def test_prediction_is_what_solving_again_gives(kind, result, step, above):
     assert all(entry.optimal for entry in large)
     if step < 0.01:
         assert found.worst_deviation(above) < 0.005
-
-
-def test_timeline_and_ratios_know_it(kind, result):
-    ratios = limit_ratios(result.trajectory)
-    column = [str(label) for label in ratios.labels].index(
-        f"j2 {kind.replace('_', ' ')}"
-    )
-    assert (
-        ratios.labels[column].unit == {"jerk": "rad/s^3", "torque_rate": "Nm/s"}[kind]
-    )
-    assert np.abs(ratios.values).max() == pytest.approx(1.0, abs=2e-4)
-    # At inner knots of cubic splines the jerk jumps: both sides are there.
-    twice = ratios.t[1:][np.diff(ratios.t) == 0.0]
-    knots = np.unique(result.trajectory.knots)[1:-1] * result.t_end
-    np.testing.assert_allclose(twice, knots, atol=1e-12)
-    assert plot_timeline(result.trajectory).axes
 
 
 def test_the_limits_of_rates_are_for_splines_that_can_hold_them(kind):

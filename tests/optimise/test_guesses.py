@@ -7,7 +7,6 @@ import pytest
 
 from brachis.optimise.guess import shortest_time, worst_time_scaling_ratio
 from brachis.optimise.program import Program
-from brachis.search.differential_ik import STRATEGIES, differential_ik_path
 from support.chains import planar_robot, program_of
 from support.phases import CASES, phase_of
 from support.starts import starting_points
@@ -29,22 +28,6 @@ def test_guesses_are_reachable_and_slow_enough(case, intervals):
         part = phase.slices[0]
         assert np.all(np.diff(x[part]) >= 0.0)
         assert np.all((x[part] >= 0.0) & (x[part] <= 1.0))
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_numeric_course_is_one_that_the_closed_form_can_follow(case):
-    chain = phase_of(case).joint_map
-    joint_path = differential_ik_path(chain, STRATEGIES[0])
-    assert joint_path.shape[1] == 1 + chain.r
-    if chain.r == 0:
-        np.testing.assert_array_equal(joint_path, [[0.0], [1.0]])
-        return
-    np.testing.assert_array_equal(joint_path[0], [0.0, *chain.start[chain.redundant]])
-    assert joint_path[-1, 0] == 1.0
-    assert np.all(np.diff(joint_path[:, 0]) >= 0.0)
-    postures = chain.postures(joint_path)
-    assert np.isfinite(postures).all()
-    assert np.abs(np.diff(postures, axis=0)).max() < 0.5
 
 
 # Half of an open range is infinite; a push away from its ends must not become so.

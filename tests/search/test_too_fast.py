@@ -81,24 +81,6 @@ def test_a_run_up_that_is_too_short_is_refused_with_what_would_do(monkeypatch):
     assert brachis.plan(slide(most, (0.1, 0.6))).verified
 
 
-def test_the_run_out_counts_too(monkeypatch):
-    """Over 0.05 m from 0.3 m/s to a stop an acceleration of 0.9 m/s^2 is enough, and over 0.025 m it is not."""
-    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    stop = [
-        {"line": {"by": [0.3, 0.0]}, "stop": True},
-        {"line": {"by": [0.2, 0.0]}},
-    ]
-    for end, is_possible in ((0.5, True), (0.55, False)):
-        content = slide(0.3, (0.2, end), path=stop)
-        if is_possible:
-            assert brachis.plan(content).verified
-            continue
-        reason = r"s = 0\.55 to 0\.6 is too short to get from 0\.3 m/s to rest"
-        with pytest.raises(brachis.PlanningError, match=reason) as caught:
-            brachis.plan(content)
-        assert 0.2 < allowed(caught.value) < np.sqrt(2.0 * 0.05 * LENGTH)
-
-
 def test_two_speeds_too_near_to_each_other(monkeypatch):
     """Between 0.1 m/s and v are 0.05 m: v^2 = 0.01 + 0.1."""
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
