@@ -19,7 +19,7 @@ from brachis.ik import (
 from brachis.ik.eaik import eaik
 from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
-from support.arms import PoseBench
+from support.factored_bench import Bench
 from support.pose_arms import (
     FAMILIES,
     family,
@@ -40,7 +40,7 @@ PER_SIGN = 8
 
 
 def bench_of(robot, redundant, postures=600):
-    return PoseBench(eaik, robot(), redundant, postures)
+    return Bench(robot(), redundant, postures, family=eaik)
 
 
 def margin_of(bench, q):
@@ -81,7 +81,7 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     q, solver = bench.q, bench.solver
     assert solver.branches == ("determinant_positive", "determinant_negative")
     assert solver.alternatives == PER_SIGN
-    solved = bench.answers(q)
+    solved = bench.solve(q)
     sample, answer, postures = bench.check_answers(solved)
     assert np.nanmax(solved) <= np.pi
     assert np.nanmin(solved) > -np.pi
@@ -141,7 +141,7 @@ def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     ) + off * rng.choice([-1.0, 1.0], count)
     bench.q = q[np.abs(margin_of(bench, q)) > 5e-3]
     assert len(bench.q) > count / 5
-    solved = bench.answers(bench.q)
+    solved = bench.solve(bench.q)
     assert gap_in_label(bench, bench.q, solved).max() < 1e-7
     bench.check_answers(solved)
 
@@ -152,12 +152,12 @@ def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
     bench = bench_of(iiwa, (2,), 200)
     q = bench.q
     q[:, 2] = np.tile(np.linspace(-1.0, 1.0, 20), 10)
-    first = bench.answers(q)
+    first = bench.solve(q)
     assert gap_in_label(bench, q, first).max() < 1e-6
     monkeypatch.setattr("brachis.ik.eaik._KEPT", 5)
     for _ in range(2):
-        np.testing.assert_allclose(bench.answers(q[::-1]), first[::-1], atol=1e-12)
-    one_by_one = np.concatenate([bench.answers(posture[None]) for posture in q])
+        np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
+    one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])
     np.testing.assert_allclose(one_by_one, first, atol=1e-12)
 
 

@@ -17,8 +17,8 @@ from brachis.errors import DecompositionError
 from brachis.ik import Family, find, find_all
 from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
-from support.arms import PoseBench
 from support.closed_forms import wrapped
+from support.factored_bench import Bench
 from support.rounded import ANY_DIGITS, ARMS, by_angles
 
 ROUNDED, EXACT = 4, ANY_DIGITS
@@ -44,7 +44,8 @@ def bench_of(name, joints, postures=2000):
     robot, _ = candidates(name, ROUNDED)
     solver = polished_of(name)[joints]
     redundant = [robot.joint_names.index(joint) for joint in joints]
-    return PoseBench(Family("found", lambda *_: solver, ""), robot, redundant, postures)
+    family = Family("ready", lambda *_: solver, "")
+    return Bench(robot, redundant, postures, family=family)
 
 
 @pytest.mark.parametrize("seed", [0, 5])
@@ -74,7 +75,7 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
 @pytest.mark.parametrize(("name", "joints"), CASES, ids=str)
 def test_all_answers_are_right_and_one_is_the_posture(name, joints):
     bench = bench_of(name, joints)
-    solved = bench.answers(bench.q)
+    solved = bench.solve(bench.q)
     _, branch, postures = bench.check_answers(solved)
 
     branch //= bench.solver.alternatives
@@ -99,7 +100,7 @@ def test_all_answers_are_right_and_one_is_the_posture(name, joints):
 @pytest.mark.parametrize(("name", "joints"), CASES, ids=str)
 def test_no_answer_is_given_twice(name, joints):
     bench = bench_of(name, joints, 500)
-    solved = bench.answers(bench.q)
+    solved = bench.solve(bench.q)
     for first, second in itertools.combinations(range(solved.shape[1]), 2):
         gap = np.abs(wrapped(solved[:, first] - solved[:, second], bench.turning)).max(
             axis=1

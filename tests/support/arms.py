@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.ik import ChainGeometry, Family, IKSolver
-from brachis.robot import Robot, bind, task_map_of
+from brachis.robot import Robot, bind
 from support.chains import Joint, chain_urdf
-from support.closed_forms import check_margin_gradient, margins_of, wrapped
 
 X, Y, Z = np.eye(3)
 SLIDE = {"lower": -5.0, "upper": 5.0, "velocity": 1.0, "effort": 50.0}
@@ -169,89 +167,3 @@ def example_robot(name: str) -> Robot:
     if not path.exists():
         pytest.skip("example-robot-data is not installed")
     return Robot.from_urdf(path, tool_frame="tool0")
-
-
-class PoseBench:
-    """Random postures of a robot, their poses, and a family's solver for some redundant joints."""
-
-    def __init__(
-        self,
-        family: Family,
-        robot: Robot,
-        redundant: Sequence[int],
-        postures: int = 800,
-        seed: int = 5,
-    ):
-        self.robot, self.redundant = robot, list(redundant)
-        self.space = task_map_of(robot, "pose")
-        self.geometry = ChainGeometry.of(robot)
-        self.rest = [i for i in range(robot.n) if i not in redundant]
-        self.turning = self.geometry.revolute[self.rest]
-        self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
-        self.solver: IKSolver = family.build(
-            self.geometry, self.space, tuple(redundant)
-        )
-
-    def poses(self, q: np.ndarray) -> np.ndarray:
-        """Task coordinates (K, 12) by the product of exponentials."""
-        posed = self.geometry.screws_at(q)
-        return np.concatenate(
-            [
-                posed.tool_position.T,
-                np.moveaxis(posed.tool_rotation, 2, 0).reshape(len(q), 9),
-            ],
-            axis=1,
-        )
-
-    def answers(self, q: np.ndarray) -> np.ndarray:
-        """Non-redundant joints (K, B A, 6) that reach the poses of some postures."""
-        solved = self.solver.solve(self.poses(q), q[:, self.redundant])
-        assert solved.shape == (
-            len(q),
-            len(self.solver.branches),
-            self.solver.alternatives,
-            6,
-        )
-        return solved.reshape(len(q), -1, 6)
-
-    def distance(self, solved: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
-        delta = np.abs(
-            wrapped(solved - q[:, *[None] * (solved.ndim - 2), self.rest], self.turning)
-        ).max(axis=-1)
-        return np.where(np.isnan(delta), np.inf, delta)
-
-    def margins(self, q: np.ndarray) -> np.ndarray:
-        """Margins (K, B, k) of all branches."""
-        return margins_of(self.solver, q)
-
-    def determinant(self, q: np.ndarray) -> np.ndarray:
-        """Det J_nr by Pinocchio."""
-        return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
-
-    def check_answers(
-        self, solved: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Put the answers for the random postures to the test; return their samples, branches and postures."""
-        sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
-        assert np.isfinite(solved).sum() == 6 * len(sample), "an answer is NaN in part"
-        postures = self.q[sample]
-        postures[:, self.rest] = solved[sample, branch]
-        # A slide that runs almost across the way it has to go goes far: positions are good to their own size.
-        size = 1.0 + np.abs(np.where(self.geometry.revolute, 0.0, postures)).max(axis=1)
-        targets = self.poses(self.q)
-        miss = np.abs(self.space.difference(self.poses(postures), targets[sample])).max(
-            axis=1
-        )
-        assert (miss / size).max() < 1e-8
-        some = slice(0, 400)
-        pinocchio = self.space.values(postures[some])
-        miss = np.abs(self.space.difference(pinocchio, targets[sample[some]])).max(
-            axis=1
-        )
-        assert (miss / size[some]).max() < 1e-8
-        return sample, branch, postures
-
-    def check_gradient(self) -> None:
-        """Compare the margins' derivatives with differences."""
-        check_margin_gradient(self.solver, self.q[:20], atol=1e-8)

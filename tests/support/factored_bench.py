@@ -36,13 +36,42 @@ class Bench:
     def targets(self, q):
         return self.space.values(q)
 
-    def answers(self, q):
-        """Postures (K, B, n) that reach the targets of the given ones."""
+    def solve(self, q):
+        """Non-redundant joints (K, B A, m) that reach the targets of postures."""
         solved = self.solver.solve(self.targets(q), q[:, self.redundant])
-        assert solved.shape == (len(q), len(self.solver.branches), 1, self.space.m)
+        shape = (len(self.solver.branches), self.solver.alternatives, self.space.m)
+        assert solved.shape == (len(q), *shape)
+        return solved.reshape(len(q), -1, self.space.m)
+
+    def answers(self, q):
+        """Postures (K, B A, n) that reach the targets of the given ones."""
+        solved = self.solve(q)
         postures = np.repeat(q[:, None], solved.shape[1], axis=1)
-        postures[:, :, self.rest] = solved[:, :, 0]
+        postures[:, :, self.rest] = solved
         return postures
+
+    def distance(self, solved, q):
+        """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
+        joints = q[:, *[None] * (solved.ndim - 2), self.rest]
+        gap = np.abs(wrapped(solved - joints, self.turning)).max(axis=-1)
+        return np.where(np.isnan(gap), np.inf, gap)
+
+    def check_answers(self, solved):
+        """Put the answers for the random postures to the test; return their samples, branches and postures."""
+        sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
+        count = self.space.m * len(sample)
+        assert np.isfinite(solved).sum() == count, "an answer is NaN in part"
+        postures = self.q[sample]
+        postures[:, self.rest] = solved[sample, branch]
+        # A slide that runs almost across the way it has to go goes far: positions are good to their own size.
+        ways = np.where(self.turning, 0.0, postures[:, self.rest])
+        size = 1.0 + np.abs(ways).max(axis=1)
+        targets = self.targets(self.q)[sample]
+        miss = np.abs(self.space.difference(self.targets(postures), targets)).max(
+            axis=1
+        )
+        assert (miss / size).max() < 1e-8
+        return sample, branch, postures
 
     def margins(self, q):
         """Margins (K, B, k) of all branches."""
@@ -53,21 +82,10 @@ class Bench:
 
     def check(self, *, with_gradient=True):
         """Hold the closed form to its promises; slopes of margins are recorded anew for every one, which takes time."""
-        postures = self.answers(self.q)
-        finite = np.isfinite(postures).all(axis=2)
-        solved = postures[:, :, self.rest]
-        assert np.array_equal(finite, np.isfinite(solved).any(axis=2)), (
-            "an answer is NaN in part"
-        )
-        angles = solved[finite][:, self.turning]
+        solved = self.solve(self.q)
+        _, branch, postures = self.check_answers(solved)
+        angles = postures[:, self.rest][:, self.turning]
         assert np.all((angles > -np.pi) & (angles <= np.pi))
-        sample, branch = np.nonzero(finite)
-        size = 1.0 + np.abs(np.where(self.turning, 0.0, solved[finite])).max(axis=1)
-        wanted = self.targets(self.q)
-        miss = np.abs(
-            self.space.difference(self.targets(postures[finite]), wanted[sample])
-        ).max(axis=1)
-        assert (miss / size).max() < 1e-8
 
         margins = self.margins(self.q)
         assert margins.shape[2] <= 3
@@ -80,15 +98,11 @@ class Bench:
         own = np.argmax(inside, axis=1)
         assert set(own) == set(range(len(self.solver.branches)))
         product = np.abs(margins[:, 0]).prod(axis=1)
-        back = wrapped(
-            solved[np.arange(len(own)), own] - self.q[:, self.rest], self.turning
-        )
-        assert (np.abs(back).max(axis=1) * product)[product > 1e-6].max() < 1e-10
+        gap = self.distance(solved[np.arange(len(own)), own], self.q)
+        assert (gap * product)[product > 1e-6].max() < 1e-10
         for b in range(len(self.solver.branches)):
             assert (
-                self.solver.branch_margins(postures[sample[branch == b], b], b).min(
-                    initial=np.inf
-                )
+                self.solver.branch_margins(postures[branch == b], b).min(initial=np.inf)
                 > -1e-7
             )
 
