@@ -63,30 +63,6 @@ def test_the_best_choice_of_joints_is_no_faster(result):
     assert result.t_end <= other.t_end * 1.0005
 
 
-def test_an_arm_without_a_closed_form():
-    robot = brachis.Robot.from_urdf(ROOT / "robots/gen3/robot.urdf")
-    start = [0.2, 0.5, 0.1, 1.4, 0.1, 1.0, 0.3]
-    task = {
-        "brachis": 1,
-        "start": {"joints": start},
-        "task_space": "pose",
-        "path": [{"line": {"by": [0.0, 0.15, 0.05]}}],
-        "spline": {"intervals": 10},
-    }
-    result = brachis.plan(robot, task)
-    assert result.verified
-    assert result.trajectory.branch == "chart"
-    begin, end = (
-        robot.tool_placement(q)
-        for q in result.trajectory.position(np.array([0.0, result.t_end]))
-    )
-    np.testing.assert_allclose(
-        end.translation - begin.translation, [0.0, 0.15, 0.05], atol=1e-9
-    )
-    np.testing.assert_allclose(end.rotation, begin.rotation, atol=1e-9)
-    np.testing.assert_allclose(result.trajectory.position(0.0), start, atol=1e-9)
-
-
 @pytest.mark.parametrize("redundant", ["auto", ["j1"]])
 def test_an_end_posture_may_be_rounded(result, redundant):
     """The motion ends at the posture on the path that is nearest to the given one, and is held to that."""

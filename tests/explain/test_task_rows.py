@@ -91,17 +91,6 @@ def test_a_stop_on_a_straight_line_has_a_row():
     assert gained < saving.saved < 2.0 * gained
 
 
-def test_higher_speeds_at_the_ends_save_what_is_said():
-    def moving(speed: float) -> brachis.Result:
-        boundary = {"start_speed": 0.1, "end_speed": speed}
-        return brachis.plan(task_of(locked=True, boundary=boundary))
-
-    result = moving(0.1)
-    saving = named(result, "boundary.end_speed: 0.11 in place of 0.1")
-    gained = least_time(result) - least_time(moving(0.1 + 0.1 * STEP))
-    assert 0.1 * saving.saved == pytest.approx(gained, rel=0.05)
-
-
 @pytest.mark.parametrize("intervals", [10, 40])
 def test_accelerations_that_may_jump_at_rest_save_about_what_is_said(intervals):
     task = task_of(locked=False, path=[{"line": {"by": [0.3, 0.3]}}])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from brachis.errors import DecompositionError
-from brachis.ik.planar import planar
 from support.chains import planar_robot
 from support.closed_forms import Bench
 
@@ -57,21 +56,6 @@ def test_every_decomposition_that_exists_is_found_and_right(pattern, plane, rows
                 "singular everywhere" in reasons
                 or "prismatic joints do not change orientations" in reasons
             )
-
-
-@pytest.mark.parametrize("rows", [["x", "y"], ["y"], ["x", "y", "yaw"]], ids="+".join)
-@pytest.mark.parametrize("pattern", ["RPP", "PRPP", "PPRP", "PRP"])
-def test_slides_that_the_linear_family_would_take_first(pattern, rows):
-    bench = Bench(robot_of(pattern), rows, 120)
-    tried = 0
-    for redundant, exists in bench.decompositions():
-        if exists:
-            candidate = bench.check(
-                redundant, (planar,), distinct_roots=roots(pattern, rows, redundant)
-            )
-            assert candidate.family == "planar"
-            tried += 1
-    assert tried
 
 
 def test_two_links_reach_the_annulus_between_them_and_nothing_else():

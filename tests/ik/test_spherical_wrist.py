@@ -62,16 +62,6 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
             )
 
 
-def test_a_rail_answers_on_the_side_to_which_it_moves_the_arm():
-    # With joint 1 of the arm held, the rail has to move the wrist across the plane of the links.
-    bench = Bench(rail_arm(), (1,), postures=400)
-    finite = np.isfinite(bench.answers(bench.q)).all(axis=2)
-    left = np.array([label.startswith("left") for label in bench.solver.branches])
-    facing = np.cos(bench.q[:, 1]) > 0.0
-    np.testing.assert_array_equal(finite[:, left].any(axis=1), facing)
-    np.testing.assert_array_equal(finite[:, ~left].any(axis=1), ~facing)
-
-
 @pytest.mark.parametrize("turntable", [1, 2])
 def test_gantry_of_three_slides_of_which_a_turntable_turns_the_last(turntable):
     axes = [Axis("P", axis, np.zeros(3)) for axis in (X, Y, Z)]

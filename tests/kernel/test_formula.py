@@ -5,7 +5,6 @@ import pickle
 import numpy as np
 import pytest
 
-from brachis.ik import ChainGeometry
 from brachis.kernel import Formula
 from brachis.kernel.formula import arccos, arctan2, ceil, cos, sin, sqrt
 
@@ -87,26 +86,3 @@ def test_a_row_is_found_as_a_whole():
 def test_points_of_another_size_are_refused(points):
     with pytest.raises(ValueError, match="needed"):
         Formula.of(everything, 2, 1)(*points[::-1])
-
-
-def test_the_geometry_takes_numbers_of_formulas():
-    """Joints before the first that moves keep plain numbers among those of the formula."""
-    chain = ChainGeometry(
-        revolute=np.array([True, True]),
-        axes=np.eye(3)[[2, 1]],
-        points=np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.2]]),
-        tool_position=np.array([1.0, 0.3, 0.0]),
-        tool_rotation=np.eye(3),
-        masses=np.zeros(2),
-        centers=np.zeros((2, 3)),
-        inertias=np.zeros((2, 6)),
-        gravity=np.zeros(3),
-        friction=np.zeros((2, 4)),
-        joint_names=("a", "b"),
-    )
-
-    def tool(q):
-        return chain.screws_with([1], q).tool_position.T
-
-    q = np.linspace(-2.0, 2.0, POINTS)[:, None]
-    np.testing.assert_allclose(Formula.of(tool, 1)(q), tool(q), atol=1e-15)

@@ -59,25 +59,6 @@ def motion(request):
     return motion_in(chain, asked, q, path, tables, curves)
 
 
-def test_rows_that_are_the_same_everywhere_are_given_once():
-    n, asked = 7, Prescribed((0, 1, 2), 3, in_tool_axes=True)
-    rng = np.random.default_rng(4)
-    chain = chain_of(*random_model(n, n))
-    row = rng.normal(size=(1, n + 1))
-    q = rng.normal(size=(POINTS, n))
-    path = tuple(rng.normal(size=(3, POINTS, 6)))
-    curves = tuple(rng.normal(size=(2, POINTS, 2)))
-    many = np.broadcast_to(row, (POINTS, 1, n + 1))
-    motions = [
-        motion_in(chain, asked, q, path, [rows], curves)
-        for rows in (many.copy(), many, row)
-    ]
-    for name in ("gradient", "qdot", "qddot", "determinants"):
-        first, *others = (getattr(own, name) for own in motions)
-        for own in others:
-            np.testing.assert_array_equal(own, first)
-
-
 @pytest.mark.parametrize(
     ("row", "side", "fault"),
     [

@@ -7,7 +7,6 @@ import pytest
 
 from brachis.optimise.guess import shortest_time, worst_time_scaling_ratio
 from brachis.optimise.program import Program
-from support.chains import planar_robot, program_of
 from support.phases import CASES, phase_of
 from support.starts import starting_points
 
@@ -53,28 +52,3 @@ def test_time_scaling_stops_at_the_limits():
     assert worst_time_scaling_ratio(program, barely) > 1.0
     np.testing.assert_array_equal(slow[1:], fast[1:])
     assert fast[0] == 0.05
-
-
-# The measured yaw jumps at pi, the path's does not.
-@pytest.mark.parametrize("yaw", [0.5, 2.9])
-@pytest.mark.parametrize("redundant", [[], ["j1"]], ids=["r0", "r1"])
-def test_yaw_may_turn_past_half_a_turn(redundant, yaw):
-    robot = planar_robot("RRRR" if redundant else "RRR")
-    start = np.array([0.4, -0.6, 1.4, 0.0] if redundant else [0.4, 1.8, 0.0])
-    rotation = robot.tool_placement(start).rotation
-    start[-1] = (
-        np.remainder(
-            yaw - np.arctan2(rotation[1, 0], rotation[0, 0]) + np.pi, 2.0 * np.pi
-        )
-        - np.pi
-    )
-    path = [{"line": {"by": [-0.05, 0.03, 0.4]}}]
-    program = program_of(robot, ["x", "y", "yaw"], path, start, redundant, intervals=8)
-    (phase,) = program.phases
-    assert phase.joint_map.path.sample(np.array([0.0, 1.0])).target[
-        :, 2
-    ] == pytest.approx([yaw, yaw + 0.4])
-    found = list(starting_points(program))
-    assert found, "no guess"
-    for x in found:
-        assert np.abs(np.diff(phase.state(x).q, axis=0)).max() < 1.0

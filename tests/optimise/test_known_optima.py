@@ -157,13 +157,6 @@ def test_parabolas_are_bang_bang_itself(intervals):
     assert result.verified, result.verification
 
 
-def test_diagonal_line_is_as_fast_as_its_slower_slide():
-    # Along the diagonal each slide goes LENGTH; the lower one, which carries 2 MASS, sets the pace.
-    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, LENGTH])
-    assert result.verified
-    assert bang_bang(2.0 * MASS) < result.t_end < 1.01 * bang_bang(2.0 * MASS)
-
-
 JERK = 50.0
 
 

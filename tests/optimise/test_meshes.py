@@ -189,40 +189,6 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     )
 
 
-def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
-    program, _ = brachis.transcribe(scara(), task(intervals=100))
-    coarse = coarsest(program)
-    report = solve(coarse, next(starting_points(coarse)))
-
-    def small_ones_only(tried, x):
-        return solve(tried, x) if tried.variables < 150 else failing(tried, x)
-
-    first = SolvedProgram(coarse, (report,))
-    nested = solve_by_levels(program, first, small_ones_only)
-    reports = nested.reports
-    assert nested.program.intervals == 50
-    assert [later.status for later in reports][-2:] == [
-        SolveStatus.FAILED,
-        SolveStatus.OPTIMAL,
-    ]
-    assert reports[-1].x.shape == (nested.program.variables,)
-    assert (
-        nested.not_completed
-        == "the motion has 50 intervals, and was not solved with all 100"
-    )
-    settled = adapt_mesh(
-        first,
-        failing,
-        SplineSettings(),
-        RefinementOptions(),
-        target=program,
-    )
-    assert settled.reports[-1] is report
-    assert settled.not_completed.startswith(
-        "the motion has 13 intervals, and was not solved with all 100"
-    )
-
-
 def test_no_level_is_begun_after_the_deadline(solved):
     program = solved.program
     report = solved.report

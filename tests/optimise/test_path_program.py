@@ -74,14 +74,6 @@ def test_answers_are_as_fast_as_their_timings(programs):
     assert result.t_end == pytest.approx(timing, rel=1e-3)
 
 
-def test_values_that_are_given_stay(programs):
-    program, x = programs[0][-1]
-    (phase,) = program.phases
-    start = phase.phase.boundary.start[1].value
-    assert phase.course(x, np.array([phase.ends[0]])).y[0, 1] == pytest.approx(start)
-    assert x[0] == program.start[0]
-
-
 def improve(program):
     """Improve a joint path by numeric inverse kinematics, roughly."""
     (motion,) = program.motions(next(starting_points(program)))

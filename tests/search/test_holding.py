@@ -97,11 +97,3 @@ def test_a_mean_torque_along_a_path_of_joints(monkeypatch):
         ).groups(),
     )
     assert 10.0 < low < high
-    limits = {"joint_2": 10.0, "joint_4": 15.0}
-    task["robot"]["limits"]["rms_torque"] = limits
-    with pytest.raises(
-        brachis.PlanningError, match="and so is that of 'joint_4'"
-    ) as both:
-        brachis.plan(task)
-    keys = [f"robot.limits.rms_torque.{name}" for name in limits]
-    assert [remedy.key for remedy in both.value.remedies] == keys

@@ -56,20 +56,11 @@ CASES = {
         START,
         [0.3, 0.9],
     ),
-    "r = 1, RPR": lambda: line(
-        planar_robot("RPR", "tilted"), [0.4, 0.2, 0.9], [0.2, 0.1]
-    ),
     "r = 1, 7R, pose": lambda: line(seven_joints(), SEVEN, [0.1, 0.2, 0.1], "pose"),
     "r = 1, rail, pose": lambda: line(
         rail_arm(), list(RAIL_START), [0.1, 0.9, 0.1], "pose"
     ),
     "r = 2, 4R": lambda: line(planar_robot("RRRR"), [0.4, 0.8, 0.7, 0.5], [-0.6, 0.3]),
-    "r = 2, rail, free roll": lambda: line(
-        rail_arm(), list(RAIL_START), [0.1, 0.5, 0.1], "pose_free_roll"
-    ),
-    "r = 3, 5R": lambda: line(
-        planar_robot("RRRRR"), [0.4, 0.8, -0.7, 0.5, 0.6], [-0.6, 0.3]
-    ),
     "r = 4, 7R, position": lambda: line(
         seven_joints(), SEVEN, [0.1, 0.2, 0.1], "position"
     ),

@@ -11,7 +11,6 @@ from brachis.robot.from_task import robot_for
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_ANSWER, DeadEnd, reaches
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.stations import spread_stations, stations
 
 TURNS = [
     ("tx90l_rail", [0.6, -0.2, 0.5], [180, 0, 0], [0, 0.4, 0], [0, 0, 1], 120.0, 0.01),
@@ -51,17 +50,6 @@ def task(robot, position, turned, line, axis, angle, length, **search):
 def problem(case):
     asked = task(*case)
     return Problem.of(robot_for(None, asked.robot), asked)
-
-
-@pytest.mark.parametrize("case", TURNS)
-def test_no_step_of_the_stations_turns_far(case):
-    given = problem(case)
-    for s in (stations(given.path, given.task_map), spread_stations(given, 97)):
-        assert s[0] == 0.0
-        assert s[-1] == 1.0
-        targets = given.path.sample(s).target
-        step = given.task_map.difference(targets[1:], targets[:-1])
-        assert given.task_map.norms(step)[1].max() < 0.26
 
 
 @pytest.mark.parametrize("case", TURNS)

@@ -157,17 +157,6 @@ def test_a_path_in_time_is_regular_by_its_length_where_it_rests():
     assert least_time(robot, path) == pytest.approx(least_time(robot, exact), rel=1e-4)
 
 
-def test_steps_are_divided_where_the_path_turns():
-    p = np.linspace(0.0, 1.0, 11)
-    tangent = np.column_stack(
-        [np.where(p < 0.45, 1.0, 0.0), np.where(p < 0.45, 0.0, 1.0)]
-    )
-    found = divide_turns(p, tangent)
-    inside = (found > 0.4) & (found < 0.5)
-    assert inside.sum() > 20
-    assert len(found) == len(p) + inside.sum()
-
-
 def there_and_back(p, *, bend=0.0, aside=0.0):
     """A joint path that turns round at p = 0: in a cusp, p^2 (1, bend p), or in a hairpin if `aside` is not 0."""
     q = np.column_stack([p**2, bend * p**3 + aside * p])
