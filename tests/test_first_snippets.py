@@ -128,14 +128,6 @@ def test_segments_are_those_of_the_task_file():
         brachis.Spline(through=np.stack([pose.homogeneous for pose in poses]))
         == joined[-1]
     )
-    assert (
-        brachis.load_task(
-            {**content, "path": joined[0].model_copy(update={"blend": None})}
-        )
-        .path[0]
-        .kind
-        == "line"
-    )
 
 
 @pytest.mark.parametrize(

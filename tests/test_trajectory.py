@@ -423,18 +423,6 @@ def test_file_of_another_kind(spoil, trajectory, tmp_path):
     assert caught.value.where == str(path)
 
 
-def test_an_archive_that_numpy_does_not_write(trajectory, tmp_path):
-    path = tmp_path / "result.npz"
-    trajectory.save(path)
-    with zipfile.ZipFile(path) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
-        for name, member in members.items():
-            archive.writestr(name, member)
-    with pytest.raises(ResultFileError, match="an archive that NumPy does not write"):
-        Trajectory.load(path)
-
-
 def test_a_fault_of_our_own_is_not_taken_for_a_broken_file(
     trajectory, tmp_path, monkeypatch
 ):

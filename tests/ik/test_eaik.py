@@ -21,8 +21,6 @@ from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
 from support.factored_bench import Bench
 from support.pose_arms import (
-    FAMILIES,
-    family,
     gen3,
     iiwa,
     iiwa_by_angles,
@@ -64,9 +62,6 @@ CASES = {
     "much_redundant": (much_redundant, [(0, 1, 4, 9), (0, 1, 8, 9), (0, 1, 2, 9)]),
     "telescope": (telescope, [(2, 3)]),
     "rounded": (functools.partial(iiwa_by_angles, 1.57079633), [(0,), (2,)]),
-}
-CASES |= {
-    f"family {kind}": (functools.partial(family, kind), [()]) for kind in FAMILIES
 }
 PARAMETERS = [
     pytest.param(robot, redundant, id=f"{name}-{redundant}")

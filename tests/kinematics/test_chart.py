@@ -11,14 +11,13 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, ChartRows
 from brachis.robot import Robot
 from support.chains import planar_robot
-from support.charts import PLACES, chart_of, jacobian, least_motion, path_from
+from support.charts import chart_of, jacobian, least_motion, path_from
 from support.motions import (
     PLANAR,
     Sway,
     check_derivatives,
     check_time_derivatives,
     curved,
-    joint_map,
 )
 from support.screw_arms import seven_joints
 from support.spatial import START, rail_arm
@@ -165,44 +164,6 @@ def test_a_copy_by_pickle_answers_alike(motion):
             getattr(second, name), getattr(first, name), atol=1e-10
         )
     np.testing.assert_array_equal(copy.start, chart.start)
-
-
-@pytest.mark.parametrize("name", [*PLANAR, "r = 1, 7R, pose", "r = 1, rail, pose"])
-def test_rows_that_select_joints_are_the_closed_form_of_these(name):
-    robot, rows, segments, start, redundant = given(name)
-    closed = joint_map(robot, rows, segments, start, redundant)
-    sway = Sway(closed, amplitude=0.1)
-    s = np.linspace(0.0, 1.0, PLACES)
-    reference = closed.postures(
-        np.column_stack(
-            [
-                s,
-                np.broadcast_to(
-                    closed.start[list(closed.redundant)], (PLACES, closed.r)
-                ),
-            ]
-        )
-    )
-    select = ChartRows.constant(np.eye(robot.n)[list(closed.redundant)])
-    chart = ChartMap(closed.task_map, closed.path, select, s, reference)
-    assert chart.redundant_joints == closed.redundant_joints
-    own, selected = (
-        each.coordinates(0.3, reference[5])[1:] for each in (chart, closed)
-    )
-    np.testing.assert_allclose(own, selected, atol=1e-12)
-    parts = sway(T)
-    expected, found = closed.state(*parts), chart.state(*parts)
-    for part in ("q", "qdot", "qddot", "gradient"):
-        size = max(1.0, np.abs(getattr(expected, part)).max())
-        np.testing.assert_allclose(
-            getattr(found, part), getattr(expected, part), atol=1e-10 * size
-        )
-    exact, derived = closed.derivatives(expected), chart.derivatives(found)
-    for part in ("qdot_y", "qddot_y", "qddot_ydot"):
-        size = max(1.0, np.abs(getattr(exact, part)).max())
-        np.testing.assert_allclose(
-            getattr(derived, part), getattr(exact, part), atol=1e-10 * size
-        )
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])

@@ -173,9 +173,6 @@ def peaks(trajectory) -> dict[str, np.ndarray | float]:
         "angular_speed": np.abs(motion.qdot.sum(axis=1)).max(),
         "power": np.abs(powers).max(axis=0),
         "total_power": np.abs(powers.sum(axis=1)).max(),
-        "rms_torque": np.sqrt(
-            np.trapezoid(motion.tau**2, motion.t, axis=0) / trajectory.t_end
-        ),
         "qdot": np.abs(motion.qdot).max(axis=0),
         "tau": np.abs(motion.tau).max(axis=0),
     }

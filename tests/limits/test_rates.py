@@ -11,7 +11,6 @@ import pytest
 import brachis
 from brachis.apps.bottleneck import check_sensitivities
 from brachis.errors import InputError
-from brachis.limits import Label, Limit, Partials
 from brachis.verify import verify_trajectory
 from brachis.verify.mechanics import torque_rates, torques
 from support.effort import QUICK
@@ -165,38 +164,4 @@ def test_rates_of_the_verification_are_differences_of_its_torques(free):
     expected = (after(h) - after(-h)) / (2.0 * h)
     np.testing.assert_allclose(
         torque_rates(robot, *parts), expected, atol=1e-6 * np.abs(expected).max()
-    )
-
-
-class _Twist(Limit):
-    """A limit of the user's own that asks for the jerk: the sum of two joints' jerks."""
-
-    kind = "twist"
-    order = 3
-    longer_time = "relieves"
-    labels = (Label("arm", "twist", "rad/s^3"),)
-    lower, upper = -np.ones(1), np.ones(1)
-
-    def bind(self, _robot):
-        return self
-
-    def values(self, motion):
-        return motion.qdddot[:, 1:].sum(axis=1)[:, None] / 15.0
-
-    def partials(self, motion):
-        return Partials(
-            qdddot=np.broadcast_to(
-                np.array([[0.0, 1.0, 1.0]]) / 15.0, (len(motion.q), 1, 3)
-            )
-        )
-
-
-def test_a_limit_of_the_users_own_may_ask_for_the_jerk(free):
-    t = np.linspace(0.0, 1.0, 5001)
-    assert np.abs(free.trajectory.jerk(t * free.t_end)[:, 1:].sum(axis=1)).max() > 20.0
-    result = brachis.plan(task(), own_limits=[_Twist()])
-    assert result.verified
-    assert (
-        np.abs(result.trajectory.jerk(t * result.t_end)[:, 1:].sum(axis=1)).max()
-        <= 15.0 * 1.0002
     )

@@ -10,7 +10,6 @@ import pytest
 import brachis
 from brachis.limits.joint import AccelerationLimit, TorqueLimit, VelocityLimit
 from brachis.problem.problem import Problem
-from brachis.robot import dynamics
 from brachis.search import phase_plane
 from brachis.search.stations import spread_stations
 from brachis.timing import JointPath, PhasePlane
@@ -38,16 +37,6 @@ def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
 
 def joint_path(distance: float) -> np.ndarray:
     return np.column_stack([distance * S, np.zeros_like(S)])
-
-
-def test_gravity_that_no_torque_holds():
-    limits = brachis.LimitSpec(torque=1.0, velocity=None)
-    robot = brachis.Robot.from_urdf(GANTRY, gravity=[-9.81, 0, 0], limits=limits)
-    weight = np.abs(
-        dynamics.torque(robot, np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2)))
-    ).max()
-    assert weight > 1.0, "the case asks nothing"
-    assert least_time(robot, S, joint_path(0.4)) == np.inf
 
 
 LENGTH = 0.5

@@ -23,7 +23,6 @@ from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.search import (
-    first_motion,
     guesses,
     over_time,
     pipeline,
@@ -40,7 +39,6 @@ from brachis.search.stages import (
     SLOW,
     Candidate,
     Marks,
-    facts_of,
 )
 from brachis.task import load_task
 from support.scara import START, scara
@@ -453,25 +451,6 @@ def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clo
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
     assert any(undone.startswith("the lattice of") for undone in result.not_completed)
-
-
-def test_only_a_moment_of_grace_for_what_fails(robot, monkeypatch, clock):
-    for module, name in (
-        (pipeline, "finish_candidate"),
-        (first_motion, "find_first_motion"),
-    ):
-        honest = getattr(module, name)
-        monkeypatch.setattr(
-            module,
-            name,
-            lambda *given, honest=honest: Candidate(**facts_of(honest(*given))),
-        )
-    calls = clock.jump(pipeline, "finish_candidate", at=1, by=0.6)
-    with pytest.raises(PlanningError, match="within the time limit"):
-        brachis.plan(robot, task(search={"time_limit": 1.5}))
-    assert sum(calls) <= math.ceil((1.5 + 0.2) / 0.6) + 3, (
-        "three more are only verified at last"
-    )
 
 
 @pytest.mark.usefixtures("wall_clock")
