@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 
 import numpy as np
 import pytest
 
 import brachis
-from brachis.common.deadline import Deadline
 from brachis.errors import NotInstalledError, StartError
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
@@ -52,18 +50,6 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
     refined = refine(program, first, solve_with_uno, RefinementOptions())
     assert dense.violation(refined.x).max() <= 1e-4
     assert refined.t_end > first.objective
-
-
-def test_if_the_time_is_up_a_motion_gets_as_slow_as_it_has_to_and_hardly_more():
-    program, _ = brachis.transcribe(
-        scara(), brachis.load_task(task(redundant_joints=["j1"]))
-    )
-    first = solve_with_uno(program, next(starting_points(program)))
-    fast = dataclasses.replace(first, x=program.scale_time(first.x, 0.8))
-    late = RefinementOptions(deadline=Deadline(0.0))
-    found = refine(program, fast, solve_with_uno, late)
-    assert found.violation <= 1e-4
-    assert found.t_end < 1.1 * first.objective
 
 
 def test_without_refinement_the_answer_is_left_as_it_is():

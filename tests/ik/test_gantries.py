@@ -75,13 +75,6 @@ def test_macro_mini_in_its_plane(rows, singular):
             bench.check(redundant, distinct_roots=2 if turning > 0 else 1)
 
 
-def test_macro_mini_of_which_the_slides_answer_for_space():
-    # Two slides and two links about z do not reach all of space: the two slides answer for y and z alone.
-    bench = macro_mini(Y, Z, Z, ["y", "z"])
-    candidate = bench.check((2, 3), distinct_roots=1)
-    assert candidate.family == "prismatic"
-
-
 def test_slides_carried_by_turning_joints_have_branches_by_the_sign_of_their_determinant():
     # The second slide's direction turns with the joint before it: parallel to the first one twice a turn.
     joints = [

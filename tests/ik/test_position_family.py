@@ -20,16 +20,13 @@ from support.pose_arms import panda as panda_urdf
 from support.screw_arms import (
     BASES,
     SLIDE,
-    Axis,
     extra,
     panda,
     screw_robot,
     seven_joints,
-    unit,
 )
 from support.spatial import rail_arm, rail_arm_joints
 
-X, Y, Z = np.eye(3)
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
@@ -169,29 +166,6 @@ def test_refusals():
     assert str(caught.value) == (
         "J_nr is singular everywhere: there is always a motion of the tool that needs rail, joint_1, joint_2, joint_3"
     )
-
-
-def test_refusals_say_what_the_joints_cannot_do():
-    with pytest.raises(NotApplicableError) as caught:
-        bench(seven_joints(), (3, 4, 5, 6), 1)
-    assert str(caught.value) == (
-        "J_nr is singular everywhere: there is always a motion of the tool that needs j4, j5, j6, j7"
-    )
-    rng = np.random.default_rng(8)
-    general = [extra(rng, "R") for _ in range(3)]
-    with pytest.raises(NotApplicableError) as caught:
-        bench(screw_robot(general), (), 1)
-    assert str(caught.value) == (
-        "no closed form moves the tool by j1, j2, j3: no two neighbours among them move in one plane or have axes that "
-        "meet in a fixed point"
-    )
-    askew = [
-        Axis("R", Z, np.zeros(3)),
-        Axis("R", Y, X),
-        Axis("P", unit(X + Y), np.zeros(3)),
-    ]
-    with pytest.raises(NotApplicableError, match="no closed form moves the tool by"):
-        bench(screw_robot(askew), (), 1)
 
 
 PLANS = {

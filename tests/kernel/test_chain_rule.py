@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 
@@ -24,20 +22,6 @@ N = 5
 @pytest.fixture
 def chain():
     return chain_of(*random_model(N, 1))
-
-
-def test_groups_can_be_sent_to_another_process(chain):
-    one = np.ones(1)
-    groups = ValueGroups(
-        [ScaledQuantity("torque", np.array([2]), one, one, chain)], [1]
-    )
-    states = np.random.default_rng(7).normal(size=(3, POINTS, N))
-    again = copy.deepcopy(groups)  # as another process gets it
-    torque = np.random.default_rng(8).normal(size=(POINTS, N))
-    (known,) = groups.values(states, torque)
-    del groups
-    (found,) = again.values(states, torque)
-    np.testing.assert_array_equal(found, known)
 
 
 def test_what_does_not_fit_is_refused(chain):

@@ -141,14 +141,6 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
         assert max(low[bound.column], high[bound.column]) > 5e-4
 
 
-def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
-    for at, sign in ((limit.upper, 1.0), (limit.lower, -1.0)):
-        values = np.where(np.isfinite(at), at, 0.0)[None]
-        on = np.isfinite(at)
-        np.testing.assert_allclose(limit.ratio(values)[0, on], sign)
-        np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("lower", "upper"),
     [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)],

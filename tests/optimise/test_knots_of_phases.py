@@ -99,19 +99,6 @@ def test_points_move_with_the_knots():
     )
 
 
-def test_frozen():
-    phase = phase_of("r2")
-    (x,) = reachable_points(phase, 1)
-    free, there = moved(phase, x)
-    fixed = free.fix_knots(there)
-    same = fixed.variables_from(free.motion(there))
-    assert fixed.variables == phase.variables
-    assert_same_motion(fixed.motion(same), free.motion(there))
-    np.testing.assert_allclose(fixed.violation(same), free.violation(there), atol=1e-9)
-    assert phase.fix_knots(x).grid is phase.grid
-    assert phase.fix_knots(x).variables == phase.variables
-
-
 def test_curves_at_knots_are_those_behind_them_whatever_the_rounding():
     phase = phase_of("r1", degree=2, rest="velocity", intervals=11)
     (x,) = reachable_points(phase, 1)

@@ -273,22 +273,6 @@ def test_a_solve_at_a_given_speed_from_out_of_reach_reports_it():
     assert report.status is SolveStatus.EVALUATION_ERROR
 
 
-def test_a_bent_time_law_is_a_spline():
-    phase = at_given_speed("r2", "bent")
-    (x,) = points_at_given_speed(phase, 1)
-    motion = phase.motion(x)
-    assert motion.control_points.shape[0] == 2
-    both = motion.as_spline()
-    assert both.t_end == DURATION
-    curves = BSpline(both.knots, both.control_points.T, both.degree)
-    t = np.linspace(0.0, DURATION, 997)
-    found = curves(t / DURATION)
-    np.testing.assert_allclose(found[:, 0], phase.time_law.at(t)[0], rtol=0, atol=1e-12)
-    rates = curves(t / DURATION, nu=1)[:, 0] / DURATION
-    np.testing.assert_allclose(rates, phase.time_law.at(t)[1], rtol=1e-8)
-    np.testing.assert_allclose(found, motion.at(t)[0], atol=1e-12)
-
-
 @pytest.mark.parametrize("orders", [1, 3])
 def test_a_motion_with_another_start(orders):
     phase = phase_of("r2", degree=5)
