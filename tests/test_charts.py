@@ -43,7 +43,7 @@ def result():
 
 
 @pytest.fixture
-def saved(result, tmp_path):
+def saved_file(result, tmp_path):
     path = tmp_path / "result.npz"
     result.trajectory.save(path)
     return path
@@ -64,7 +64,7 @@ def test_the_best_choice_of_joints_is_no_faster(result):
 
 
 @pytest.mark.parametrize("redundant", ["auto", ["j1"]])
-def test_an_end_posture_may_be_rounded(result, redundant):
+def test_an_end_posture_may_have_few_digits(result, redundant):
     """The motion ends at the posture on the path that is nearest to the given one, and is held to that."""
     exact = result.trajectory.position(result.t_end)
     end = np.round(exact, 7)
@@ -86,8 +86,8 @@ def test_an_end_posture_may_be_rounded(result, redundant):
     assert [check.name for check in checks if not check.passed] == ["end posture"]
 
 
-def test_a_saved_motion_is_loaded_and_verified(result, saved):
-    loaded = Trajectory.load(saved)
+def test_a_saved_motion_passes_its_checks_again(result, saved_file):
+    loaded = Trajectory.load(saved_file)
     assert loaded.branch == "chart"
     assert loaded.redundant_joints == result.trajectory.redundant_joints
     np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
@@ -136,20 +136,22 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_broken_chart_is_refused(case, saved):
-    with_arrays(saved, **BROKEN[case])
+def test_a_broken_chart_is_an_error(case, saved_file):
+    with_arrays(saved_file, **BROKEN[case])
     with pytest.raises(
         ResultFileError, match=r"the result file is broken|not a brachis result"
     ) as caught:
-        Trajectory.load(saved)
-    assert caught.value.where == str(saved)
+        Trajectory.load(saved_file)
+    assert caught.value.where == str(saved_file)
 
 
-def test_a_chart_that_is_not_broken_is_read(saved):
+def test_a_chart_that_is_not_broken_is_read(saved_file):
     """The same rows as splines."""
     knots = np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(6)])
-    with_arrays(saved, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots)
-    assert len(Trajectory.load(saved).chart_knots) == 14
+    with_arrays(
+        saved_file, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots
+    )
+    assert len(Trajectory.load(saved_file).chart_knots) == 14
 
 
 @pytest.mark.parametrize(
@@ -159,7 +161,7 @@ def test_a_chart_that_is_not_broken_is_read(saved):
         ("gen3", [0.0] * 7, "pose", [0.0, 0.1, -0.1]),
     ],
 )
-def test_a_singular_start_is_refused(urdf, start, space, line):
+def test_a_singular_start_is_an_error(urdf, start, space, line):
     task = {
         "brachis": 1,
         "start": {"joints": start},

@@ -141,7 +141,7 @@ def test_segments_are_those_of_the_task_file():
         (lambda: brachis.Spline(through=[pin.SE3.Identity(), 3.0]), ["spline.through"]),
     ],
 )
-def test_wrong_segments_are_refused(make, parts):
+def test_wrong_segments_are_errors(make, parts):
     with pytest.raises(TaskError) as caught:
         make()
     assert all(part in str(caught.value) for part in parts), str(caught.value)

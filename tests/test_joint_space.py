@@ -64,7 +64,7 @@ def example():
 
 
 @pytest.fixture(scope="module")
-def planned():
+def joint_motion():
     return brachis.plan(task())
 
 
@@ -80,16 +80,16 @@ def test_end_time_is_that_of_toppra(bench, example, seed):
     assert result.t_end == pytest.approx(least, rel=3e-3)
 
 
-def test_result_is_verified_and_follows_the_path(planned):
-    assert planned.verified
-    assert planned.verification.path_error <= 1e-9
-    assert planned.trajectory.redundant_joints == ()
-    assert planned.family == "path of joints"
+def test_result_is_verified_and_follows_the_path(joint_motion):
+    assert joint_motion.verified
+    assert joint_motion.verification.path_error <= 1e-9
+    assert joint_motion.trajectory.redundant_joints == ()
+    assert joint_motion.family == "path of joints"
     np.testing.assert_allclose(
-        planned.trajectory.position(0.0), WAYPOINTS[0], atol=1e-12
+        joint_motion.trajectory.position(0.0), WAYPOINTS[0], atol=1e-12
     )
     np.testing.assert_allclose(
-        planned.trajectory.position(planned.t_end), WAYPOINTS[-1], atol=1e-12
+        joint_motion.trajectory.position(joint_motion.t_end), WAYPOINTS[-1], atol=1e-12
     )
 
 
@@ -156,23 +156,25 @@ def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
         brachis.plan(weak, task)
 
 
-def test_an_end_beside_the_path_is_refused():
+def test_an_end_beside_the_path_is_an_error():
     with pytest.raises(
         brachis.BrachisError, match=r"end posture is off the path.*in joint joint_3"
     ):
         brachis.plan(task(end={"joints": WAYPOINTS[-1] + [0, 0, 1e-3, 0, 0, 0, 0]}))
 
 
-def test_sensitivities_are_those_of_solving_again(planned):
-    found = check_sensitivities(planned.candidate.refined, planned.sensitivities)
+def test_sensitivities_are_those_of_solving_again(joint_motion):
+    found = check_sensitivities(
+        joint_motion.candidate.refined, joint_motion.sensitivities
+    )
     assert found.larger()
     assert found.worst_deviation() < 0.05
 
 
-def test_bottlenecks_of_the_saved_motion_are_those_of_the_plan(planned, tmp_path):
-    planned.trajectory.save(tmp_path / "motion.npz")
+def test_bottlenecks_of_the_saved_motion_are_those_of_the_plan(joint_motion, tmp_path):
+    joint_motion.trajectory.save(tmp_path / "motion.npz")
     again = plan_again(brachis.Trajectory.load(tmp_path / "motion.npz"))
-    assert again.t_end == pytest.approx(planned.t_end, rel=1e-4)
+    assert again.t_end == pytest.approx(joint_motion.t_end, rel=1e-4)
 
 
 @pytest.mark.parametrize(("row", "excess"), [(0, 1e-8), (1, 5e-5), (2, 1e-8)])
@@ -285,7 +287,7 @@ def test_a_table_of_joints_in_any_order_has_its_start(tmp_path):
         )
 
 
-def test_waypoints_that_begin_elsewhere_are_refused():
+def test_waypoints_that_begin_elsewhere_are_errors():
     with pytest.raises(PathError, match=r"starts elsewhere.*rad or m off"):
         brachis.plan(
             "iiwa14", path=WAYPOINTS[1:], start=WAYPOINTS[0], task_space="joints"

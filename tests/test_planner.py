@@ -76,7 +76,7 @@ def test_a_solver_that_is_not_installed_is_an_error_that_names_the_others(monkey
         brachis.plan(scara(), task(solver={"name": "ipopt"}))
 
 
-def test_path_start_is_checked():
+def test_path_start_has_to_be_that_of_the_posture():
     assert brachis.plan(scara(), task(path_start=[np.sqrt(3.0), 0.0])).verified
     with pytest.raises(
         StartError, match=r"the start posture is off the path; found 0.01 m off in y"
@@ -88,7 +88,7 @@ def test_path_start_is_checked():
         brachis.plan(scara(), task(path_start=[1.0, 0.0, 0.0]))
 
 
-def test_end_posture_on_another_branch_is_refused():
+def test_end_posture_on_another_branch_is_an_error():
     free = brachis.plan(scara(), task())
     end = free.trajectory.position(free.t_end)
     assert brachis.plan(scara(), task(end={"joints": end})).verified

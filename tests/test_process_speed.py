@@ -49,7 +49,7 @@ def fastest(speed: float) -> float:
     return ways + (END - BEGIN) * LENGTH / speed
 
 
-def sampled(trajectory):
+def speeds_along(trajectory):
     """s and the tool's speed by differences, at 5,000 times."""
     t = np.linspace(0.0, trajectory.t_end, 5_001)
     motion = trajectory.at(t)
@@ -59,14 +59,14 @@ def sampled(trajectory):
 
 def test_the_speed_is_met_and_reached_and_left_fast():
     free = brachis.plan(task())
-    s, speed = sampled(free.trajectory)
+    s, speed = speeds_along(free.trajectory)
     assert speed[(s > BEGIN) & (s < END)].min() > 2.0 * SPEED, (
         "without it the tool is much faster"
     )
     result = brachis.plan(task(PART))
     assert result.verified
     assert result.t_end > 1.2 * free.t_end
-    s, speed = sampled(result.trajectory)
+    s, speed = speeds_along(result.trajectory)
     inside = (s > BEGIN + 1e-3) & (s < END - 1e-3)
     np.testing.assert_allclose(speed[inside], SPEED, rtol=1e-8)
     assert speed[s < 0.9 * BEGIN].max() > 1.4 * SPEED, (

@@ -275,7 +275,7 @@ TURN = [{"turn": ABOUT_Y}]
         ("ZYZ", "axis", [{"line": {"by": [0.1]}}], ["not in the task space", "turn: {rotate"]),
     ],
 )  # fmt: skip
-def test_rows_that_are_refused(word, space, path, texts):
+def test_rows_that_are_errors(word, space, path, texts):
     robot = chain(word)
     path = path or [{"line": {"by": [0.1] * len(space)}}]
     with pytest.raises(brachis.BrachisError) as caught:

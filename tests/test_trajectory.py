@@ -107,7 +107,7 @@ def test_positions_say_what_they_can_and_no_more(length):
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e-4])
-def test_very_short_lines_are_verified(length):
+def test_very_short_lines_pass_their_checks(length):
     result = plan(task_of_length(length))
     assert result.t_end < 0.06
     assert result.verified, [
@@ -215,7 +215,7 @@ def test_unusable_period(dt, trajectory):
 @pytest.mark.parametrize(
     "curve", ["position", "velocity", "acceleration", "torque", "path_coordinate", "at"]
 )
-def test_times_outside_are_refused(curve, beyond, trajectory):
+def test_times_outside_are_errors(curve, beyond, trajectory):
     t = np.array([0.1, beyond if beyond < 0.0 else trajectory.t_end + beyond])
     with pytest.raises(
         InputError, match="the time is outside the trajectory"
@@ -375,7 +375,7 @@ def cut(path):
     path.write_bytes(path.read_bytes()[:-100])
 
 
-def flipped(path):
+def flip_a_byte(path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(bytes(content))
@@ -404,7 +404,7 @@ def blown_up(path):
 
 BROKEN_FILES = [
     cut,
-    flipped,
+    flip_a_byte,
     single_array,
     zip_of_text,
     member_that_is_no_array,

@@ -69,7 +69,7 @@ def result():
 
 
 @pytest.fixture
-def saved(result, tmp_path):
+def saved_file(result, tmp_path):
     result.trajectory.save(tmp_path / "result.npz")
     return tmp_path / "result.npz"
 
@@ -89,9 +89,9 @@ def test_masses_change_nothing_where_nothing_needs_them(result, text, limits):
     assert other.t_end == pytest.approx(result.t_end, rel=1e-12)
 
 
-def test_the_motion_is_verified_without_torques(result, saved):
+def test_the_motion_is_verified_without_torques(result, saved_file):
     assert result.verified
-    again = brachis.verify_trajectory(brachis.Trajectory.load(saved))
+    again = brachis.verify_trajectory(brachis.Trajectory.load(saved_file))
     assert again.passed
     names = [check.name for check in again.checks]
     assert "acceleration jump" in names
@@ -127,7 +127,7 @@ def test_figures_without_torques(result, kind):
     assert not [ax for ax in figure.axes if "tau" in ax.get_ylabel()]
 
 
-def test_the_figure_of_torques_is_refused(result):
+def test_the_figure_of_torques_is_an_error(result):
     with pytest.raises(UrdfError, match=r"Add the masses to the URDF"):
         PLOTS["torques"](result.trajectory)
 
@@ -194,7 +194,7 @@ def test_an_effort_of_the_urdf_asks_for_masses():
     assert robot_of(six_axes(effort=50.0), limits=free).n == 6
 
 
-def test_one_body_without_mass_is_named():
+def test_one_body_without_mass_is_in_the_message():
     robot = robot_of(six_axes(GRAM, bare="l6 tool0"))
     assert not robot.has_masses
     with pytest.raises(
@@ -210,7 +210,7 @@ def test_a_missing_limit_is_said_for_all_joints():
     assert "found none for a2, a4, a5, a6" in str(caught.value)
 
 
-def test_an_effort_of_0_is_not_stated():
+def test_an_effort_of_0_is_no_limit():
     robot = robot_of(six_axes(GRAM))
     assert np.isinf(robot.limits.torque).all()
     said = brachis.robot.from_task.in_use(robot)
@@ -248,7 +248,7 @@ class BoundTorqueShare(brachis.limits.Limit):
         return brachis.limits.Partials(*(each[:, :1] for each in exact))
 
 
-def test_a_limit_of_a_user_that_needs_torques_is_refused():
+def test_a_limit_of_a_user_that_needs_torques_is_an_error():
     with pytest.raises(InputError, match="no masses, which are needed for torques"):
         brachis.plan(robot_of(six_axes()), TASK, own_limits=[TorqueShare()])
 
@@ -297,7 +297,7 @@ def test_industrial_arms_without_masses(name, tmp_path):
     assert not result.trajectory.robot.has_masses
 
 
-def test_a_joint_on_the_chain_that_follows_is_refused(tmp_path):
+def test_a_joint_on_the_chain_that_follows_is_an_error(tmp_path):
     rows = ARMS.arms()["abb irb5400"]
     assert ARMS.follows_on_the_chain(rows)
     assert not ARMS.follows_on_the_chain(ARMS.arms()["abb irb6640_185_280"])

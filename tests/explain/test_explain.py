@@ -41,7 +41,7 @@ def faster(task: brachis.Task, speed: float) -> brachis.Task:
 
 
 @pytest.mark.parametrize("speed", [0.1, 0.2])
-def test_a_higher_process_speed_saves_what_is_said(seams, speed):
+def test_a_higher_process_speed_saves_what_its_row_says(seams, speed):
     entry = seams.sensitivities.of("tool", f"process speed of {speed} m/s")
     again = brachis.plan(faster(seams.task, speed), start_from=seams)
     assert entry.change(STEP) == pytest.approx(again.t_end - seams.t_end, rel=0.05)
@@ -87,7 +87,7 @@ def test_a_check_leaves_process_speeds_out(seams):
     assert not [kind for kind in kinds if "process speed" in kind]
 
 
-def test_a_broken_sensitivity_is_refused(seams, tmp_path):
+def test_a_broken_sensitivity_is_an_error(seams, tmp_path):
     broken = replace(seams.sensitivities, residual="much")
     replace(seams.trajectory, sensitivities=broken).save(tmp_path / "result.npz")
     with pytest.raises(brachis.errors.ResultFileError, match="broken") as caught:

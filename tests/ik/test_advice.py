@@ -47,7 +47,7 @@ def test_nothing_is_promised_where_no_closed_form_can_be(monkeypatch):
     assert ik.missing_eaik(found) == ""
 
 
-def test_nothing_is_missing_where_it_is_installed():
+def test_nothing_is_missing_beside_an_installation():
     pytest.importorskip("eaik.pybindings.EAIK")
     assert ik.missing_eaik(candidates(panda_lengths())) == ""
 

@@ -209,7 +209,7 @@ def test_without_eaik_the_reason_is_that(monkeypatch):
         eaik.build(ChainGeometry.of(robot), rows(robot), ())
 
 
-def test_only_the_compiled_part_of_eaik_is_loaded_and_that_when_needed():
+def test_the_compiled_part_of_eaik_alone_loads_and_that_on_demand():
     code = """
 import sys
 import brachis.ik.eaik as answers

@@ -106,7 +106,7 @@ def test_no_closed_form_lists_the_choices_that_have_one():
     assert "Choices with a closed form: [j1]" in str(caught.value)
 
 
-def test_yaw_in_another_plane_than_the_joints_is_refused():
+def test_yaw_in_another_plane_than_the_joints_is_an_error():
     robot = planar_robot("RRR", "tilted")
     with pytest.raises(
         DecompositionError, match="yaw turns in another plane than the joints"
@@ -114,7 +114,7 @@ def test_yaw_in_another_plane_than_the_joints_is_refused():
         find(robot, RowsAndAngle(robot, ("x", "y", "yaw"), tool_axis=0), [])
 
 
-def test_rows_that_the_plane_cannot_tell_apart_are_refused():
+def test_rows_that_the_plane_cannot_tell_apart_are_errors():
     # In the xz-plane y stands still: rows x and y are of rank one.
     robot = planar_robot("RR", "xz")
     with pytest.raises(DecompositionError, match="do not fit the plane"):
@@ -243,7 +243,7 @@ def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane
         ("margin_gradient", lambda slopes: slopes * np.nan, "contradicts differences"),
     ],
 )
-def test_wrong_members_of_a_solver_are_rejected(arm, plane, member, change, reason):
+def test_wrong_members_of_a_solver_are_errors(arm, plane, member, change, reason):
     solver = Wrapped(find(arm, plane, ["j3"]).solver, lambda answers: answers)
     check_answers(arm, plane, (2,), solver)
     right = getattr(solver, member)
@@ -262,7 +262,7 @@ def test_a_family_that_returns_no_solver_says_so(arm, plane):
     assert reasons["forgetful"] == "it returned None, not an IKSolver"
 
 
-def test_margins_that_are_not_analytic_are_rejected(arm, plane):
+def test_margins_that_are_not_analytic_are_errors(arm, plane):
     class Rough(Wrapped):
         margin_gradient = IKSolver.margin_gradient
 
@@ -279,7 +279,7 @@ def forget_the_decorator(_geometry, _task_map, _redundant):
 
 
 @pytest.mark.parametrize("wrong", [forget_the_decorator, 3, Wrapped])
-def test_what_is_no_family_is_refused(arm, plane, wrong):
+def test_what_is_no_family_is_an_error(arm, plane, wrong):
     with pytest.raises(InputError, match="not a family") as caught:
         find(arm, plane, ["j3"], families=[wrong])
     assert caught.value.where == "families[0]"

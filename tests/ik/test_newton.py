@@ -53,7 +53,7 @@ def test_placed_is_what_pinocchio_says(arm):
     np.testing.assert_allclose(found, expected, atol=1e-13)
 
 
-def well_posed(task_map, q):
+def regular_postures(task_map, q):
     """Rows of the null spaces, and the postures in which the Jacobian is far from singular."""
     _, sizes, right = np.linalg.svd(jacobian(task_map, q))
     return right[:, task_map.m :], sizes[:, -1] > 0.03
@@ -61,7 +61,7 @@ def well_posed(task_map, q):
 
 def test_targets_and_linear_conditions_are_met(arm):
     task_map, q = arm
-    rows, good = well_posed(task_map, q)
+    rows, good = regular_postures(task_map, q)
     assert good.sum() > COUNT // 5
     q, rows = q[good], rows[good]
     there = q + 0.02 * np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
@@ -75,7 +75,7 @@ def test_targets_and_linear_conditions_are_met(arm):
 def test_no_answer_out_of_reach_nor_from_nowhere():
     _, task_map = bind(planar_robot("RRR"), ["x", "y"])
     q = np.tile([0.4, 1.0, 0.5], (4, 1))
-    targets, rows = task_map.values(q), well_posed(task_map, q)[0]
+    targets, rows = task_map.values(q), regular_postures(task_map, q)[0]
     levels = np.einsum("kij,kj->ki", rows, q)
     targets[0] = [9.0, 9.0]
     q[1] = np.nan

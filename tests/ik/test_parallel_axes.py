@@ -147,7 +147,7 @@ def test_arms_as_their_urdf_states_them(name):
     ],
     ids=["pan", "wrist 2", "wrist 3", "pan below the slide"],
 )
-def test_slide_that_never_helps_is_refused(arm, redundant):
+def test_a_slide_that_never_helps_is_an_error(arm, redundant):
     # Along the pan axis, or radially after it, it moves the arm within the plane of the parallel joints.
     robot = arm.robot(MOUNT)
     with pytest.raises(DecompositionError) as caught:

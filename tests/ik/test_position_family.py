@@ -75,7 +75,7 @@ def test_every_recipe(name, arrangement):
     assert len(set(checked.solver.branches)) == len(checked.solver.branches)
 
 
-def test_every_recipe_is_tried():
+def test_the_cases_use_every_recipe():
     used = {
         RECIPES.index(bench(screw_robot(base), (), 1).solver.recipe)
         for base in BASES.values()

@@ -17,7 +17,7 @@ from brachis.errors import DecompositionError
 from brachis.ik import Family, find, find_all
 from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
-from support.closed_forms import wrapped
+from support.closed_forms import wrap
 from support.factored_bench import Bench
 from support.rounded import ANY_DIGITS, ARMS, by_angles
 
@@ -102,7 +102,7 @@ def test_no_answer_is_given_twice(name, joints):
     bench = bench_of(name, joints, 500)
     solved = bench.solve(bench.q)
     for first, second in itertools.combinations(range(solved.shape[1]), 2):
-        gap = np.abs(wrapped(solved[:, first] - solved[:, second], bench.turning)).max(
+        gap = np.abs(wrap(solved[:, first] - solved[:, second], bench.turning)).max(
             axis=1
         )
         assert np.nanmin(gap, initial=1.0) > 1e-6
@@ -118,7 +118,7 @@ def test_no_answer_is_given_twice(name, joints):
         ("TX90L on a rail", 6),
     ],
 )
-def test_what_is_farther_off_is_refused_and_the_reason_named(name, joint):
+def test_what_is_farther_off_is_an_error_with_the_reason(name, joint):
     near, far = (
         by_angles(ARMS[name], EXACT, bent=bent, bent_joint=joint)
         for bent in (5e-5, 1e-3)
@@ -158,9 +158,7 @@ def xarm():
     return path
 
 
-def test_inspect_names_the_families_and_says_which_solvers_are_refined(
-    capsys, monkeypatch
-):
+def test_inspect_names_the_families_and_the_solvers_that_refine(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "240")
     inspect(xarm(), task_space="pose", json=True)
     data = json.loads(capsys.readouterr().out)

@@ -194,7 +194,7 @@ def test_no_rotation_is_no_vector():
     assert np.array_equal(rotation_vectors(np.eye(3)[None]), np.zeros((1, 3)))
 
 
-def test_arrays_of_another_shape_are_refused(case):
+def test_arrays_of_another_shape_are_errors(case):
     chain, (q, qdot, qddot) = case[2], case[3]
     with pytest.raises(ValueError, match="an array has the shape"):
         chain.torques(q[:, :1].repeat(chain.n + 1, axis=1), qdot, qddot)

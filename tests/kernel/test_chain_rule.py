@@ -24,7 +24,7 @@ def chain():
     return chain_of(*random_model(N, 1))
 
 
-def test_what_does_not_fit_is_refused(chain):
+def test_what_does_not_fit_is_an_error(chain):
     with pytest.raises(ValueError, match="point"):
         CurvePattern(np.array([9]), np.array([0]), POINTS, 2)
     with pytest.raises(ValueError, match="curve"):

@@ -83,6 +83,6 @@ def test_a_row_is_found_as_a_whole():
     assert Formula.of(function, 2)(points)[1, 1] == 5.0
 
 
-def test_points_of_another_size_are_refused(points):
+def test_points_of_another_size_are_errors(points):
     with pytest.raises(ValueError, match="needed"):
         Formula.of(everything, 2, 1)(*points[::-1])

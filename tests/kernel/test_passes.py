@@ -39,14 +39,14 @@ def go_backwards(factor, least, most, floor, ceiling, last):
     return np.array(low), np.array(high)
 
 
-def test_without_rows_nothing_is_bounded():
+def test_without_rows_there_are_no_bounds():
     none = np.empty((3, 0))
     least, most = kernel.bounds_of_pairs(none, none, none, FLAT)
     assert np.array_equal(least, np.zeros(3))
     assert np.isinf(most).all()
 
 
-def test_an_end_that_cannot_be_reached():
+def test_an_end_out_of_reach():
     steps = np.ones((3, 1)), -np.ones((3, 1)), np.full((3, 1), 0.1)
     levels = np.zeros(3), np.full(3, 0.2)
     assert kernel.go_backwards(steps, levels, 1.0, flat=FLAT, rounding=ROUNDING) is None

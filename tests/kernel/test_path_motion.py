@@ -68,7 +68,7 @@ def motion(request):
         ([0.0, 0.0, -1.0], -1.0, None),
     ],
 )
-def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
+def test_singular_postures_and_other_sides_are_faults(row, side, fault):
     chain = chain_of(*random_model(3, 1))
     given = dict.fromkeys(CURVES_AND_PATH, np.ones((1, 2)))
     given["rows"] = np.array([[*row, 0.0]])
@@ -91,7 +91,7 @@ def test_what_is_not_finite_is_no_posture():
     assert motion.evaluate() is Fault.NO_POSTURE
 
 
-def test_conditions_of_other_shapes_are_refused():
+def test_conditions_of_other_shapes_are_errors():
     chain = chain_of(*random_model(3, 1))
     ones = np.ones((1, 2))
     given = {"y": ones, "rows": np.zeros((1, 1, 4)), "turning": np.zeros((2, 1, 1, 4))}
@@ -99,7 +99,7 @@ def test_conditions_of_other_shapes_are_refused():
         PathMotion.prepare(chain, Prescribed((0, 1)), given)
 
 
-def test_what_the_library_would_read_beyond_its_end_is_refused():
+def test_what_the_library_would_read_beyond_its_end_is_an_error():
     chain = chain_of(*random_model(3, 1))
     asked = Prescribed((0, 1))
     ones = np.ones((1, 2))

@@ -115,7 +115,7 @@ def test_a_branch_comes_back_from_another_process():
     np.testing.assert_array_equal(again.others, OTHERS)
 
 
-def test_what_does_not_fit_is_refused():
+def test_what_does_not_fit_is_an_error():
     mask = np.ones(N, dtype=bool)
     with pytest.raises(ValueError, match="not all joints"):
         _ = Branch(REDUNDANT, REDUNDANT, mask, mask, np.zeros(N)).address
@@ -126,7 +126,7 @@ def test_what_does_not_fit_is_refused():
         _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula).address
 
 
-def test_a_branch_of_another_chain_is_refused():
+def test_a_branch_of_another_chain_is_an_error():
     chain = chain_of(*random_model(4, 1))
     mask = np.ones(N, dtype=bool)
     given = {"y": np.zeros((1, 2)), "rows": np.zeros((1, 4))}

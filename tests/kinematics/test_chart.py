@@ -15,9 +15,9 @@ from support.charts import chart_of, jacobian, least_motion, path_from
 from support.motions import (
     PLANAR,
     Sway,
+    arc_path,
     check_derivatives,
     check_time_derivatives,
-    curved,
 )
 from support.screw_arms import seven_joints
 from support.spatial import START, rail_arm
@@ -31,22 +31,28 @@ SPATIAL = {
 }
 
 
-def bent(robot, start):
+def bent_path(robot, start):
     """A circular arc in space near the tool, along which the orientation is kept."""
     tool = robot.tool_placement(np.array(start[: robot.n], dtype=float)).translation
     via, to = tool + np.array([0.06, 0.05, -0.04]), tool + np.array([0.02, 0.12, -0.1])
     return [{"arc": {"via": via.tolist(), "to": to.tolist()}}]
 
 
-def given(name):
+def case_of(name):
     """Robot, rows, segments, start posture and redundant joints of a case."""
     if name in PLANAR:
         pattern, plane, rows, start, redundant = PLANAR[name]
         robot = planar_robot(pattern, plane)
-        return robot, rows, curved(robot, rows, start, angle_deg=35.0), start, redundant
+        return (
+            robot,
+            rows,
+            arc_path(robot, rows, start, angle_deg=35.0),
+            start,
+            redundant,
+        )
     make, rows, start, redundant = SPATIAL[name]
     robot = make()
-    return robot, rows, bent(robot, start), start, redundant
+    return robot, rows, bent_path(robot, start), start, redundant
 
 
 CASES = [
@@ -62,7 +68,7 @@ T = np.linspace(0.02, 0.97, 25)  # not at the knots of rows that follow
 @pytest.fixture(params=CASES, ids=str, scope="module")
 def motion(request):
     name, kind = request.param
-    robot, rows, segments, start, _ = given(name)
+    robot, rows, segments, start, _ = case_of(name)
     return Sway(chart_of(robot, rows, segments, start, kind), amplitude=0.1)
 
 

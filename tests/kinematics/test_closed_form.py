@@ -17,9 +17,9 @@ from support.chains import planar_robot
 from support.motions import (
     PLANAR,
     Sway,
+    arc_path,
     check_derivatives,
     check_time_derivatives,
-    curved,
     joint_map,
 )
 
@@ -29,7 +29,7 @@ def motion(request):
     pattern, plane, rows, start, redundant = PLANAR[request.param]
     robot = planar_robot(pattern, plane)
     return Sway(
-        joint_map(robot, rows, curved(robot, rows, start), start, redundant),
+        joint_map(robot, rows, arc_path(robot, rows, start), start, redundant),
         amplitude=0.1,
     )
 
@@ -79,7 +79,7 @@ def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_ma
     )
 
 
-def test_slides_are_never_wrapped():
+def test_slides_never_wrap():
     robot = planar_robot("PPR")
     start = [20.0, -30.0, 0.4]
     chain = joint_map(robot, ["x", "y"], [{"line": {"by": [40.0, 0.0]}}], start, ["j3"])
@@ -124,7 +124,7 @@ def test_what_a_subclass_computes_itself_is_asked_for():
     robot = planar_robot("RRR", "xy")
     start = [0.4, 1.0, 0.5]
     known = joint_map(
-        robot, ["x", "y"], curved(robot, ["x", "y"], start), start, ["j2"]
+        robot, ["x", "y"], arc_path(robot, ["x", "y"], start), start, ["j2"]
     )
     assert isinstance(known.solver, PlanarSolver)
     solver = copy.copy(known.solver)

@@ -70,14 +70,14 @@ def test_torque_that_falls_with_speed(curve):
     """The slide's equation of motion under full force, up to the middle; braking is the mirror."""
     speed, force = np.transpose(curve)
 
-    def allowed(v):
+    def largest_force(v):
         last = (force[-1] - force[-2]) / (speed[-1] - speed[-2])
         return np.maximum(
             np.interp(v, speed, force) + last * np.maximum(v - speed[-1], 0.0), 0.0
         )
 
     def motion(_t, state):
-        return [state[1], allowed(state[1]) / MASS]
+        return [state[1], largest_force(state[1]) / MASS]
 
     found = solve_ivp(
         motion,
@@ -97,7 +97,7 @@ def test_torque_that_falls_with_speed(curve):
     def excess(planned):
         dense = planned.trajectory.at(np.linspace(0.0, planned.t_end, 5_001))
         return (
-            np.abs(dense.tau[:, 0]) - allowed(np.abs(dense.qdot[:, 0]))
+            np.abs(dense.tau[:, 0]) - largest_force(np.abs(dense.qdot[:, 0]))
         ).max() / FORCE
 
     assert excess(result) <= 1e-4
@@ -178,7 +178,7 @@ def peaks(trajectory) -> dict[str, np.ndarray | float]:
     }
 
 
-def limited(task, kind, free):
+def task_with_limit(task, kind, free):
     """The task with a limit that the free motion exceeds."""
     tool, joints = {}, {}
     if kind in ("acceleration", "angular_speed"):
@@ -226,7 +226,7 @@ def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(
     arm, kind, check, label
 ):
     task, free = arm
-    result = brachis.plan(limited(task, kind, peaks(free.trajectory)))
+    result = brachis.plan(task_with_limit(task, kind, peaks(free.trajectory)))
     assert result.verified, result.verification
     assert result.t_end > free.t_end * 1.001
     assert ratio(result, check) == pytest.approx(1.0, abs=1e-3)

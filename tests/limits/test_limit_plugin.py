@@ -39,7 +39,7 @@ def plugin():
 
 
 @pytest.fixture
-def installed(plugin, monkeypatch):
+def entry_point(plugin, monkeypatch):
     """The entry point as the plug-in's pyproject.toml names it."""
     import tomllib
 
@@ -97,7 +97,7 @@ def test_an_object_limits_the_motion(plugin, tmp_path):
     assert not verify_trajectory(free.trajectory, own_limits=[model]).passed
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("entry_point")
 def test_a_task_file_names_it():
     result = brachis.plan(TASK, **QUICK)
     assert result.verified
@@ -147,7 +147,7 @@ def test_a_kind_without_its_plugin_is_unknown():
         ({"joints": ["j2", "elbow"], "lower": -1.0, "upper": 1.0}, "elbow"),
     ],
 )
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("entry_point")
 def test_wrong_parameters_have_a_reason(parameters, said):
     task = brachis.load_task(TASK).to_dict()
     with pytest.raises(InputError, match=said) as caught:
@@ -155,7 +155,7 @@ def test_wrong_parameters_have_a_reason(parameters, said):
     assert "custom_limits.coupled_range" in str(caught.value)
 
 
-def test_a_start_posture_beyond_it_is_refused(plugin):
+def test_a_start_posture_beyond_it_is_an_error(plugin):
     model = plugin.CoupledRange(("j2", "j3"), 0.5, 0.7)
     said = "the range limit of 'j2 + j3' is exceeded at rest; found 0 rad at rest; allowed: 0.5 to 0.7 rad"
     with pytest.raises(brachis.errors.StartError, match=re.escape(said)):
@@ -261,7 +261,7 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         ),
     ],
 )
-def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
+def test_a_limit_whose_parts_do_not_fit_is_an_error(parts, where, said):
     with pytest.raises(InputError) as caught:
         brachis.plan(LINE, own_limits=[Given(**parts)])
     assert str(caught.value).startswith(f"{where}: ")
@@ -294,7 +294,7 @@ def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
         ("labels", (Label("j3", "rate", None),), "of texts"),
     ],
 )
-def test_a_member_that_is_not_allowed_is_named(name, wrong, allowed):
+def test_a_member_that_is_not_allowed_is_in_the_message(name, wrong, allowed):
     with pytest.raises(InputError) as caught:
         brachis.plan(LINE, own_limits=[Given(**{name: wrong})])
     assert caught.value.where == f"own_limits[0].{name}"
@@ -302,7 +302,7 @@ def test_a_member_that_is_not_allowed_is_named(name, wrong, allowed):
 
 
 @pytest.mark.parametrize("centre", [np.zeros(3), np.array([5.0]), np.array([np.nan])])
-def test_a_centre_that_is_not_between_the_bounds_is_named(centre):
+def test_a_centre_that_is_not_between_the_bounds_is_in_the_message(centre):
     class Off(Rate):
         def bind(self, _robot):
             return self
@@ -375,7 +375,7 @@ class Failing(Given):
 
 
 @pytest.mark.parametrize("part", ["__init__", "bind", "values", "partials", "check"])
-def test_a_failing_plugin_is_named(part, monkeypatch):
+def test_a_failing_plugin_is_in_the_message(part, monkeypatch):
     class Entry:
         name = "failing"
         value = "__init__"
@@ -392,7 +392,7 @@ def test_a_failing_plugin_is_named(part, monkeypatch):
     )
 
 
-def test_a_plugin_that_fails_later_is_named(monkeypatch):
+def test_a_plugin_that_fails_later_is_in_the_message(monkeypatch):
     class Late(Rate):
         def values(self, motion):
             if np.isnan(motion.s).any() or len(motion.q) in {6, 24, 72}:
@@ -447,7 +447,7 @@ class Alike:
     ],
     ids=str,
 )
-def test_what_is_no_list_of_limits_is_refused(line_result, own_limits, said):
+def test_what_is_no_list_of_limits_is_an_error(line_result, own_limits, said):
     with pytest.raises(InputError, match=said):
         brachis.plan(LINE, own_limits=own_limits)
     with pytest.raises(InputError, match=said):

@@ -145,7 +145,7 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
     ("lower", "upper"),
     [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)],
 )
-def test_a_ratio_is_above_one_exactly_where_a_bound_is_violated(lower, upper):
+def test_a_ratio_is_above_one_exactly_beyond_the_bounds(lower, upper):
     """However narrow the bounds are, or far from zero."""
 
     class Sum(Limit):
@@ -184,7 +184,7 @@ def pairs(kind: str) -> Limit:
 
 
 @pytest.mark.parametrize("kind", ["torque", "velocity"])
-def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
+def test_pairs_of_limits_are_the_bounds_of_their_quantity(kind):
     limit = pairs(kind)
     test_partials_equal_differences(limit)
     test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit)

@@ -55,7 +55,7 @@ def right_partials(motion):
     return Partials(q=by_q, qdot=rows(motion, 0.5, 0.0, 0.0))
 
 
-def changed(motion, **parts):
+def partials_with(motion, **parts):
     return Partials(**{**vars(right_partials(motion)), **parts})
 
 
@@ -66,17 +66,21 @@ def bind(limit):
 @pytest.mark.parametrize(
     ("partials", "where", "joint"),
     [
-        (lambda m: changed(m, q=-right_partials(m).q), "q", "j2"),
-        (lambda m: changed(m, q=1.1 * right_partials(m).q), "q", "j2"),
-        (lambda m: changed(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
+        (lambda m: partials_with(m, q=-right_partials(m).q), "q", "j2"),
+        (lambda m: partials_with(m, q=1.1 * right_partials(m).q), "q", "j2"),
+        (lambda m: partials_with(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
         (lambda m: Partials(qdot=right_partials(m).q), "q", "j2"),
-        (lambda m: changed(m, q=right_partials(m).q * [1.0, 1.0, 0.0]), "q", "j3"),
-        (lambda m: changed(m, qdot=None), "qdot", "j1"),
-        (lambda m: changed(m, qddot=rows(m, 0.0, 0.1, 0.0)), "qddot", "j2"),
-        (lambda m: changed(m, s=np.ones((len(m.q), 1))), "s", ""),
+        (
+            lambda m: partials_with(m, q=right_partials(m).q * [1.0, 1.0, 0.0]),
+            "q",
+            "j3",
+        ),
+        (lambda m: partials_with(m, qdot=None), "qdot", "j1"),
+        (lambda m: partials_with(m, qddot=rows(m, 0.0, 0.1, 0.0)), "qddot", "j2"),
+        (lambda m: partials_with(m, s=np.ones((len(m.q), 1))), "s", ""),
     ],
 )
-def test_a_wrong_partial_derivative_is_named(partials, where, joint):
+def test_a_wrong_partial_derivative_is_in_the_message(partials, where, joint):
     with pytest.raises(InputError, match="contradicts the values") as caught:
         bind(Sum(right_values, partials))
     assert caught.value.where == f"own_limits[0].partials.{where}"
@@ -87,7 +91,9 @@ def test_a_wrong_partial_derivative_is_named(partials, where, joint):
 
 def test_the_numbers_are_those_of_the_joint():
     with pytest.raises(InputError) as caught:
-        bind(Sum(right_values, lambda m: changed(m, qdot=rows(m, -0.5, 0.0, 0.0))))
+        bind(
+            Sum(right_values, lambda m: partials_with(m, qdot=rows(m, -0.5, 0.0, 0.0)))
+        )
     assert "found -0.5 at q" in str(caught.value)
     assert "allowed: 0.5, by differences" in str(caught.value)
 
@@ -204,7 +210,7 @@ def test_values_may_be_undefined_in_some_postures_and_not_in_most(left_out, is_r
         bind(Sum(values, right_partials))
 
 
-def test_values_for_another_number_of_moments_are_refused():
+def test_values_for_another_number_of_moments_are_errors():
     def values(motion):
         return right_values(motion)[:12]
 

@@ -49,7 +49,7 @@ def rates(trajectory, kind, count=5_000):
     return np.abs(np.diff(values, axis=0)) / np.diff(t)[:, None]
 
 
-def test_the_limit_holds_everywhere_and_is_used(kind, free, result):
+def test_the_limit_holds_everywhere_and_is_active(kind, free, result):
     assert rates(free.trajectory, kind).max() > 2.0 * FIGURES[kind], (
         "without the limit it is exceeded"
     )

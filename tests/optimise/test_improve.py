@@ -54,7 +54,7 @@ def solve(program, _x):
     )
 
 
-def solved(program) -> SolvedProgram:
+def solution_of(program) -> SolvedProgram:
     return SolvedProgram(program, (solve(program, None),))
 
 
@@ -72,7 +72,7 @@ def changes_to(*programs):
     return [change_to(program) for program in programs], seen
 
 
-FIRST = solved(Fake(5.0))
+FIRST = solution_of(Fake(5.0))
 
 
 GAINS = {"least_gain": 0.0, "go_on_above": None}

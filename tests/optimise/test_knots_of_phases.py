@@ -20,7 +20,7 @@ def finer(phase):
     return phase.with_knots(clamped_knots(phase.degree, breaks), spread(breaks, 3))
 
 
-def moved(phase, x, seed=0):
+def with_other_lengths(phase, x, seed=0):
     """Free knots, and a point with other lengths than even ones."""
     free = phase.with_free_knots(SHORTEST)
     rng = np.random.default_rng(seed)
@@ -80,7 +80,7 @@ def test_free_knots_where_they_are_given_change_nothing(degree):
 def test_points_move_with_the_knots():
     phase = phase_of("r2")
     (x,) = reachable_points(phase, 1)
-    free, there = moved(phase, x)
+    free, there = with_other_lengths(phase, x)
     ends = np.concatenate([[0.0], np.cumsum(there[-5:])])
     motion = free.motion(there)
     np.testing.assert_allclose(motion.breaks / motion.t_end, ends, atol=1e-14)

@@ -12,7 +12,7 @@ from scipy.interpolate import BSpline
 
 from brachis.optimise.boundary import Boundary, EndCondition, periodic
 from brachis.optimise.bspline import clamped_knots
-from support.jacobians import dense, differences, told
+from support.jacobians import comparable_rows, dense, differences
 from support.phases import phase_of, reachable_points
 
 BREAKS = np.array([0.0, 0.1, 0.25, 0.5, 0.6, 0.85, 0.95, 1.0])
@@ -56,7 +56,7 @@ def test_jacobian_equals_differences(phase):
         exact, expected = dense(phase, x), differences(phase, x, 2e-6)
         count = phase._layout.progress.fixed_terms.shape[1]
         kinds = {
-            limit.kind: phase.rows_of(limit).ravel()[told(phase, limit, x)]
+            limit.kind: phase.rows_of(limit).ravel()[comparable_rows(phase, limit, x)]
             for limit in phase.limits
             if not limit.guarantee.is_mean
         }

@@ -7,7 +7,7 @@ import pytest
 
 from brachis import limits
 from brachis.optimise.program import Program
-from support.jacobians import dense, differences, told
+from support.jacobians import comparable_rows, dense, differences
 from support.phases import CASES, phase_of, reachable_points
 
 OTHER_ROBOTS = (
@@ -48,14 +48,14 @@ def program(request):
 
 
 @pytest.fixture(scope="module")
-def differentiated(program):
+def points_and_differences(program):
     """Some points, and the Jacobian there by differences."""
     return [
         (x, differences(program, x)) for x in reachable_points(program.phases[0], 2)
     ]
 
 
-def test_jacobian_equals_differences(program, differentiated):
+def test_jacobian_equals_differences(program, points_and_differences):
     (phase,) = program.phases
     parts = blocks(program)
     kinds = [
@@ -71,9 +71,9 @@ def test_jacobian_equals_differences(program, differentiated):
     assert sorted(np.concatenate(list(parts.values()))) == list(
         range(len(program.lower))
     )
-    for x, expected in differentiated:
+    for x, expected in points_and_differences:
         exact = dense(program, x)
-        kept = {limit.kind: told(phase, limit, x) for limit in phase.limits}
+        kept = {limit.kind: comparable_rows(phase, limit, x) for limit in phase.limits}
         for kind, rows in parts.items():
             assert np.count_nonzero(exact[rows]) > 0, f"{kind} has no entries"
             scale = np.abs(expected[rows]).max()
@@ -88,11 +88,11 @@ def test_jacobian_equals_differences(program, differentiated):
             assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
 
 
-def test_the_pattern_covers_all_differences(program, differentiated):
+def test_the_pattern_covers_all_differences(program, points_and_differences):
     (phase,) = program.phases
     pattern = np.zeros((len(program.lower), program.variables), dtype=bool)
     pattern[program.jacobian_rows, program.jacobian_columns] = True
-    for _, expected in differentiated:
+    for _, expected in points_and_differences:
         wrong = np.abs(expected) > 1e-7
         assert not np.any(wrong & ~pattern)
     # Each row touches the end time, at most degree + 1 control points of every curve, and free lengths nearby; the

@@ -18,7 +18,7 @@ from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.path.time_law import TimeLaw
 from brachis.robot import dynamics
-from support.jacobians import dense, differences, differences_of, told
+from support.jacobians import comparable_rows, dense, differences, differences_of
 from support.phases import phase_of, reachable_points
 
 DURATION = 0.6
@@ -63,7 +63,7 @@ def compare_by_kind(
     for limit in phase.limits:
         if limit.guarantee.is_mean:
             continue
-        rows = phase.rows_of(limit).ravel()[told(phase, limit, x)]
+        rows = phase.rows_of(limit).ravel()[comparable_rows(phase, limit, x)]
         assert len(rows) > 0
         scale = max(1e-3, np.abs(own[rows]).max())
         assert error[rows].max() <= 1e-6 * scale, limit.kind

@@ -110,7 +110,7 @@ def test_a_stop_that_only_the_ranges_of_the_phases_bound():
     ), "the link should matter"
 
 
-def test_meshes_of_every_phase_are_refined():
+def test_refinement_reaches_meshes_of_every_phase():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
     fine = refine_mesh(
@@ -125,7 +125,7 @@ def test_meshes_of_every_phase_are_refined():
     assert report.objective > 1.01 * fine.t_end
 
 
-def test_knots_of_every_phase_are_freed():
+def test_free_knots_move_in_every_phase():
     program = two_moves(degree=3, intervals=3)
     report = solve(program, first_point(program))
     moved = optimise_knots(

@@ -54,7 +54,7 @@ def test_a_mean_force_below_the_weight_is_named_with_one_that_is_enough(monkeypa
     assert brachis.plan(lift(advised)).verified
 
 
-def test_no_plan_is_tried_where_no_posture_can_be_held(monkeypatch):
+def test_no_plan_begins_where_no_posture_holds(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     monkeypatch.setattr(
         "brachis.search.pipeline.rank_candidate",

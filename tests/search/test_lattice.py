@@ -251,7 +251,7 @@ def test_small_circles_have_stations_enough(turns, joints):
     assert not isinstance(ClosedFormLattice(decomposition).joint_paths(1), DeadEnd)
 
 
-def test_an_end_posture_without_redundancy_may_be_rounded():
+def test_an_end_posture_without_redundancy_may_have_few_digits():
     robot = scara(locked_joints={"j3": 0.4})
     line = [{"line": {"by": [-0.3, 0.2]}}]
     free = brachis.plan(
@@ -293,7 +293,7 @@ def back_from(
         {"wrist_1_joint": 1, "wrist_3_joint": -1},
     ],
 )
-def test_a_free_start_is_in_the_turn_from_which_the_given_end_is_reached(turned):
+def test_a_free_start_is_in_the_turn_that_leads_to_the_end_posture(turned):
     """Ranges of two turns: whichever turns the end is in, every choice of redundant joints finds its way back."""
     task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
     robot = robot_from_settings(brachis.load_task(task).robot)

@@ -282,13 +282,13 @@ def ctrl_c_before_refinement(monkeypatch):
     """Ctrl-C as the first motion is finished; the second call is the last look at it."""
     honest, calls = pipeline.finish_candidate, []
 
-    def interrupted(*arguments: Any) -> Any:
+    def interrupt(*arguments: Any) -> Any:
         calls.append(1)
         if len(calls) == 1:
             raise KeyboardInterrupt
         return honest(*arguments)
 
-    monkeypatch.setattr(pipeline, "finish_candidate", interrupted)
+    monkeypatch.setattr(pipeline, "finish_candidate", interrupt)
 
 
 @pytest.fixture
@@ -337,13 +337,13 @@ class Clock:
         """Jump at the end of the `at`-th call of a function, and of every later one; the calls are counted."""
         honest, calls = getattr(where, name), []
 
-        def counted(*arguments: Any) -> Any:
+        def count(*arguments: Any) -> Any:
             calls.append(1)
             made = honest(*arguments)
             self.now += by * (len(calls) >= at)
             return made
 
-        self._monkeypatch.setattr(where, name, counted)
+        self._monkeypatch.setattr(where, name, count)
         return calls
 
 
@@ -445,7 +445,7 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
         brachis.plan(robot, task(**EVERY_CHOICE))
 
 
-def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clock):
+def test_starts_from_their_part_of_the_time_have_plans(robot, clock):
     clock.jump(schedule, "lattice_guesses", at=1, by=30.0)
     result = brachis.plan(robot, task(**EVERY_CHOICE))
     assert result.verified
@@ -481,7 +481,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     )
 
 
-def test_within_other_workers_no_processes_are_made(robot):
+def test_within_other_workers_no_processes_start(robot):
     joblib = pytest.importorskip("joblib")
     handler = signal.getsignal(signal.SIGINT)
     asked = task(search={"jobs": 2}, redundant_joints=["j1"])
@@ -525,7 +525,7 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     tried: list[Candidate] = []
     adapt = pipeline.adapt_mesh
 
-    def noted(*arguments: Any, **settings: Any) -> Any:
+    def note(*arguments: Any, **settings: Any) -> Any:
         meshes.append(len(tried))
         return adapt(*arguments, **settings)
 
@@ -535,7 +535,7 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
         return tried[-1]
 
     monkeypatch.setattr(portfolio.Search, "_may_win", lambda *_: True)
-    monkeypatch.setattr(pipeline, "adapt_mesh", noted)
+    monkeypatch.setattr(pipeline, "adapt_mesh", note)
     monkeypatch.setattr(pipeline, "finish_candidate", against_faster)
     asked = task(start="free", path_start=HERE, spline={"intervals": "auto"})
     result = brachis.plan(robot, asked)
@@ -548,7 +548,7 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     assert all(math.isinf(each.adapted) for each in rest)
 
 
-def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):
+def test_a_search_without_time_says_where_its_lattices_end(robot, clock):
     tool = robot.tool_placement(START).translation
     post = brachis.Cylinder(0.1, 1.0, name="post", position=[tool[0] - 0.6, tool[1], 0])
     calls = clock.jump(schedule, "_guess_on_some_branches", at=1)

@@ -95,7 +95,7 @@ def test_what_a_trial_of_one_joint_path_does_not_find_is_not_said_to_be_impossib
     )
 
 
-def test_a_whole_search_that_finds_more_is_believed(task):
+def test_a_whole_search_that_finds_more_counts(task):
     """Quick trials stop at 0.5 m/s; with a whole search 0.6 m/s are possible."""
 
     def is_planned(changed, _, most):
@@ -109,7 +109,7 @@ def test_a_whole_search_that_finds_more_is_believed(task):
 
 
 @pytest.mark.parametrize("seconds", [0.0, 60.0])
-def test_a_number_that_was_not_verified_is_not_told(task, seconds):
+def test_the_hint_has_no_number_without_a_verified_plan(task, seconds):
     remedies = [
         Remedy("boundary.end_speed", 0.9, 0.5, "m/s"),
         Remedy("robot.payload.mass", 8.0, 4.0, "kg"),

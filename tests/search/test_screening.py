@@ -51,7 +51,7 @@ def guesses():
     return found[:12]
 
 
-def test_the_fastest_that_differ_are_kept(guesses):
+def test_the_fastest_that_differ_pass(guesses):
     kept = screening.screen(guesses, MOST, NEVER, quiet)
     assert 1 <= len(kept) <= MOST
     estimates = [guess.estimate for guess in kept]
@@ -82,7 +82,7 @@ def test_without_time_or_motion_guesses_are_kept_that_differ(guesses, monkeypatc
     assert [guess.origin for guess in without] == [guess.origin for guess in late]
 
 
-def test_few_guesses_are_improved_where_most_of_the_time_is_given(guesses, monkeypatch):
+def test_dwells_leave_few_guesses_to_improve(guesses, monkeypatch):
     tried = []
 
     def improve(guess: object, *_arguments: object) -> object:
@@ -120,12 +120,12 @@ def test_no_further_guess_is_looked_at_where_the_least_end_time_is_met_again(
 def test_the_best_of_a_coarse_search_are_searched_again(guesses, monkeypatch):
     searched = {COARSE.places: [], ROUGH.places: []}
 
-    def ranked(guess, _deadline, effort, _charts, _listener):
+    def rank(guess, _deadline, effort, _charts, _listener):
         searched[effort.places].append(guess.origin)
         number = [own.origin for own in guesses].index(guess.origin)
         return dataclasses.replace(guess, estimate=2.0 - 0.1 * number)
 
-    monkeypatch.setattr(screening, "improve_quickly", ranked)
+    monkeypatch.setattr(screening, "improve_quickly", rank)
     monkeypatch.setattr(screening, "is_same", lambda *_guesses: False)
     screening.screen(guesses, MOST, NEVER, quiet)
     origins = [guess.origin for guess in guesses]

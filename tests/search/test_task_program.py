@@ -115,7 +115,7 @@ def slsqp(program):
     )
 
 
-def test_solvers_agree_on_the_line_of_the_paper_and_more_points_make_it_verified():
+def test_solvers_agree_on_the_line_of_the_paper_and_more_points_pass_the_checks():
     program = line()
     answer = slsqp(program)
     assert answer.success
@@ -135,7 +135,7 @@ def test_solvers_agree_on_the_line_of_the_paper_and_more_points_make_it_verified
     assert answer.fun < trajectory.t_end < 1.01 * answer.fun
 
 
-def test_a_point_that_is_none_is_refused():
+def test_what_is_no_point_is_an_error():
     program = line()
     for x, words in [
         (np.ones(3), r"wrong shape.*\(3,\).*\(28,\)"),

@@ -68,7 +68,7 @@ def test_lattices_follow_quick_turns(case):
         assert np.abs(np.diff(found[0].q, axis=0)).max() <= 0.8
 
 
-def test_a_quick_turn_is_planned():
+def test_a_quick_turn_has_a_plan():
     assert brachis.plan(task(*TURNS[0]), intervals=12).verified
 
 

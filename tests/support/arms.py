@@ -67,7 +67,9 @@ class Arm:
         """Exchange the tool."""
         return replace(self, steps=(*self.steps[:-1], self.steps[-1] @ tool))
 
-    def changed(self, signs: Sequence[int], offsets: Sequence[float]) -> Arm:
+    def with_senses_and_zeros(
+        self, signs: Sequence[int], offsets: Sequence[float]
+    ) -> Arm:
         """Change the senses of the joints, and turn or move what follows a joint by an offset."""
         steps = list(self.steps)
         for i, offset in enumerate(offsets):
@@ -137,7 +139,9 @@ def on_random_rail(arm: Arm, seed: int) -> Robot:
     rng = np.random.default_rng(seed)
     arm = arm.with_slide(0, rng.normal(size=3))
     mount = placement(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=seed))
-    return arm.changed(rng.choice([-1, 1], 7), rng.uniform(-3.0, 3.0, 7)).robot(mount)
+    return arm.with_senses_and_zeros(
+        rng.choice([-1, 1], 7), rng.uniform(-3.0, 3.0, 7)
+    ).robot(mount)
 
 
 def rolling(arm: Arm) -> Robot:

@@ -11,7 +11,7 @@ from brachis.ik import Family, IKSolver, TriedDecomposition, find
 from brachis.robot import Robot, task_map_of
 
 
-def wrapped(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def wrap(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Differences, modulo 2 pi where `angles`."""
     return np.where(angles, np.remainder(delta + np.pi, 2.0 * np.pi) - np.pi, delta)
 
@@ -74,7 +74,7 @@ class Bench:
 
     def miss(self, postures: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """Largest distance from the target of every posture, by Pinocchio's forward kinematics."""
-        return np.abs(wrapped(self.space.values(postures) - targets, self.angles)).max(
+        return np.abs(wrap(self.space.values(postures) - targets, self.angles)).max(
             axis=1
         )
 
@@ -122,7 +122,7 @@ class Bench:
                 "margins are of the order of one"
             )
             own = np.argmax(margins[:, :, 0], axis=1)
-        back = wrapped(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
+        back = wrap(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
         slack = 1e-9 * scale / np.abs(determinant)
         assert np.all(np.abs(back).max(axis=1)[regular] < slack[regular]), (
             "the posture's own branch gives another posture"

@@ -7,7 +7,7 @@ import numpy as np
 from brachis.ik import ChainGeometry
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import task_map_of
-from support.closed_forms import check_margin_gradient, margins_of, wrapped
+from support.closed_forms import check_margin_gradient, margins_of, wrap
 
 
 class Bench:
@@ -53,7 +53,7 @@ class Bench:
     def distance(self, solved, q):
         """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
         joints = q[:, *[None] * (solved.ndim - 2), self.rest]
-        gap = np.abs(wrapped(solved - joints, self.turning)).max(axis=-1)
+        gap = np.abs(wrap(solved - joints, self.turning)).max(axis=-1)
         return np.where(np.isnan(gap), np.inf, gap)
 
     def check_answers(self, solved):
@@ -139,7 +139,7 @@ class Bench:
                 steps = np.diff(postures[:, branch][:, self.rest], axis=0)
                 inside = (margin[1:] > 0.15) & (margin[:-1] > 0.15)
                 assert (
-                    np.abs(wrapped(steps, self.turning))[inside].max(initial=0.0) < 0.2
+                    np.abs(wrap(steps, self.turning))[inside].max(initial=0.0) < 0.2
                 ), "the branch jumps"
                 followed += np.count_nonzero(inside)
             crossings = np.diff(np.sign(self.margins(q)[:, 0]), axis=0) != 0.0

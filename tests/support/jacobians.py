@@ -30,7 +30,7 @@ def differences_of(function, x, h) -> np.ndarray:
     return np.stack(columns, axis=-1)
 
 
-def told(phase, limit, x) -> np.ndarray:
+def comparable_rows(phase, limit, x) -> np.ndarray:
     """Rows whose differences tell: the direction of a tool that hardly moves turns within a step, and kinks bend."""
     state = phase.state(x)
     kind = limit.kind

@@ -33,7 +33,7 @@ PLANAR: dict[str, Any] = {
 """Planar arms: pattern, plane, rows of the task space, start posture and redundant joints."""
 
 
-def curved(
+def arc_path(
     robot: Robot, rows: Sequence[str], start: Any, angle_deg: float = 25.0
 ) -> list[dict[str, Any]]:
     """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""

@@ -124,7 +124,7 @@ def test_power_by_its_formula():
     assert least_time(robot) == pytest.approx(2.0 * half, rel=1e-3)
 
 
-def curved(p):
+def curve_with_derivatives(p):
     """A joint path with its derivatives."""
     q = np.column_stack([np.sin(2.0 * p), 0.3 * p**2])
     q_dp = np.column_stack([2.0 * np.cos(2.0 * p), 0.6 * p])
@@ -134,7 +134,7 @@ def curved(p):
 
 def test_the_parameter_does_not_matter():
     robot = gantry(acceleration=[3.0, 2.0], velocity=[1.0, 0.4])
-    q, q_dp, q_ddp = curved(P)
+    q, q_dp, q_ddp = curve_with_derivatives(P)
     exact = JointPath(P, P, q, q_dp, q_ddp)
     by_length, places = exact.by_length()
     np.testing.assert_array_equal(places, P)
@@ -149,11 +149,11 @@ def test_a_path_in_time_is_regular_by_its_length_where_it_rests():
     t = np.linspace(0.0, 1.0, 1001)
     part = 3.0 * t**2 - 2.0 * t**3
     rate = 6.0 * t * (1.0 - t)
-    q, q_dp, q_ddp = curved(part)
+    q, q_dp, q_ddp = curve_with_derivatives(part)
     qddot = q_dp * (6.0 - 12.0 * t)[:, None] + q_ddp * rate[:, None] ** 2
     path, _ = JointPath(t, part, q, q_dp * rate[:, None], qddot).by_length()
     robot = gantry(acceleration=[3.0, 2.0])
-    exact = JointPath(P, P, *curved(P))
+    exact = JointPath(P, P, *curve_with_derivatives(P))
     assert least_time(robot, path) == pytest.approx(least_time(robot, exact), rel=1e-4)
 
 

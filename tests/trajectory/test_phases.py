@@ -37,7 +37,7 @@ def random_splines(degree: int) -> list[PhaseSpline]:
 
 
 @pytest.mark.parametrize("degree", [2, 3, 5])
-def test_splines_are_split_as_they_were_joined(degree, motion):
+def test_a_split_gives_back_the_splines_before_their_join(degree, motion):
     splines = random_splines(degree)
     knots, points = join_splines(splines)
     ends = np.cumsum([spline.t_end for spline in splines])

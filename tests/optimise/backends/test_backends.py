@@ -26,7 +26,7 @@ from brachis.optimise.backends import (
     uno,
 )
 from brachis.optimise.backends.monitor import SolveMonitor
-from support.programs import bounded, corner, curved, disc, impossible
+from support.programs import corner, disc, impossible, nearest_in_disc, under_hyperbola
 from support.solvers import INSTALLED
 
 ROOT = Path(__file__).parents[3]
@@ -49,8 +49,8 @@ def solve(name, problem, x, options=OPTIONS, progress=None):
         (disc, [4.0, 0.5], [1.0, 1.0], [-0.25]),
         (disc, [9.0, 9.0], [1.0, 1.0], [-0.25]),
         (corner, [0.0, 0.0], [3.0, 1.0], [1.0 / 3.0, 2.0 / 3.0]),
-        (bounded, [1.0, 3.0], [4.0, 0.5], [0.25]),
-        (curved, [3.0, 0.5], [4.2, 2.6], [-0.75]),
+        (under_hyperbola, [1.0, 3.0], [4.0, 0.5], [0.25]),
+        (nearest_in_disc, [3.0, 0.5], [4.2, 2.6], [-0.75]),
     ],
 )
 def test_known_optima(name, make, start, optimum, multipliers):
@@ -86,7 +86,7 @@ def test_large_bounds_are_held_as_exactly_as_others(name):
 
 # At (2, 1) the objective stands still while the row comes true.
 def test_optimal_means_that_first_order_conditions_hold(name):
-    report = solve(name, bounded(), [1.0, 1.0])
+    report = solve(name, under_hyperbola(), [1.0, 1.0])
     if report.status is SolveStatus.OPTIMAL:
         np.testing.assert_allclose(report.x, [4.0, 0.5], atol=1e-4)
     else:
@@ -100,7 +100,7 @@ def test_start_is_not_overwritten(name):
 
 
 @pytest.mark.parametrize("edge", [0.99, 0.9])
-def test_backs_off_from_points_that_cannot_be_evaluated(name, edge):
+def test_backs_off_from_points_without_values(name, edge):
     refusals = 0
     for start in ([4.9, 1.2], [1.5, 1.3], [2.0, 2.6], [1.2, 1.05], [1.2, 0.3]):
         problem = disc(reachable=lambda x: x[0] > edge)
@@ -187,7 +187,7 @@ def test_what_a_problem_raises_comes_out(name, function, monkeypatch):
 
 # The objective is not the first variable here, as it is in a program of one phase.
 def test_progress_tells_iteration_and_objective(name):
-    problem, calls = bounded(), []
+    problem, calls = under_hyperbola(), []
     report = solve(name, problem, [1.0, 3.0], progress=lambda *call: calls.append(call))
     assert [iteration for iteration, _ in calls] == list(
         range(1, report.iterations + 1)
@@ -196,7 +196,7 @@ def test_progress_tells_iteration_and_objective(name):
 
 
 @pytest.mark.parametrize("make", [disc, impossible])
-def test_nothing_is_printed(name, make, capfd):
+def test_solvers_print_nothing(name, make, capfd):
     solve(name, make(), [4.0, 0.5])
     captured = capfd.readouterr()
     assert (captured.out, captured.err) == ("", "")
@@ -234,8 +234,8 @@ def test_registry(is_installed, interior, monkeypatch):
         (disc(), [-51.0, 1.0], 54.0**2 - 4.0),
         (disc(), [np.nan, 1.0], np.inf),
         (disc(reachable=lambda _x: False), [3.0, 1.0], np.inf),
-        (bounded(), [5.5, 1.0], 1.5),
-        (bounded(), [-2.0, -1.0], 2.0),
+        (under_hyperbola(), [5.5, 1.0], 1.5),
+        (under_hyperbola(), [-2.0, -1.0], 2.0),
     ],
 )
 def test_residual_is_the_worst_of_rows_and_bounds(problem, x, expected):
