@@ -269,7 +269,6 @@ def rows_of(bad):
         ({}, 1e300),
         (rows_of(np.nan), 4.0),
         (rows_of(np.inf), 4.0),
-        ({"row_slopes": lambda _x: np.array([[1.0, np.nan]])}, 4.0),
         ({"upper": np.array([np.nan])}, 4.0),
         ({"reachable": lambda _x: False}, 4.0),
     ],
@@ -280,6 +279,13 @@ def test_a_start_without_values_is_an_answer_without_iterations(name, changes, x
     assert not report.status.usable
     assert not report.violation <= 1e-5
     assert report.solver == name
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_slopes_that_are_not_finite_give_no_usable_answer(name, bad):
+    slopes = np.array([[1.0, bad]])
+    problem = dataclasses.replace(disc(), row_slopes=lambda _x: slopes)
+    assert not solve(name, problem, [4.0, 0.5]).status.usable
 
 
 PLAN = """
