@@ -25,14 +25,29 @@ MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 SLACK = 2e-4  # refinement may lengthen the time by its tolerance
 
 
-def plan(robot, rows, by, *, settings=None, intervals=20, rest="velocity", **spline):
-    spline |= {"intervals": intervals, "rest": rest}
-    task = {
-        key: spline.pop(key)
-        for key in ("boundary", "solver", "redundant_joints")
-        if key in spline
-    }
-    return plan_slides(robot, rows, by, settings=settings, spline=spline, **task)
+def plan(
+    robot,
+    rows,
+    by,
+    *,
+    settings=None,
+    intervals=20,
+    rest="velocity",
+    redundant_joints=(),
+    solver="auto",
+    boundary=None,
+    **spline,
+):
+    return plan_slides(
+        robot,
+        rows,
+        by,
+        settings=settings,
+        spline={"intervals": intervals, "rest": rest, **spline},
+        redundant_joints=list(redundant_joints),
+        solver={"name": solver},
+        boundary=boundary or {},
+    )
 
 
 def bang_bang(mass: float) -> float:
@@ -254,7 +269,7 @@ def test_two_slides_along_one_line_recoil_against_each_other():
         [LENGTH],
         redundant_joints=["j1"],
         settings=held,
-        solver={"name": "uno_interior"},
+        solver="uno_interior",
     )
     result = plan(urdf, ["x"], [LENGTH], redundant_joints=["j1"])
     assert result.verified

@@ -113,16 +113,6 @@ def test_a_given_speed_that_the_limits_do_not_allow(velocity, is_possible):
     assert np.isfinite(phase_plane.least_time(problem, s, q)) == is_possible
 
 
-def test_a_run_up_that_is_too_short():
-    """Over d the acceleration a leads to sqrt(2 a d)."""
-    largest = np.sqrt(2.0 * 3.0 * 0.1 * LENGTH)
-    for speed, is_possible in ((0.99 * largest, True), (1.01 * largest, False)):
-        content = {"tool_limits": {"process_speed": {"speed": speed, "s": [0.1, 0.6]}}}
-        problem, s, q = slide(content, acceleration=3.0)
-        run_up = phase_plane.fastest_times(problem, s, q)[0]
-        assert (run_up is not None) == is_possible
-
-
 def test_how_much_faster_a_motion_may_be():
     """Where it accelerates by a third of the limit, 3 ** 0.5; where it is at half its velocity limit, twice."""
     robot = gantry(acceleration=3.0, velocity=1.0)
