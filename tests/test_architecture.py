@@ -141,7 +141,7 @@ def function_name(call: ast.Call) -> str:
     return named.id if isinstance(named, ast.Name) else ""
 
 
-def modules_named(module: str) -> frozenset[str]:
+def modules_by_string(module: str) -> frozenset[str]:
     """Modules that a module imports by a string."""
     calls = [node for node in ast.walk(tree_of(module)) if isinstance(node, ast.Call)]
     importing = [call for call in calls if function_name(call) == "import_module"]
@@ -151,10 +151,10 @@ def modules_named(module: str) -> frozenset[str]:
 
 
 @cache
-def stages_imported(module: str, *, types: bool = False) -> frozenset[str]:
+def stages_of_imports(module: str, *, types: bool = False) -> frozenset[str]:
     """Stages of what a module imports; with types, what it imports for types alone or by a string too."""
     names = imports_of(module, types=types) | (
-        modules_named(module) if types else frozenset()
+        modules_by_string(module) if types else frozenset()
     )
     return frozenset(
         stage_of(name)
@@ -173,7 +173,7 @@ def test_no_stage_imports_one_to_its_right():
         f"{module} imports {stage}"
         for module in STAGED
         for stage in ORDER[ORDER.index(stage_of(module)) + 1 :]
-        if stage in stages_imported(module, types=True)
+        if stage in stages_of_imports(module, types=True)
     ] == []
 
 
@@ -186,7 +186,7 @@ def test_verification_shares_no_code_with_the_optimiser():
         waiting |= (
             set().union(
                 *(
-                    stages_imported(module)
+                    stages_of_imports(module)
                     for module in STAGED
                     if stage_of(module) == stage
                 )
@@ -211,7 +211,7 @@ def in_circles(graph: Mapping[str, AbstractSet[str]]) -> list[str]:
     return sorted(left)
 
 
-def test_circles_are_found():
+def test_in_circles_finds_circles():
     assert in_circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
     assert in_circles({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}) == [
         "b",
@@ -236,7 +236,7 @@ def test_every_kind_of_limit_is_checked_by_the_verification():
     assert set(brachis.limits.TABLE) <= checked
 
 
-def words_compared(tree: ast.Module) -> Iterator[tuple[int, object]]:
+def compared_words(tree: ast.Module) -> Iterator[tuple[int, object]]:
     """Lines and constants that are compared with something, or are among what something is looked for in."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Compare):
@@ -259,7 +259,7 @@ def test_nobody_asks_for_a_kind_of_limit():
     kinds = {
         name for kind in brachis.limits.TABLE for name in (kind, kind.replace("_", " "))
     }
-    assert (1, "torque") in words_compared(
+    assert (1, "torque") in compared_words(
         ast.parse("limit.kind in ('jerk', 'torque')")
     )
     assert [
@@ -268,12 +268,12 @@ def test_nobody_asks_for_a_kind_of_limit():
         if not path.relative_to(SOURCE)
         .as_posix()
         .startswith(tuple(f"{folder}/" for folder in MAY_NAME_KINDS))
-        for line, word in words_compared(tree_of(module))
+        for line, word in compared_words(tree_of(module))
         if word in kinds
     ] == []
 
 
-def test_heavy_libraries_are_imported_where_used():
+def test_no_module_imports_a_heavy_library_at_its_top():
     assert [
         f"{module} imports {name}"
         for module in FILES

@@ -79,7 +79,7 @@ def motion():
         ),
     ],
 )
-def test_what_is_asked_for_is_named(make, told):
+def test_wrong_arguments_have_a_message_with_the_right_ones(make, told):
     with pytest.raises(InputError, match=told):
         make()
 
@@ -120,7 +120,7 @@ def test_what_is_asked_for_is_named(make, told):
         ),
     ],
 )
-def test_the_form_of_a_key_is_named(keywords, told):
+def test_the_message_has_the_form_of_a_key(keywords, told):
     with pytest.raises(InputError) as found:
         brachis.plan(brachis.examples.scara_line, **keywords)
     assert told in str(found.value)

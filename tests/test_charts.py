@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ from scipy.linalg import null_space
 import brachis
 from brachis.errors import (
     DecompositionError,
-    InputError,
     ResultFileError,
     StartError,
 )
@@ -23,16 +21,12 @@ from brachis.robot import task_map_of
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 from support.charts import jacobian
+from support.scara import START, scara
 
 ROOT = Path(__file__).parents[1]
-START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 
 
 def scara_line(angle: float, **changes: Any) -> brachis.Result:
-    limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    robot = brachis.Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
-    )
     task = {
         "brachis": 1,
         "start": {"joints": START},
@@ -40,7 +34,7 @@ def scara_line(angle: float, **changes: Any) -> brachis.Result:
         "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
         "spline": {"degree": 3, "intervals": 20, "rest": "full"},
     }
-    return brachis.plan(robot, task | changes)
+    return brachis.plan(scara(), task | changes)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +43,7 @@ def result():
 
 
 @pytest.fixture
-def saved(result, tmp_path):
+def saved_file(result, tmp_path):
     path = tmp_path / "result.npz"
     result.trajectory.save(path)
     return path
@@ -69,32 +63,8 @@ def test_the_best_choice_of_joints_is_no_faster(result):
     assert result.t_end <= other.t_end * 1.0005
 
 
-def test_an_arm_without_a_closed_form():
-    robot = brachis.Robot.from_urdf(ROOT / "robots/gen3/robot.urdf")
-    start = [0.2, 0.5, 0.1, 1.4, 0.1, 1.0, 0.3]
-    task = {
-        "brachis": 1,
-        "start": {"joints": start},
-        "task_space": "pose",
-        "path": [{"line": {"by": [0.0, 0.15, 0.05]}}],
-        "spline": {"intervals": 10},
-    }
-    result = brachis.plan(robot, task)
-    assert result.verified
-    assert result.trajectory.branch == "chart"
-    begin, end = (
-        robot.tool_placement(q)
-        for q in result.trajectory.position(np.array([0.0, result.t_end]))
-    )
-    np.testing.assert_allclose(
-        end.translation - begin.translation, [0.0, 0.15, 0.05], atol=1e-9
-    )
-    np.testing.assert_allclose(end.rotation, begin.rotation, atol=1e-9)
-    np.testing.assert_allclose(result.trajectory.position(0.0), start, atol=1e-9)
-
-
 @pytest.mark.parametrize("redundant", ["auto", ["j1"]])
-def test_an_end_posture_may_be_rounded(result, redundant):
+def test_an_end_posture_may_have_few_digits(result, redundant):
     """The motion ends at the posture on the path that is nearest to the given one, and is held to that."""
     exact = result.trajectory.position(result.t_end)
     end = np.round(exact, 7)
@@ -116,8 +86,8 @@ def test_an_end_posture_may_be_rounded(result, redundant):
     assert [check.name for check in checks if not check.passed] == ["end posture"]
 
 
-def test_a_saved_motion_is_loaded_and_verified(result, saved):
-    loaded = Trajectory.load(saved)
+def test_a_saved_motion_passes_its_checks_again(result, saved_file):
+    loaded = Trajectory.load(saved_file)
     assert loaded.branch == "chart"
     assert loaded.redundant_joints == result.trajectory.redundant_joints
     np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
@@ -133,24 +103,6 @@ def test_a_saved_motion_is_loaded_and_verified(result, saved):
     np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
 
 
-def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(
-    result, saved
-):
-    fresh = brachis.bottleneck.report(result)
-    report = brachis.bottleneck.report(Trajectory.load(saved), check=True)
-    assert report.sensitivities.reliable
-    large = [entry for entry in report.check.entries if entry.predicted < -1e-4]
-    assert len(large) >= 2
-    for entry in large:
-        assert entry.optimal
-        assert entry.predicted == pytest.approx(entry.re_solved, rel=0.05)
-    for entry in fresh.sensitivities.limits:
-        other = report.sensitivities.of(
-            entry.label.subject, entry.label.kind, entry.side
-        )
-        assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-2, abs=1e-5)
-
-
 def with_arrays(path: Path, **changed: Any) -> None:
     with np.load(path) as archive:
         arrays = dict(archive)
@@ -164,31 +116,17 @@ def with_arrays(path: Path, **changed: Any) -> None:
 BROKEN = {
     "rows NaN": {"chart_rows": lambda a: a * np.nan},
     "rows of fewer joints": {"chart_rows": lambda a: a[:, :, 1:]},
-    "rows flat": {"chart_rows": lambda a: a.ravel()},
     "rows a number": {"chart_rows": np.array(3.0)},
-    "rows text": {"chart_rows": np.array([[["a", "b", "c", "d"]]])},
-    "rows complex": {"chart_rows": lambda a: a + 1j},
     "more rows": {"chart_rows": lambda a: np.repeat(a, 2, axis=1)},
-    "no rows": {"chart_rows": lambda a: a[:0]},
     "several rows without knots": {"chart_rows": lambda a: np.repeat(a, 8, axis=0)},
     "knots of constant rows": {"chart_knots": np.linspace(0.0, 1.0, 7)},
     "knots without rows": {
         "chart_rows": np.empty((0, 0, 0)),
         "chart_knots": np.linspace(0.0, 1.0, 7),
     },
-    "knots a number": {"chart_knots": np.array(0.5)},
-    "knots text": {"chart_knots": np.array(["a", "b"])},
     "knots descending": {
         "chart_rows": lambda a: np.repeat(a, 8, axis=0),
         "chart_knots": np.linspace(1.0, 0.0, 14),
-    },
-    "knots infinite": {
-        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
-        "chart_knots": np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(5), [np.inf]]),
-    },
-    "splines with knots of text": {
-        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
-        "chart_knots": np.array(["a"] * 14),
     },
     "knots all the same": {
         "chart_rows": lambda a: np.repeat(a, 8, axis=0),
@@ -198,20 +136,22 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_broken_chart_is_refused(case, saved):
-    with_arrays(saved, **BROKEN[case])
+def test_a_broken_chart_is_an_error(case, saved_file):
+    with_arrays(saved_file, **BROKEN[case])
     with pytest.raises(
         ResultFileError, match=r"the result file is broken|not a brachis result"
     ) as caught:
-        Trajectory.load(saved)
-    assert caught.value.where == str(saved)
+        Trajectory.load(saved_file)
+    assert caught.value.where == str(saved_file)
 
 
-def test_a_chart_that_is_not_broken_is_read(saved):
+def test_a_chart_that_is_not_broken_is_read(saved_file):
     """The same rows as splines."""
     knots = np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(6)])
-    with_arrays(saved, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots)
-    assert len(Trajectory.load(saved).chart_knots) == 14
+    with_arrays(
+        saved_file, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots
+    )
+    assert len(Trajectory.load(saved_file).chart_knots) == 14
 
 
 @pytest.mark.parametrize(
@@ -221,7 +161,7 @@ def test_a_chart_that_is_not_broken_is_read(saved):
         ("gen3", [0.0] * 7, "pose", [0.0, 0.1, -0.1]),
     ],
 )
-def test_a_singular_start_is_refused(urdf, start, space, line):
+def test_a_singular_start_is_an_error(urdf, start, space, line):
     task = {
         "brachis": 1,
         "start": {"joints": start},
@@ -230,18 +170,6 @@ def test_a_singular_start_is_refused(urdf, start, space, line):
     }
     with pytest.raises(StartError, match="singular"):
         brachis.plan(ROOT / "robots" / urdf / "robot.urdf", task)
-
-
-def test_directions_that_the_arm_lacks_are_refused():
-    line = {"line": {"by": [-0.1, 0.1, 0.0]}}
-    task = {
-        "brachis": 1,
-        "start": {"joints": [0.2, 0.6, 0.4]},
-        "task_space": "position",
-        "path": [line],
-    }
-    with pytest.raises(InputError, match="no joint changes z of the tool"):
-        brachis.plan(ROOT / "robots" / "scara3/robot.urdf", task)
 
 
 def test_numeric_guesses_need_a_closed_form():

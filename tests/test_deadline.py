@@ -17,7 +17,7 @@ def clock(monkeypatch):
     return now
 
 
-def test_the_time_that_is_left(clock):
+def test_the_time_to_a_deadline(clock):
     deadline = Deadline.after(10.0)
     assert (deadline.at, deadline.left, deadline.passed) == (110.0, 10.0, False)
     clock[0] = 111.0

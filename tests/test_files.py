@@ -83,7 +83,7 @@ def test_what_the_system_refuses_is_not_written(name, tmp_path):
     assert not is_folder(tmp_path / name)
 
 
-def test_what_would_not_end_is_refused(endless):
+def test_what_would_not_end_is_an_error(endless):
     path, words = endless
     with pytest.raises(OSError) as caught:  # noqa: PT011  (its text is what is looked at)
         read_file(path)
@@ -99,7 +99,7 @@ def test_a_file_without_a_size_is_read_so_far_and_no_farther():
         read_file("/proc/self/status", largest=10)
 
 
-def test_nothing_stays_open_when_a_file_is_refused(tmp_path):
+def test_nothing_stays_open_after_a_refusal(tmp_path):
     before = os.dup(0)
     os.close(before)
     for _ in range(3):

@@ -128,14 +128,6 @@ def test_segments_are_those_of_the_task_file():
         brachis.Spline(through=np.stack([pose.homogeneous for pose in poses]))
         == joined[-1]
     )
-    assert (
-        brachis.load_task(
-            {**content, "path": joined[0].model_copy(update={"blend": None})}
-        )
-        .path[0]
-        .kind
-        == "line"
-    )
 
 
 @pytest.mark.parametrize(
@@ -149,7 +141,7 @@ def test_segments_are_those_of_the_task_file():
         (lambda: brachis.Spline(through=[pin.SE3.Identity(), 3.0]), ["spline.through"]),
     ],
 )
-def test_wrong_segments_are_refused(make, parts):
+def test_wrong_segments_are_errors(make, parts):
     with pytest.raises(TaskError) as caught:
         make()
     assert all(part in str(caught.value) for part in parts), str(caught.value)
@@ -187,23 +179,6 @@ def test_a_robot_whose_tool_rolls_may_have_other_limits():
     assert changed.tool_joints
     assert changed.limits.velocity.tolist() == [1.0] * 7 + [np.inf]
     assert not robot.with_payload(1.0).tool_joints
-
-
-def test_a_payload_is_carried():
-    robot = brachis.robots.scara3
-    heavy = robot.with_payload(1.5, com=(0.0, 0.0, 0.1)).with_limits(velocity=3.0)
-    assert (
-        sum(body.mass for body in heavy.model.inertias)
-        - sum(body.mass for body in robot.model.inertias)
-        == 1.5
-    )
-    assert heavy.with_payload(None).settings.payload is None
-    given = brachis.plan(heavy, **LINE)
-    same = brachis.plan(
-        robot, **LINE, payload=heavy.settings.payload, limits={"velocity": 3.0}
-    )
-    assert given.t_end == pytest.approx(same.t_end, rel=1e-6)
-    assert given.t_end > brachis.plan(robot, **LINE, limits={"velocity": 3.0}).t_end
 
 
 def test_samples_carry_the_tool():
@@ -248,16 +223,6 @@ def test_many_plans_keep_their_order_and_failures_are_values():
         brachis.plan("scara3", **LINE).t_end, rel=1e-9
     )
     assert outcomes[2].bottleneck().sensitivities.limits
-
-
-def test_one_task_is_no_list_of_tasks():
-    for one in (
-        brachis.examples.scara_line,
-        str(brachis.examples.scara_line),
-        {"brachis": 1},
-    ):
-        with pytest.raises(InputError, match="a list of tasks"):
-            brachis.plan_many(one)
 
 
 def test_a_line_tells_of_many_plans(capsys):

@@ -50,33 +50,6 @@ def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(
         assert given is None or np.allclose(given, own, rtol=0.0, atol=1e-9)
 
 
-def test_the_same_arguments_make_the_same_task(bench, tmp_path):
-    make = bench("mixed_cases").case
-    first, again = (
-        make("tx90l_rail", 3, 5, tmp_path / folder).task for folder in ("one", "two")
-    )
-    assert first.read_bytes() == again.read_bytes()
-    assert (
-        first.with_suffix(".csv").read_bytes() == again.with_suffix(".csv").read_bytes()
-    )
-
-
-def test_a_comparison_tells_what_became_faster_and_what_was_lost(bench, capsys):
-    before = [
-        {"task": name, "verified": True, "t_end": 2.0, "seconds": 8.0, "cpu": 4.0}
-        for name in ("a", "b")
-    ]
-    after = [
-        {**before[0], "t_end": 1.0, "cpu": 1.0},
-        {**before[1], "verified": False, "t_end": None},
-    ]
-    bench("mixed_tasks").compare(before, after)
-    said = capsys.readouterr().out
-    assert "a: t_end times 0.5000" in said
-    assert "plan times times 1.000 on average, processor times 0.500" in said
-    assert "before and not now: b" in said
-
-
 @pytest.mark.parametrize(("robot", "number"), [("tx90l_rail", 1), ("planar4", 1)])
 def test_derivatives_of_the_plain_transcription(bench, robot, number, folder):
     case = bench("mixed_cases").case(robot, 0, number, folder)

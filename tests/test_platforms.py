@@ -29,7 +29,7 @@ def test_ipopt_is_needed_by_an_extra_alone():
     assert [*platforms.requirements("all")].count(*platforms.requirements("ipopt")) == 1
 
 
-def test_the_pages_name_the_platforms_that_are_resolved():
+def test_the_pages_name_the_platforms_of_the_requirements():
     for page in ("README.md", "docs/quick_start.md"):
         text = (ROOT / page).read_text()
         for system, _, machine in platforms.PLATFORMS.values():

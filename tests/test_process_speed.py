@@ -49,7 +49,7 @@ def fastest(speed: float) -> float:
     return ways + (END - BEGIN) * LENGTH / speed
 
 
-def sampled(trajectory):
+def speeds_along(trajectory):
     """s and the tool's speed by differences, at 5,000 times."""
     t = np.linspace(0.0, trajectory.t_end, 5_001)
     motion = trajectory.at(t)
@@ -59,14 +59,14 @@ def sampled(trajectory):
 
 def test_the_speed_is_met_and_reached_and_left_fast():
     free = brachis.plan(task())
-    s, speed = sampled(free.trajectory)
+    s, speed = speeds_along(free.trajectory)
     assert speed[(s > BEGIN) & (s < END)].min() > 2.0 * SPEED, (
         "without it the tool is much faster"
     )
     result = brachis.plan(task(PART))
     assert result.verified
     assert result.t_end > 1.2 * free.t_end
-    s, speed = sampled(result.trajectory)
+    s, speed = speeds_along(result.trajectory)
     inside = (s > BEGIN + 1e-3) & (s < END - 1e-3)
     np.testing.assert_allclose(speed[inside], SPEED, rtol=1e-8)
     assert speed[s < 0.9 * BEGIN].max() > 1.4 * SPEED, (
@@ -132,17 +132,6 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     assert is_held.sum() * step > 0.5 * 0.5 / speed
     (check,) = (c for c in result.verification.checks if c.name == "process speed")
     assert check.passed
-
-
-def test_two_parts():
-    parts = [{"speed": 0.5, "s": [0.2, 0.35]}, {"speed": 0.8, "s": [0.6, 0.8]}]
-    result = brachis.plan(task(parts))
-    assert result.verified
-    s, speed = sampled(result.trajectory)
-    for part in parts:
-        begin, end = part["s"]
-        inside = (s > begin + 1e-3) & (s < end - 1e-3)
-        np.testing.assert_allclose(speed[inside], part["speed"], rtol=1e-8)
 
 
 def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():

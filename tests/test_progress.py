@@ -53,7 +53,7 @@ def test_progress_is_a_line_for_every_stage_where_there_is_no_terminal(capsys):
     assert len(heard) > len(lines) > 2
 
 
-def test_on_a_terminal_the_line_is_wiped(monkeypatch, capsys):
+def test_on_a_terminal_the_line_is_blank_at_last(monkeypatch, capsys):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with pytest.raises(brachis.PlanningError):
         brachis.plan(

@@ -79,17 +79,6 @@ def test_a_periodic_motion_may_stop():
     assert first + last == pytest.approx(from_rest(0.4), rel=2e-3)
 
 
-def test_a_file_with_corners(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    first = np.linspace([0.0, 0.0], [500.0, 0.0], 41)
-    rows = np.concatenate([first, first[-1] + np.linspace([0, 5], [0, 300], 30)])
-    np.savetxt("seam.csv", rows, header="x_mm,y_mm", delimiter=",", comments="")
-    csv = {"file": "seam.csv", "corner": "stop", "relative": True}
-    result = brachis.plan(task([{"csv": csv}]))
-    assert result.verified
-    assert result.trajectory.phase_ends[0] == pytest.approx(from_rest(0.5), rel=2e-3)
-
-
 def test_a_tool_turns_on_the_spot_between_lines():
     given = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     line = {"line": {"by": [0.0, 0.4, 0.0]}}

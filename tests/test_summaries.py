@@ -94,7 +94,7 @@ def test_notebooks_show_a_figure_beside_a_table_and_figures_as_pictures(result):
         ("x" * 500 + "\n", "x" * 84 + "... (501 characters)"),
     ],
 )
-def test_values_are_shortened(value, text):
+def test_long_values_have_short_texts(value, text):
     assert show_value(value) == text
 
 
@@ -114,7 +114,7 @@ def test_a_table_has_the_samples(result):
     )
 
 
-def test_a_missing_pandas_is_said(result, monkeypatch):
+def test_the_message_says_that_pandas_is_missing(result, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
     with pytest.raises(brachis.errors.NotInstalledError, match=r"whl\[pandas\]"):
         result.to_dataframe(0.1)

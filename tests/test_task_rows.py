@@ -7,8 +7,7 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import DecompositionError, TaskError
-from brachis.ik import default_task_space, find, find_all
+from brachis.ik import default_task_space, find_all
 from brachis.path import build_path
 from brachis.robot import Robot, bind, task_map_of
 from brachis.task import load_task
@@ -135,25 +134,6 @@ def test_closed_forms(word, rows, family):
     robot = chain(word)
     found = find_all(robot, task_map_of(robot, rows))
     assert {choice.family for choice in found} == {family}
-
-
-@pytest.mark.parametrize(
-    ("redundant", "exists"), [("j1", True), ("j2", True), ("j3", False), ("j4", True)]
-)
-def test_positions_of_a_scara_with_a_redundant_joint(redundant, exists):
-    robot = chain(SCARA)
-    task_map = task_map_of(robot, ["x", "y", "z"])
-    if not exists:
-        with pytest.raises(DecompositionError, match="z needs one slide"):
-            find(robot, task_map, [redundant])
-        return
-    solver = find(robot, task_map, [redundant]).solver
-    q = np.random.default_rng(1).uniform(-1.4, 1.4, (50, 4))
-    held = robot.joint_names.index(redundant)
-    answers = solver.solve(task_map.values(q), q[:, [held]])[:, :, 0]
-    free = [i for i in range(4) if i != held]
-    gaps = np.abs(answers - q[:, None, free]).max(axis=2)
-    assert np.nanmin(gaps, axis=1).max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -295,26 +275,13 @@ TURN = [{"turn": ABOUT_Y}]
         ("ZYZ", "axis", [{"line": {"by": [0.1]}}], ["not in the task space", "turn: {rotate"]),
     ],
 )  # fmt: skip
-def test_rows_that_are_refused(word, space, path, texts):
+def test_rows_that_are_errors(word, space, path, texts):
     robot = chain(word)
     path = path or [{"line": {"by": [0.1] * len(space)}}]
     with pytest.raises(brachis.BrachisError) as caught:
         plan(robot, [0.3] * robot.n, space, path)
     for text in texts:
         assert text in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ["position", "orientation"])
-def test_tolerances_are_refused_where_they_do_not_apply(name):
-    tolerances = {"position": {"sphere": 0.001}, "orientation": {"tilt": 3.0}}
-    with pytest.raises(TaskError, match=f"tolerances.{name}"):
-        plan(
-            chain(SCARA),
-            [0.3, 1.2, 0.1, 0.2],
-            YAWING,
-            [{"line": {"by": [0.1, 0.0, 0.0, 0.0]}}],
-            tolerances={name: tolerances[name]},
-        )
 
 
 def test_rows_with_the_axis_have_one_name():

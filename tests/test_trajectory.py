@@ -107,7 +107,7 @@ def test_positions_say_what_they_can_and_no_more(length):
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e-4])
-def test_very_short_lines_are_verified(length):
+def test_very_short_lines_pass_their_checks(length):
     result = plan(task_of_length(length))
     assert result.t_end < 0.06
     assert result.verified, [
@@ -145,22 +145,6 @@ def test_headers_of_arrays_that_are_broken(header, trajectory, tmp_path):
             archive.writestr(name, member)
     with pytest.raises(ResultFileError, match="not a brachis result"):
         Trajectory.load(path)
-
-
-def test_numbers_and_arrays_of_times(trajectory):
-    t = np.linspace(0.0, trajectory.t_end, 7)
-    for curve in (
-        trajectory.position,
-        trajectory.velocity,
-        trajectory.acceleration,
-        trajectory.torque,
-    ):
-        assert curve(t).shape == (7, 3)
-        assert curve(float(t[3])).shape == (3,)
-        np.testing.assert_allclose(
-            curve(t)[3], curve(float(t[3])), rtol=1e-12, atol=1e-12
-        )
-    assert trajectory.path_coordinate(t).shape == (7,)
 
 
 def test_samples(trajectory):
@@ -231,7 +215,7 @@ def test_unusable_period(dt, trajectory):
 @pytest.mark.parametrize(
     "curve", ["position", "velocity", "acceleration", "torque", "path_coordinate", "at"]
 )
-def test_times_outside_are_refused(curve, beyond, trajectory):
+def test_times_outside_are_errors(curve, beyond, trajectory):
     t = np.array([0.1, beyond if beyond < 0.0 else trajectory.t_end + beyond])
     with pytest.raises(
         InputError, match="the time is outside the trajectory"
@@ -281,6 +265,9 @@ def test_round_trip(trajectory, tmp_path):
         elif field.name != "robot":
             assert one == other, field.name
     assert again.joint_names == trajectory.joint_names
+    for name in ("torque", "velocity"):
+        limits = (getattr(own.robot.limits, name) for own in (again, trajectory))
+        np.testing.assert_array_equal(*limits)
     t = np.linspace(0.0, trajectory.t_end, 50)
     np.testing.assert_allclose(
         trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12
@@ -304,24 +291,14 @@ def put(place, value):
 BROKEN = {
     "meta missing": ({"meta": None}, "meta"),
     "meta not JSON": ({"meta": np.array("{")}, "not a brachis result"),
-    "meta a list": ({"meta": np.array("[1]")}, "not a mapping"),
-    "meta an array": ({"meta": np.zeros(3)}, "not a brachis result"),
     "other schema": ({"schema": 99}, "unknown schema version; found 99; allowed: 4"),
     "the schema before this one": (
         {"schema": 3, "phase_ends": None},
         "unknown schema version; found 3; allowed: 4. Plan again, or load the file with the release that wrote it",
     ),
-    "no schema": ({"schema": None}, "unknown schema version"),
     "array missing": ({"qddot": None}, "qddot"),
     "degree a string": ({"degree": "3"}, "degree: wrong type; found '3' (a string)"),
-    "degree a fraction": ({"degree": 3.5}, "degree: wrong type; found 3.5"),
-    "degree a truth value": (
-        {"degree": True},
-        "degree: wrong type; found true (a boolean)",
-    ),
     "degree zero": ({"degree": 0}, "knots of a spline of degree 0"),
-    "degree negative": ({"degree": -2}, "knots of a spline of degree -2"),
-    "degree of other knots": ({"degree": 4}, "knots of a spline of degree 4"),
     "degree huge": ({"degree": 10**9}, "knots of a spline"),
     "urdf missing": ({"urdf": None}, "urdf: wrong type"),
     "urdf broken": ({"urdf": "<robot"}, "not well-formed XML"),
@@ -330,10 +307,6 @@ BROKEN = {
         "joint_names: the joints are not those",
     ),
     "task missing": ({"task": None}, "task: wrong type"),
-    "task the name of a file": (
-        {"task": "task.yaml"},
-        "task: wrong type; found 'task.yaml' (a string)",
-    ),
     "task wrong": ({"task__spline__degree": "three"}, "spline.degree"),
     "task of another robot": ({"task__start__joints": [0.1, 0.2]}, "task.start.joints"),
     "task space that there is not": ({"task__task_space": ["x", "w"]}, "task_space"),
@@ -342,33 +315,19 @@ BROKEN = {
         {"redundant_joints": ["j9"]},
         "redundant_joints: unknown joints",
     ),
-    "redundant joint a number": (
-        {"redundant_joints": [3]},
-        "redundant_joints[0]: wrong type; found 3",
-    ),
     "more redundant joints": (
         {"redundant_joints": ["j1", "j3"]},
         "control_points: wrong shape",
     ),
     "branch a number": ({"branch": 1}, "branch: wrong type"),
     "times descending": ({"times": lambda a: a[::-1]}, "times: not times"),
-    "times equal": ({"times": put(3, 0.0)}, "times: not times"),
-    "times from elsewhere": ({"times": lambda a: a + 1.0}, "times: not times"),
     "times NaN": ({"times": put(3, np.nan)}, "times: some numbers are not finite"),
-    "times a matrix": ({"times": lambda a: a[None]}, "times: not times"),
-    "times a number": ({"times": np.array(1.0)}, "times: not times"),
     "one time": ({"times": np.zeros(1)}, "times: not times"),
-    "times words": (
-        {"times": np.array(["a", "b"])},
-        "times: some numbers are not finite",
-    ),
     "times objects": (
         {"times": np.array([None, {}], dtype=object)},
         "not a brachis result",
     ),
     "knots descending": ({"knots": lambda a: a[::-1]}, "knots: not the knots"),
-    "knots infinite": ({"knots": put(5, np.inf)}, "knots: some numbers are not finite"),
-    "knots beyond one": ({"knots": lambda a: 2.0 * a}, "knots: not the knots"),
     "times too close": ({"times": put(1, 1e-14)}, "times: not times"),
     "knots too close": (
         {"knots": lambda a: np.sort(put(5, a[4] + 1e-14)(a))},
@@ -386,26 +345,10 @@ BROKEN = {
         {"phase_ends": lambda a: 0.5 * a},
         "phase_ends: not the ends of the phases",
     ),
-    "more phases than knots": (
-        {"phase_ends": lambda a: np.append(0.5 * a, a)},
-        "phase_ends: not the ends of the phases",
-    ),
-    "no phase": (
-        {"phase_ends": np.zeros(0)},
-        "phase_ends: not the ends of the phases",
-    ),
-    "no knots": ({"knots": np.zeros(0)}, "knots: not the knots"),
     "q of fewer nodes": ({"q": lambda a: a[1:]}, "q: wrong shape"),
-    "q of fewer joints": ({"qdot": lambda a: a[:, 1:]}, "qdot: wrong shape"),
-    "q flat": ({"qddot_before": lambda a: a.ravel()}, "qddot_before: wrong shape"),
     "q complex": ({"q": lambda a: a + 1j}, "q: some numbers are not finite"),
-    "q NaN": ({"q": put((3, 1), np.nan)}, "q: some numbers are not finite"),
     "fewer control points": (
         {"control_points": lambda a: a[:, 1:]},
-        "control_points: wrong shape",
-    ),
-    "fewer splines": (
-        {"control_points": lambda a: a[:1]},
         "control_points: wrong shape",
     ),
     "control points infinite": (
@@ -432,7 +375,7 @@ def cut(path):
     path.write_bytes(path.read_bytes()[:-100])
 
 
-def flipped(path):
+def flip_a_byte(path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(bytes(content))
@@ -461,7 +404,7 @@ def blown_up(path):
 
 BROKEN_FILES = [
     cut,
-    flipped,
+    flip_a_byte,
     single_array,
     zip_of_text,
     member_that_is_no_array,
@@ -478,18 +421,6 @@ def test_file_of_another_kind(spoil, trajectory, tmp_path):
     with pytest.raises(ResultFileError, match="not a brachis result") as caught:
         Trajectory.load(path)
     assert caught.value.where == str(path)
-
-
-def test_an_archive_that_numpy_does_not_write(trajectory, tmp_path):
-    path = tmp_path / "result.npz"
-    trajectory.save(path)
-    with zipfile.ZipFile(path) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
-        for name, member in members.items():
-            archive.writestr(name, member)
-    with pytest.raises(ResultFileError, match="an archive that NumPy does not write"):
-        Trajectory.load(path)
 
 
 def test_a_fault_of_our_own_is_not_taken_for_a_broken_file(

@@ -12,7 +12,6 @@ import yaml
 
 import brachis
 from brachis.apps import bottleneck
-from brachis.apps.compose import Rail, on_rail
 from brachis.apps.export import write
 from brachis.apps.plots import PLOTS
 from brachis.apps.plots.panels import joint_rows_of
@@ -70,7 +69,7 @@ def result():
 
 
 @pytest.fixture
-def saved(result, tmp_path):
+def saved_file(result, tmp_path):
     result.trajectory.save(tmp_path / "result.npz")
     return tmp_path / "result.npz"
 
@@ -90,9 +89,9 @@ def test_masses_change_nothing_where_nothing_needs_them(result, text, limits):
     assert other.t_end == pytest.approx(result.t_end, rel=1e-12)
 
 
-def test_the_motion_is_verified_without_torques(result, saved):
+def test_the_motion_is_verified_without_torques(result, saved_file):
     assert result.verified
-    again = brachis.verify_trajectory(brachis.Trajectory.load(saved))
+    again = brachis.verify_trajectory(brachis.Trajectory.load(saved_file))
     assert again.passed
     names = [check.name for check in again.checks]
     assert "acceleration jump" in names
@@ -128,7 +127,7 @@ def test_figures_without_torques(result, kind):
     assert not [ax for ax in figure.axes if "tau" in ax.get_ylabel()]
 
 
-def test_the_figure_of_torques_is_refused(result):
+def test_the_figure_of_torques_is_an_error(result):
     with pytest.raises(UrdfError, match=r"Add the masses to the URDF"):
         PLOTS["torques"](result.trajectory)
 
@@ -195,7 +194,7 @@ def test_an_effort_of_the_urdf_asks_for_masses():
     assert robot_of(six_axes(effort=50.0), limits=free).n == 6
 
 
-def test_one_body_without_mass_is_named():
+def test_one_body_without_mass_is_in_the_message():
     robot = robot_of(six_axes(GRAM, bare="l6 tool0"))
     assert not robot.has_masses
     with pytest.raises(
@@ -211,7 +210,7 @@ def test_a_missing_limit_is_said_for_all_joints():
     assert "found none for a2, a4, a5, a6" in str(caught.value)
 
 
-def test_an_effort_of_0_is_not_stated():
+def test_an_effort_of_0_is_no_limit():
     robot = robot_of(six_axes(GRAM))
     assert np.isinf(robot.limits.torque).all()
     said = brachis.robot.from_task.in_use(robot)
@@ -249,7 +248,7 @@ class BoundTorqueShare(brachis.limits.Limit):
         return brachis.limits.Partials(*(each[:, :1] for each in exact))
 
 
-def test_a_limit_of_a_user_that_needs_torques_is_refused():
+def test_a_limit_of_a_user_that_needs_torques_is_an_error():
     with pytest.raises(InputError, match="no masses, which are needed for torques"):
         brachis.plan(robot_of(six_axes()), TASK, own_limits=[TorqueShare()])
 
@@ -266,34 +265,6 @@ def test_the_commands(tmp_path, capsys):
     limits = yaml.safe_load(starter.text)["robot"]["limits"]
     assert set(limits["torque"].values()) == {None}
     assert set(limits["acceleration"].values()) == {1.0}
-
-
-def test_an_arm_without_masses_on_a_rail(tmp_path):
-    (tmp_path / "arm.urdf").write_text(six_axes())
-    rail = Rail(range=(-2.0, 2.0), velocity=2.0, force=1500.0, mass=50.0)
-    text = on_rail(tmp_path / "arm.urdf", rail)
-    with pytest.raises(
-        UrdfError, match=r"robot\.limits\.torque\.rail; found .* moved by a1"
-    ):
-        robot_of(text)
-    robot = robot_of(text, limits={"torque": None, "acceleration": 8.0})
-    assert robot.n == 7
-
-
-@pytest.mark.parametrize("angle", [20.0, -20.0])
-def test_a_joint_without_range_may_have_turned_three_times(angle, recwarn):
-    text = """<robot name='c'><link name='base'/><link name='l1'/><link name='l2'/><link name='tool0'/>
-        <joint name='a1' type='continuous'><parent link='base'/><child link='l1'/><axis xyz='0 0 1'/>
-        <limit effort='0' velocity='2.6'/></joint>
-        <joint name='a2' type='continuous'><origin xyz='0.5 0 0'/><parent link='l1'/><child link='l2'/>
-        <axis xyz='0 0 1'/><limit effort='0' velocity='2.6'/></joint>
-        <joint name='f' type='fixed'><origin xyz='0.4 0 0'/><parent link='l2'/><child link='tool0'/></joint></robot>"""
-    line = [{"line": {"by": [-0.05, 0.05]}}]
-    task = TASK | {"start": {"joints": [angle, 1.0]}, "task_space": ["x", "y"]}
-    planned = brachis.plan(robot_of(text), task | {"path": line})
-    assert planned.verified
-    assert planned.trajectory.q[0, 0] == pytest.approx(angle)
-    assert not recwarn.list
 
 
 def _benchmark():
@@ -326,7 +297,7 @@ def test_industrial_arms_without_masses(name, tmp_path):
     assert not result.trajectory.robot.has_masses
 
 
-def test_a_joint_on_the_chain_that_follows_is_refused(tmp_path):
+def test_a_joint_on_the_chain_that_follows_is_an_error(tmp_path):
     rows = ARMS.arms()["abb irb5400"]
     assert ARMS.follows_on_the_chain(rows)
     assert not ARMS.follows_on_the_chain(ARMS.arms()["abb irb6640_185_280"])

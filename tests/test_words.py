@@ -12,7 +12,7 @@ def test_counts_are_written_with_their_noun(count, text):
     assert write_count(count, "row") == text
 
 
-def test_three_names_are_written_and_the_others_are_counted():
+def test_three_names_and_the_number_of_the_others():
     assert name_first(["a", "b", "c"], "; ") == "a; b; c"
     assert name_first(list("abcde"), "; ") == "a; b; c and 2 more"
 

@@ -39,7 +39,7 @@ def least_time(result: brachis.Result) -> float:
     return result.timing_gap.least_time
 
 
-def test_a_larger_blend_saves_what_is_said(corner):
+def test_a_larger_blend_saves_what_its_row_says(corner):
     locked, result = corner
     assert (result.sensitivities.source == "timings") is locked
     entry = result.sensitivities.of("path", "blend, 0.05 m")
@@ -61,16 +61,16 @@ def test_a_blend_that_cannot_be_larger_has_no_row():
     assert not [entry for entry in costs.limits if entry.label.subject == "path"]
 
 
-def named(result: brachis.Result, words: str) -> brachis.bottleneck.TaskSaving:
+def row_of(result: brachis.Result, words: str) -> brachis.bottleneck.TaskSaving:
     """Return the only row of the task with these words."""
     (saving,) = [row for row in result.sensitivities.task if words in row.change]
     return saving
 
 
 @pytest.mark.parametrize("end", ["start", "end"])
-def test_ends_in_motion_save_what_is_said(corner, end):
+def test_ends_in_motion_save_what_their_rows_say(corner, end):
     locked, result = corner
-    saving = named(result, f"boundary.{end}_speed")
+    saving = row_of(result, f"boundary.{end}_speed")
     assert saving.accuracy == ("estimate" if locked else "least")
     if not locked:  # a search for another joint path may find more
         return
@@ -85,25 +85,14 @@ def test_a_stop_on_a_straight_line_has_a_row():
     path = [{**half, "stop": True}, half]
     stopping = brachis.plan(task_of(locked=True, path=path))
     passing = brachis.plan(task_of(locked=True, path=[half, half]))
-    saving = named(stopping, "without the stop at s = 0.5")
+    saving = row_of(stopping, "without the stop at s = 0.5")
     gained = least_time(stopping) - least_time(passing)
     assert saving.accuracy == "bound"
     assert gained < saving.saved < 2.0 * gained
 
 
-def test_higher_speeds_at_the_ends_save_what_is_said():
-    def moving(speed: float) -> brachis.Result:
-        boundary = {"start_speed": 0.1, "end_speed": speed}
-        return brachis.plan(task_of(locked=True, boundary=boundary))
-
-    result = moving(0.1)
-    saving = named(result, "boundary.end_speed: 0.11 in place of 0.1")
-    gained = least_time(result) - least_time(moving(0.1 + 0.1 * STEP))
-    assert 0.1 * saving.saved == pytest.approx(gained, rel=0.05)
-
-
 @pytest.mark.parametrize("intervals", [10, 40])
-def test_accelerations_that_may_jump_at_rest_save_about_what_is_said(intervals):
+def test_accelerations_that_may_jump_at_rest_save_about_what_their_row_says(intervals):
     task = task_of(locked=False, path=[{"line": {"by": [0.3, 0.3]}}])
 
     def resting(rest: str) -> brachis.Result:
@@ -111,7 +100,7 @@ def test_accelerations_that_may_jump_at_rest_save_about_what_is_said(intervals):
 
     result = resting("full")
     gained = result.t_end - resting("velocity").t_end
-    saving = named(result, "spline.rest: velocity in place of full")
+    saving = row_of(result, "spline.rest: velocity in place of full")
     assert saving.accuracy == "estimate"
     assert saving.saved == pytest.approx(gained, rel=0.2)
     assert not [
@@ -119,11 +108,11 @@ def test_accelerations_that_may_jump_at_rest_save_about_what_is_said(intervals):
     ]
 
 
-def test_another_start_posture_saves_about_what_is_said():
+def test_another_start_posture_saves_about_what_its_row_says():
     line = [{"line": {"length": 1.0, "angle_deg": 0.0}}]
     task = task_of(locked=False, path=line, spline={"intervals": 40})
     result = brachis.plan(task)
-    saving = named(result, "start posture")
+    saving = row_of(result, "start posture")
     problem = result.candidate.problem
     words = saving.change.split()
     joint = problem.robot.joint_names.index(words[3])
@@ -149,18 +138,18 @@ def test_corners_of_points_have_one_row():
         ]
     )
 
-    def fitted(corner: float) -> brachis.Result:
+    def plan_through_points(corner: float) -> brachis.Result:
         tolerance = {"position": 1e-4, "corner": corner}
         path = brachis.fit_path(points, tolerance=tolerance, relative=True)
         return brachis.plan(task_of(locked=True, path=path))
 
-    result = fitted(5e-3)
+    result = plan_through_points(5e-3)
     (entry,) = [
         entry for entry in result.sensitivities.limits if entry.label.subject == "path"
     ]
     assert len(entry.s) == 2
     assert entry.label.key == "csv.tolerance.corner"
-    gained = least_time(fitted(5e-3 * (1.0 + STEP))) - least_time(result)
+    gained = least_time(plan_through_points(5e-3 * (1.0 + STEP))) - least_time(result)
     assert entry.change(STEP) == pytest.approx(gained, rel=0.05)
     assert "a blend at the corners of points of" in str(result.bottleneck())
 
@@ -171,34 +160,3 @@ def test_a_motion_without_stored_figures_has_about_the_same_costliest_one(corner
     entry = result.sensitivities.limits[0]
     other = again.of(entry.label.subject, entry.label.kind, entry.side)
     assert other.change(STEP) == pytest.approx(entry.change(STEP), rel=0.05)
-
-
-def test_segments_with_speeds_and_a_blend_between_them():
-    seams = brachis.load_task(brachis.examples.weld_seams).to_dict()
-    speeds = (0.3, 0.15)
-
-    def welded(
-        *speeds: float, blend: float = 0.06, known: brachis.Result | None = None
-    ) -> brachis.Result:
-        lines = [{"by": [0.1, 0.45, 0.0]}, {"by": [0.3, 0.0, 0.05]}]
-        path = [
-            {"line": line, "speed": speed}
-            for line, speed in zip(lines, speeds, strict=True)
-        ]
-        path[0]["blend"] = blend
-        task = {**seams, "path": path, "tool_limits": {}}
-        return brachis.plan(task, start_from=known)
-
-    result = welded(*speeds)
-    costs = result.sensitivities
-    assert all(entry.change(STEP) <= 0.0 for entry in costs.limits)
-    for number, speed in enumerate(speeds):
-        faster = [*speeds]
-        faster[number] *= 1.0 + STEP
-        gained = welded(*faster, known=result).t_end - result.t_end
-        entry = costs.of("tool", f"process speed of {speed} m/s")
-        assert entry.change(STEP) == pytest.approx(gained, rel=0.05)
-        assert entry.label.key == f"path[{number}].speed"
-    larger = welded(*speeds, blend=0.06 * (1.0 + STEP), known=result)
-    entry = costs.of("path", "blend, 0.06 m")
-    assert entry.change(STEP) == pytest.approx(larger.t_end - result.t_end, rel=0.05)

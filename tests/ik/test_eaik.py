@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import pickle
 import subprocess
 import sys
 
@@ -17,16 +16,11 @@ from brachis.ik import (
     check_answers,
     find,
 )
-from brachis.ik.eaik import eaik, exact_axes
+from brachis.ik.eaik import eaik
 from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
-from support.closed_forms import wrapped
+from support.factored_bench import Bench
 from support.pose_arms import (
-    FAMILIES,
-    X,
-    Y,
-    Z,
-    family,
     gen3,
     iiwa,
     iiwa_by_angles,
@@ -43,35 +37,20 @@ pytest.importorskip("eaik")
 PER_SIGN = 8
 
 
-class Bench:
-    """Random postures of a robot, their poses, and the solver for some redundant joints."""
+def bench_of(robot, redundant, postures=600):
+    return Bench(robot(), redundant, postures, family=eaik)
 
-    def __init__(self, robot, redundant, postures=600, seed=5):
-        self.robot, self.redundant = robot, list(redundant)
-        self.space = task_map_of(robot, "pose")
-        self.rest = [i for i in range(robot.n) if i not in redundant]
-        self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
-        self.solver = eaik.build(ChainGeometry.of(robot), self.space, tuple(redundant))
 
-    def poses(self, q):
-        return self.space.values(q)
+def margin_of(bench, q):
+    """Branch margin of the positive label, (K,)."""
+    return bench.solver.branch_margins(q, 0)[:, 0]
 
-    def solve(self, q):
-        """Answers (K, 2, 8, 6) for the poses of postures."""
-        return self.solver.solve(self.poses(q), q[:, self.redundant])
 
-    def margin(self, q):
-        """Branch margin of the positive label, (K,)."""
-        return self.solver.branch_margins(q, 0)[:, 0]
-
-    def own_gap(self, q, answers):
-        """Distance (K,) of each posture from the nearest answer with the label of the posture's own sign."""
-        sign = (self.margin(q) < 0.0).astype(int)
-        own = answers[np.arange(len(q)), sign]
-        gap = np.abs(wrapped(own - q[:, None, self.rest], np.ones(6, dtype=bool))).max(
-            axis=2
-        )
-        return np.where(np.isnan(gap), np.inf, gap).min(axis=1)
+def gap_in_label(bench, q, solved):
+    """Distance (K,) of each posture from the nearest answer with the label of the posture's sign."""
+    sign = (margin_of(bench, q) < 0.0).astype(int)
+    labelled = solved.reshape(len(q), 2, PER_SIGN, 6)[np.arange(len(q)), sign]
+    return bench.distance(labelled, q).min(axis=1)
 
 
 CASES = {
@@ -84,9 +63,6 @@ CASES = {
     "telescope": (telescope, [(2, 3)]),
     "rounded": (functools.partial(iiwa_by_angles, 1.57079633), [(0,), (2,)]),
 }
-CASES |= {
-    f"family {kind}": (functools.partial(family, kind), [()]) for kind in FAMILIES
-}
 PARAMETERS = [
     pytest.param(robot, redundant, id=f"{name}-{redundant}")
     for name, (robot, choices) in CASES.items()
@@ -96,77 +72,38 @@ PARAMETERS = [
 
 @pytest.mark.parametrize(("robot", "redundant"), PARAMETERS)
 def test_all_postures_are_found_and_all_answers_right(robot, redundant):
-    bench = Bench(robot(), redundant)
-    q, rest, solver = bench.q, bench.rest, bench.solver
+    bench = bench_of(robot, redundant)
+    q, solver = bench.q, bench.solver
     assert solver.branches == ("determinant_positive", "determinant_negative")
     assert solver.alternatives == PER_SIGN
-    answers = bench.solve(q)
-    assert answers.shape == (len(q), 2, PER_SIGN, 6)
-    finite = np.isfinite(answers).all(axis=3)
-    assert np.array_equal(finite, np.isfinite(answers).any(axis=3)), (
-        "an answer is NaN in part"
-    )
-    assert np.nanmax(answers) <= np.pi
-    assert np.nanmin(answers) > -np.pi
+    solved = bench.solve(q)
+    sample, answer, postures = bench.check_answers(solved)
+    assert np.nanmax(solved) <= np.pi
+    assert np.nanmin(solved) > -np.pi
+    branch = answer // PER_SIGN
 
-    sample, branch, _ = np.nonzero(finite)
-    postures = q[sample]
-    postures[:, rest] = answers[finite]
-    assert (
-        np.abs(
-            bench.space.difference(bench.poses(postures), bench.poses(q)[sample])
-        ).max()
-        < 1e-8
-    )
-
-    margin = bench.margin(postures)
+    margin = margin_of(bench, postures)
     assert np.array_equal(margin > 0.0, branch == 0), (
         "an answer has the other sign's label"
     )
     assert 0.5 < np.abs(margin).max() < 20.0, "margins are of the order of one"
-    determinant = np.linalg.det(
-        bench.space.jacobian(bench.space.twists(postures))[:, :, rest]
-    )
     clear = np.abs(margin) > 1e-5
-    ratio = margin[clear] / determinant[clear]
+    ratio = margin[clear] / bench.determinant(postures)[clear]
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
 
-    own = np.abs(bench.margin(q))
-    clear = (
-        own > 1e-5
-    )  # nearer to the boundary an URDF's rounding decides whether there is an answer
+    margins = np.abs(margin_of(bench, q))
+    # Nearer to the boundary an URDF's rounding decides whether there is an answer.
+    clear = margins > 1e-5
     assert np.mean(clear) > 0.98
-    assert np.all(bench.own_gap(q, answers)[clear] < 1e-9 / own[clear])
+    assert np.all(gap_in_label(bench, q, solved)[clear] < 1e-9 / margins[clear])
     regular = np.ones(len(q), dtype=bool)
     regular[sample[np.abs(margin) < 1e-5]] = False
-    by_sign = finite.sum(axis=2)
-    assert np.array_equal(by_sign[regular, 0], by_sign[regular, 1]), (
+    exists = np.isfinite(solved).all(axis=2).reshape(-1, 2, PER_SIGN)
+    counts = exists.sum(axis=2)[regular]
+    assert np.array_equal(counts[:, 0], counts[:, 1]), (
         "answers of either sign are equally many"
     )
     check_answers(bench.robot, bench.space, tuple(redundant), solver)
-
-
-@pytest.mark.parametrize(
-    ("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (panda_lengths, (4,))]
-)
-def test_answers_of_a_sign_differ_and_stand_in_ascending_order(robot, redundant):
-    bench = Bench(robot(), redundant, 500)
-    answers = bench.solve(bench.q).reshape(-1, PER_SIGN, 6)
-    count = np.isfinite(answers).all(axis=2).sum(axis=1)
-    assert np.array_equal(
-        np.isfinite(answers[:, :, 0]), np.arange(PER_SIGN) < count[:, None]
-    ), "no gaps between alternatives"
-    for first in range(PER_SIGN):
-        assert not np.any(np.diff(answers[:, first:, 0], axis=1) < -0.01)
-        for second in range(first):
-            both = count > first
-            gap = np.abs(
-                wrapped(
-                    answers[both, first] - answers[both, second], np.ones(6, dtype=bool)
-                )
-            )
-            assert np.all(gap.max(axis=1) > 1e-4)
-    assert count.max() == 4
 
 
 @pytest.mark.parametrize(
@@ -174,67 +111,7 @@ def test_answers_of_a_sign_differ_and_stand_in_ascending_order(robot, redundant)
     [(ur, ()), (iiwa, (2,)), (panda_lengths, (5,)), (much_redundant, (0, 1, 4, 9))],
 )
 def test_margin_gradient(robot, redundant):
-    bench = Bench(robot(), redundant, 20)
-    for branch in (0, 1):
-        exact = bench.solver.margin_gradient(bench.q, branch)
-        for joint, step in enumerate(1e-6 * np.eye(bench.robot.n)):
-            change = bench.solver.branch_margins(
-                bench.q + step, branch
-            ) - bench.solver.branch_margins(bench.q - step, branch)
-            np.testing.assert_allclose(exact[:, :, joint], change / 2e-6, atol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("robot", "redundant", "elbow"),
-    [(ur, (), 2), (iiwa, (2,), 3), (telescope, (2, 3), 4)],
-)
-def test_margins_vanish_where_answers_merge(robot, redundant, elbow):
-    bench = Bench(robot(), redundant, 200)
-    bent = bench.q.copy()
-    bent[:, elbow] = 0.1
-    straight = bench.q[
-        np.abs(bench.margin(bent)) > 0.02
-    ]  # nothing but the elbow is stretched
-    assert len(straight) > 50
-    margins, distances = [], []
-    for bend in (1e-3, 1e-4):
-        q = straight.copy()
-        q[:, elbow] = bend
-        margin, answers = bench.margin(q), bench.solve(q)
-        other = answers[np.arange(len(q)), (margin > 0.0).astype(int)]
-        gap = np.abs(
-            wrapped(other - q[:, None, bench.rest], np.ones(6, dtype=bool))
-        ).max(axis=2)
-        margins.append(np.abs(margin) / bend)
-        distances.append(np.nanmin(gap, axis=1) / bend)
-    for ratios in (margins, distances):
-        np.testing.assert_allclose(ratios[0], ratios[1], rtol=0.1)
-        assert 1e-2 < ratios[1].min() < ratios[1].max() < 100.0
-
-
-@pytest.mark.parametrize(
-    ("robot", "redundant"),
-    [(ur, ()), (iiwa, (1,)), (panda_lengths, (3,)), (rail_arm, (0,))],
-)
-def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundant):
-    bench = Bench(robot(), redundant, 150)
-    t = np.linspace(0.0, 1.0, 301)[:, None]
-    followed = 0
-    for start in bench.q:
-        q = start + 0.5 * np.sin(2.0 * np.pi * t * np.linspace(0.4, 1.0, bench.robot.n))
-        margin = bench.margin(q)
-        if np.abs(margin).min() < 0.03:
-            continue
-        answers = bench.solve(q)[:, int(margin[0] < 0.0)]
-        joint_path = [q[0, bench.rest]]
-        for choice in answers:
-            gap = wrapped(choice - joint_path[-1], np.ones(6, dtype=bool))
-            joint_path.append(
-                joint_path[-1] + gap[np.nanargmin(np.abs(gap).max(axis=1))]
-            )
-        np.testing.assert_allclose(joint_path[1:], q[:, bench.rest], atol=1e-8)
-        followed += 1
-    assert followed >= 5
+    bench_of(robot, redundant, 20).check_gradient()
 
 
 @pytest.mark.parametrize(
@@ -248,7 +125,7 @@ def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundan
     ],
 )
 def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
-    bench = Bench(robot(), redundant)
+    bench = bench_of(robot, redundant)
     rng = np.random.default_rng(6)
     q, count = bench.q, len(bench.q)
     off = np.where(
@@ -257,89 +134,26 @@ def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     q[:, redundant[0]] = rng.choice(
         [0.0, 0.5 * np.pi, np.pi], count
     ) + off * rng.choice([-1.0, 1.0], count)
-    q = q[np.abs(bench.margin(q)) > 5e-3]
-    assert len(q) > count / 5
-    answers = bench.solve(q)
-    assert bench.own_gap(q, answers).max() < 1e-7
-    exists = np.isfinite(answers).all(axis=3)
-    sample = np.nonzero(exists)[0]
-    postures = q[sample]
-    postures[:, bench.rest] = answers[exists]
-    assert (
-        np.abs(
-            bench.space.difference(bench.poses(postures), bench.poses(q)[sample])
-        ).max()
-        < 1e-8
-    )
-
-
-def test_postures_with_joints_at_quarter_turns():
-    for robot, redundant in (
-        (ur, ()),
-        (iiwa, (2,)),
-        (panda_lengths, (6,)),
-        (rail_arm, (0,)),
-    ):
-        bench = Bench(robot(), redundant, 3000)
-        rng = np.random.default_rng(7)
-        quarters = rng.choice([-0.5 * np.pi, 0.0, 0.5 * np.pi, np.pi], bench.q.shape)
-        q = np.where(rng.uniform(size=bench.q.shape) < 0.5, quarters, bench.q)
-        q = q[np.abs(bench.margin(q)) > 5e-3]
-        assert len(q) > 500
-        assert bench.own_gap(q, bench.solve(q)).max() < 1e-7
-
-
-@pytest.mark.parametrize(
-    ("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (much_redundant, (0, 1, 4, 9))]
-)
-def test_what_cannot_be_solved_is_nan_and_disturbs_nothing(robot, redundant):
-    bench = Bench(robot(), redundant, 30)
-    targets, q_r = bench.poses(bench.q), bench.q[:, bench.redundant]
-    clean = bench.solver.solve(targets, q_r)
-    assert np.isfinite(clean).any(axis=(1, 2, 3)).all()
-    targets[3, :3] += 50.0
-    targets[5, 0] = np.nan
-    targets[7, 4] = np.inf
-    spoilt = [3, 5, 7]
-    if redundant:
-        q_r[9, 0] = np.nan
-        spoilt.append(9)
-    answers = bench.solver.solve(targets, q_r)
-    assert np.isnan(answers[spoilt]).all()
-    others = np.setdiff1d(np.arange(30), spoilt)
-    np.testing.assert_allclose(answers[others], clean[others], atol=1e-12)
-    assert bench.solver.solve(targets[:0], q_r[:0]).shape == (0, 2, PER_SIGN, 6)
-    assert np.isnan(bench.solver.solve(targets[[3]], q_r[[3]])).all()
+    bench.q = q[np.abs(margin_of(bench, q)) > 5e-3]
+    assert len(bench.q) > count / 5
+    solved = bench.solve(bench.q)
+    assert gap_in_label(bench, bench.q, solved).max() < 1e-7
+    bench.check_answers(solved)
 
 
 def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
     monkeypatch,
 ):
-    bench = Bench(iiwa(), (2,), 200)
+    bench = bench_of(iiwa, (2,), 200)
     q = bench.q
     q[:, 2] = np.tile(np.linspace(-1.0, 1.0, 20), 10)
     first = bench.solve(q)
-    assert bench.own_gap(q, first).max() < 1e-6
+    assert gap_in_label(bench, q, first).max() < 1e-6
     monkeypatch.setattr("brachis.ik.eaik._KEPT", 5)
     for _ in range(2):
         np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
     one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])
     np.testing.assert_allclose(one_by_one, first, atol=1e-12)
-
-
-@pytest.mark.parametrize(("robot", "redundant"), [(ur, ()), (iiwa, (4,))])
-def test_solvers_can_be_pickled_after_use(robot, redundant):
-    bench = Bench(robot(), redundant, 100)
-    answers = bench.solve(bench.q)
-    bench.solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301  (our own)
-    np.testing.assert_allclose(bench.solve(bench.q), answers, atol=1e-12)
-    np.testing.assert_allclose(
-        bench.margin(bench.q), eaik_margin(robot(), redundant, bench.q), atol=1e-12
-    )
-
-
-def eaik_margin(robot, redundant, q):
-    return Bench(robot, redundant, 1).margin(q)
 
 
 def rows(robot, *names):
@@ -395,7 +209,7 @@ def test_without_eaik_the_reason_is_that(monkeypatch):
         eaik.build(ChainGeometry.of(robot), rows(robot), ())
 
 
-def test_only_the_compiled_part_of_eaik_is_loaded_and_that_when_needed():
+def test_the_compiled_part_of_eaik_alone_loads_and_that_on_demand():
     code = """
 import sys
 import brachis.ik.eaik as answers
@@ -411,63 +225,3 @@ print(sorted({"urchin", "trimesh", "pyglet", "eaik.IK_Robot"} & set(sys.modules)
         check=True,
     )
     assert done.stdout.strip() == "[]"
-
-
-def test_the_registry_takes_it_and_lists_what_it_can_do():
-    robot = iiwa()
-    found = find(robot, rows(robot), ["j3"], families=[eaik])
-    assert found.family == "eaik"
-    with pytest.raises(DecompositionError, match="singular everywhere") as caught:
-        find(robot, rows(robot), ["j4"], families=[eaik])
-    assert [names for (names,) in caught.value.available] == [
-        "j1",
-        "j2",
-        "j3",
-        "j5",
-        "j6",
-        "j7",
-    ]
-
-
-def lines_apart(axes, points, first, second):
-    """Distance of two straight lines that are not parallel."""
-    normal = np.cross(axes[:, first, 0], axes[:, second, 0])
-    return abs(normal @ (points[:, second, 0] - points[:, first, 0])) / np.linalg.norm(
-        normal
-    )
-
-
-def test_exact_axes():
-    rng = np.random.default_rng(8)
-    frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    centre = np.array([0.3, -0.2, 0.7])
-    exact = frame @ np.array([Z, Y, Y, Z, Y, X]).T
-    axes = exact + 1e-9 * rng.normal(size=(3, 6))
-    axes /= np.linalg.norm(axes, axis=0)
-    # The first two meet in one place, the last three in the centre, each given by some point along it.
-    places = (
-        centre[:, None]
-        + frame
-        @ np.array(
-            [[0, 0, -2], [0, 0, -2], [1, 0, -1], [0, 0, 0], [0, 0, 0], [0, 0, 0.0]]
-        ).T
-    )
-    points = places + exact * rng.normal(size=6) + 1e-9 * rng.normal(size=(3, 6))
-    axes, points = axes[:, :, None], points[:, :, None]
-    assert lines_apart(axes, points, 3, 4) > 1e-12
-
-    turned, moved = exact_axes(axes, points, 1e-8)
-    np.testing.assert_array_equal(turned[:, 1], turned[:, 2])
-    np.testing.assert_array_equal(turned[:, 1], turned[:, 4])
-    np.testing.assert_array_equal(turned[:, 0], turned[:, 3])
-    assert lines_apart(turned, moved, 0, 1) < 1e-15
-    assert lines_apart(turned, moved, 3, 4) < 1e-15
-    np.testing.assert_array_equal(moved[:, 4], moved[:, 5])
-    np.testing.assert_allclose(turned, axes, atol=1e-8)
-    shift = moved - points
-    across = shift - axes * np.sum(shift * axes, axis=0)
-    assert np.abs(across).max() < 3e-8, "axes move along themselves only"
-
-    left, still = exact_axes(axes, points, 1e-13)
-    np.testing.assert_array_equal(left, axes)
-    assert lines_apart(left, still, 3, 4) > 1e-12

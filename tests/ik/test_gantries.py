@@ -75,26 +75,6 @@ def test_macro_mini_in_its_plane(rows, singular):
             bench.check(redundant, distinct_roots=2 if turning > 0 else 1)
 
 
-def test_macro_mini_of_which_the_slides_answer_for_space():
-    # Two slides and two links about z do not reach all of space: the two slides answer for y and z alone.
-    bench = macro_mini(Y, Z, Z, ["y", "z"])
-    candidate = bench.check((2, 3), distinct_roots=1)
-    assert candidate.family == "prismatic"
-
-
-def test_slide_along_the_normal_of_the_plane_does_not_disturb():
-    joints = [
-        Joint("prismatic", axis=Z, limit=SLIDE),
-        Joint("revolute", axis=Z),
-        Joint("revolute", axis=Z, xyz=(0.4, 0.0, 0.0)),
-    ]
-    robot = Robot.from_urdf("scara", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
-    bench = Bench(robot, ["x", "y"], 500)
-    exists = dict(bench.decompositions())
-    assert exists == {(0,): True, (1,): False, (2,): False}
-    bench.check((0,), distinct_roots=2)
-
-
 def test_slides_carried_by_turning_joints_have_branches_by_the_sign_of_their_determinant():
     # The second slide's direction turns with the joint before it: parallel to the first one twice a turn.
     joints = [

@@ -18,7 +18,6 @@ from support.arms import (
     TOOL,
     UR10_D,
     Arm,
-    PoseBench,
     X,
     Y,
     Z,
@@ -29,8 +28,8 @@ from support.arms import (
     rolling,
     tx90l,
     ur10,
-    zero_crossing,
 )
+from support.factored_bench import Bench
 
 WRIST = ("noflip", "flip")
 ELBOW = ("up", "down")
@@ -51,21 +50,23 @@ UR = ur10().with_tool(TOOL)
 ON_RAIL = UR.with_slide(0, Y)
 ON_SKEW = UR.with_slide(0, SKEW)
 CARRIED = UR.with_slide(1, SKEW)
+JOINTS = {"slide": SIX, "pan": TURNED, "wrist 2": TURNED, "wrist 3": TURNED}
+
+
+def on_rails(name, robot, places):
+    """A redundant joint each, by the places of the slide, the pan joint and the last two."""
+    return {
+        f"{name}, {joint}": (robot, (place,), words)
+        for place, (joint, words) in zip(places, JOINTS.items(), strict=True)
+    }
+
+
 CASES = {
     "UR10": (UR.robot(), (), SIX),
     "UR10 from its tool": (UR.mirrored.robot(MOUNT), (), SIX),
-    "rail": (ON_RAIL.robot(), (0,), SIX),
-    "pan": (ON_RAIL.robot(), (1,), TURNED),
-    "wrist 2": (ON_RAIL.robot(), (5,), TURNED),
-    "wrist 3": (ON_RAIL.robot(), (6,), TURNED),
-    "skew rail": (ON_SKEW.robot(MOUNT), (0,), SIX),
-    "skew rail, pan": (ON_SKEW.robot(MOUNT), (1,), TURNED),
-    "skew rail, wrist 2": (ON_SKEW.robot(MOUNT), (5,), TURNED),
-    "skew rail, wrist 3": (ON_SKEW.robot(MOUNT), (6,), TURNED),
-    "rail at the tool": (ON_SKEW.mirrored.robot(MOUNT), (6,), SIX),
-    "rail at the tool, pan": (ON_SKEW.mirrored.robot(MOUNT), (5,), TURNED),
-    "rail at the tool, wrist 2": (ON_SKEW.mirrored.robot(MOUNT), (1,), TURNED),
-    "rail at the tool, wrist 3": (ON_SKEW.mirrored.robot(MOUNT), (0,), TURNED),
+    **on_rails("rail", ON_RAIL.robot(), (0, 1, 5, 6)),
+    **on_rails("skew rail", ON_SKEW.robot(MOUNT), (0, 1, 5, 6)),
+    **on_rails("rail at the tool", ON_SKEW.mirrored.robot(MOUNT), (6, 5, 1, 0)),
     "slide after pan": (CARRIED.robot(MOUNT), (1,), SIX),
     "slide after pan, pan": (CARRIED.robot(MOUNT), (0,), SLID),
     "slide after pan, wrist 2": (CARRIED.robot(MOUNT), (5,), SLID),
@@ -105,7 +106,7 @@ CASES = {
 
 def bench_of(name):
     robot, redundant, _ = CASES[name]
-    return PoseBench(parallel_axes, robot, redundant)
+    return Bench(robot, redundant, 800, family=parallel_axes)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -115,97 +116,12 @@ def test_every_branch_is_right(name):
     assert bench.solver.branches == tuple(
         "_".join(label) for label in itertools.product(*words)
     )
-    solved = bench.answers(bench.q)
-    sample, branch, postures = bench.check_answers(solved)
-
-    margins = bench.margins(bench.q)
-    assert np.all(np.abs(margins).max(axis=(0, 1)) > 0.8)
-    assert np.all(np.abs(margins).max(axis=(0, 1)) < 3.0), (
-        "margins are of the order of one"
-    )
-    inside = (margins > 0.0).all(axis=2)
-    assert np.all(inside.sum(axis=1) == 1), "a posture is in exactly one branch"
-    own = np.argmax(inside, axis=1)
-    assert set(own) == set(range(len(bench.solver.branches)))
-    product = np.abs(margins[:, 0]).prod(axis=1)
-    regular = product > 1e-5
-    found = bench.distance(solved[np.arange(len(own)), own], bench.q)
-    assert (found * product)[regular].max() < 1e-10
-    for b in range(len(bench.solver.branches)):
-        assert bench.solver.branch_margins(postures[branch == b], b).min() > -1e-7
-    assert len(set(zip(sample, branch, strict=True))) == len(sample)
-
-    ratio = bench.determinant(bench.q)[regular] / margins[regular, 0].prod(axis=1)
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-7)
-    bench.check_gradient()
-
-
-@pytest.mark.parametrize(
-    "name", ["UR10", "rail", "pan", "wrist 2", "wrist 3", "skew rail, wrist 2"]
-)
-def test_labels_follow_the_branch_along_smooth_curves(name):
-    bench = bench_of(name)
-    followed, changes = 0, 0
-    for seed in range(6):
-        q = bench.curve(seed, 8001)
-        solved = bench.answers(q)
-        margins = bench.margins(q)
-        own = np.argmax((margins > 0.0).all(axis=2), axis=1)
-        regular = np.abs(margins[:, 0]).min(axis=1) > 1e-3
-        assert (
-            bench.distance(solved[np.arange(len(q)), own], q)[regular].max() < 1e-8
-        ), "the curve loses its branch"
-        # The branch of the curve changes where a margin changes its sign and nowhere else.
-        changed = np.any(np.diff(np.sign(margins[:, 0]), axis=0) != 0.0, axis=1)
-        np.testing.assert_array_equal(np.diff(own) != 0, changed)
-        changes += np.count_nonzero(changed)
-        for b in range(len(bench.solver.branches)):
-            postures = q.copy()
-            postures[:, bench.rest] = solved[:, b]
-            exists = np.isfinite(postures).all(axis=1)
-            margin = np.full(len(q), -1.0)
-            margin[exists] = bench.solver.branch_margins(postures[exists], b).prod(
-                axis=1
-            )
-            inside = (margin[1:] > 0.1) & (margin[:-1] > 0.1)
-            steps = bench.distance(solved[1:, b], postures[:-1])
-            assert steps[inside].max(initial=0.0) < 0.1, "the branch jumps"
-            followed += np.count_nonzero(inside)
-    assert changes >= 3, "no curve crossed a boundary: the test shows nothing"
-    assert followed > 40000
-
-
-@pytest.mark.parametrize("name", [name for name in CASES if name.startswith("generic")])
-def test_branches_meet_where_a_margin_vanishes(name):
-    bench, words = bench_of(name), CASES[name][2]
-    labels = [label.split("_") for label in bench.solver.branches]
-    met = set()
-    for seed, (place, pair) in itertools.product(range(8), enumerate(words)):
-        found = zero_crossing(
-            lambda q, place=place: bench.margins(q)[:, 0, place], bench.curve(seed)
-        )
-        if (
-            found is None
-            or np.abs(np.delete(bench.margins(found[0][None])[0, 0], place)).min() < 0.1
-        ):
-            continue
-        gaps = []
-        for share in (0.01, 0.001):
-            near = (found[0] + share * found[1])[None]
-            solved, margins = bench.answers(near)[0], bench.margins(near)[0]
-            own = int(np.argmax((margins > 0.0).all(axis=1)))
-            flipped = list(labels[own])
-            flipped[place] = pair[1 - pair.index(flipped[place])]
-            gaps.append(bench.difference(solved[own], solved[labels.index(flipped)]))
-        assert gaps[1] < 0.2 * gaps[0]
-        assert gaps[1] < 0.02
-        met.add(pair)
-    assert met == set(words)
+    bench.check()
 
 
 def test_rail_answers_change_sides_where_the_rail_stops_helping():
     # The pan joint turns the parallel axes to -y cos + ..., and the rail runs along y: one side or the other.
-    bench = bench_of("pan")
+    bench = bench_of("rail, pan")
     sides = (
         np.isfinite(bench.answers(bench.q)).all(axis=2).reshape(-1, 4, 2).any(axis=1)
     )
@@ -213,21 +129,10 @@ def test_rail_answers_change_sides_where_the_rail_stops_helping():
     np.testing.assert_array_equal(sides, np.stack([~right, right], axis=1))
 
 
-def test_out_of_reach_is_nan_without_a_warning():
-    bench = bench_of("UR10")
-    far = bench.poses(bench.q[:5])
-    far[:, :3] += 10.0
-    assert np.isnan(bench.solver.solve(far, np.empty((5, 0)))).all()
-    assert np.isnan(
-        bench.solver.solve(np.full((2, 12), np.nan), np.empty((2, 0)))
-    ).all()
-
-
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
 def test_arms_as_their_urdf_states_them(name):
     robot = example_robot(name)
-    bench = PoseBench(parallel_axes, robot, ())
-    bench.check_answers(bench.answers(bench.q))
+    Bench(robot, (), 800, family=parallel_axes).check()
     match = find(robot, task_map_of(robot, "pose"), [], families=[parallel_axes])
     assert match.family == "parallel_axes"
 
@@ -242,7 +147,7 @@ def test_arms_as_their_urdf_states_them(name):
     ],
     ids=["pan", "wrist 2", "wrist 3", "pan below the slide"],
 )
-def test_slide_that_never_helps_is_refused(arm, redundant):
+def test_a_slide_that_never_helps_is_an_error(arm, redundant):
     # Along the pan axis, or radially after it, it moves the arm within the plane of the parallel joints.
     robot = arm.robot(MOUNT)
     with pytest.raises(DecompositionError) as caught:

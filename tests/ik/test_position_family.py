@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import brachis
-from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
+from brachis.ik import ChainGeometry, NotApplicableError
 from brachis.ik.point_recipes import RECIPES, positioning
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndAngle
@@ -21,16 +20,13 @@ from support.pose_arms import panda as panda_urdf
 from support.screw_arms import (
     BASES,
     SLIDE,
-    Axis,
     extra,
     panda,
     screw_robot,
     seven_joints,
-    unit,
 )
 from support.spatial import rail_arm, rail_arm_joints
 
-X, Y, Z = np.eye(3)
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
@@ -63,17 +59,6 @@ def scara(tool=(0.1, 0.05, 0.0)):
     )
 
 
-def crane():
-    """A rail, and an arm that turns, tilts and reaches."""
-    joints = [
-        Joint("prismatic", axis=(0.0, 1.0, 0.0), limit=SLIDE),
-        Joint("revolute", xyz=(0.0, 0.0, 0.6)),
-        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.3)),
-        Joint("prismatic", axis=(1.0, 0.0, 0.0), xyz=(0.9, 0.0, 0.1), limit=SLIDE),
-    ]
-    return Robot.from_urdf("crane", urdf_text=chain_urdf(joints, tool=(0.1, 0.0, 0.0)))
-
-
 @pytest.mark.parametrize("name", BASES)
 @pytest.mark.parametrize("arrangement", ["alone", "carried", "carried backwards"])
 def test_every_recipe(name, arrangement):
@@ -90,7 +75,7 @@ def test_every_recipe(name, arrangement):
     assert len(set(checked.solver.branches)) == len(checked.solver.branches)
 
 
-def test_every_recipe_is_tried():
+def test_the_cases_use_every_recipe():
     used = {
         RECIPES.index(bench(screw_robot(base), (), 1).solver.recipe)
         for base in BASES.values()
@@ -103,7 +88,6 @@ def test_every_recipe_is_tried():
 ARMS = {
     "three joints": (three_joints, 1),
     "scara": (scara, 3),
-    "crane": (crane, 4),
     "tx90l_rail": (lambda: built("tx90l_rail"), 14),
     "ur10_rail": (lambda: built("ur10_rail"), 16),
     "iiwa14": (lambda: built("iiwa14"), 16),
@@ -163,31 +147,6 @@ def test_labels_say_where_the_arm_is():
     assert bench(screw_robot(BASES["P|PP"]), (), 1).solver.branches == ("slides",)
 
 
-# Robot, redundant joints, and the joint of every step with two answers.
-SMOOTH = {
-    "three joints": (three_joints, (), (0, 2)),
-    "scara": (scara, (0,), (2,)),
-    "slide in a plane": (lambda: screw_robot(BASES["R|RP"]), (), (0, 2)),
-    "rail and wrist": (lambda: built("tx90l_rail"), (0, 4, 5, 6), (1, 3)),
-    "joint 1 and wrist": (lambda: built("tx90l_rail"), (1, 4, 5, 6), (None, 3)),
-    "iiwa14": (lambda: built("iiwa14"), (2, 4, 5, 6), (1, 3)),
-    "meeting of the last": (panda, (0, 1, 2, 6), (5, 3)),
-    "backwards": (lambda: screw_robot(BASES["cylinder"][::-1]), (), (0, 0)),
-}
-
-
-@pytest.mark.parametrize("name", SMOOTH)
-def test_labels_follow_the_branch_along_smooth_curves(name):
-    make, redundant, _ = SMOOTH[name]
-    bench(make(), redundant, 1).check_labels_along_curves()
-
-
-@pytest.mark.parametrize("name", SMOOTH)
-def test_margins_vanish_where_two_answers_meet(name):
-    make, redundant, steps = SMOOTH[name]
-    bench(make(), redundant).check_boundaries(steps)
-
-
 def test_refusals():
     robot = built("tx90l_rail")
     geometry, position = ChainGeometry.of(robot), task_map_of(robot, "position")
@@ -207,63 +166,6 @@ def test_refusals():
     assert str(caught.value) == (
         "J_nr is singular everywhere: there is always a motion of the tool that needs rail, joint_1, joint_2, joint_3"
     )
-
-
-def test_refusals_say_what_the_joints_cannot_do():
-    with pytest.raises(NotApplicableError) as caught:
-        bench(seven_joints(), (3, 4, 5, 6), 1)
-    assert str(caught.value) == (
-        "J_nr is singular everywhere: there is always a motion of the tool that needs j4, j5, j6, j7"
-    )
-    rng = np.random.default_rng(8)
-    general = [extra(rng, "R") for _ in range(3)]
-    with pytest.raises(NotApplicableError) as caught:
-        bench(screw_robot(general), (), 1)
-    assert str(caught.value) == (
-        "no closed form moves the tool by j1, j2, j3: no two neighbours among them move in one plane or have axes that "
-        "meet in a fixed point"
-    )
-    askew = [
-        Axis("R", Z, np.zeros(3)),
-        Axis("R", Y, X),
-        Axis("P", unit(X + Y), np.zeros(3)),
-    ]
-    with pytest.raises(NotApplicableError, match="no closed form moves the tool by"):
-        bench(screw_robot(askew), (), 1)
-
-
-def test_solvers_can_be_sent_to_other_processes():
-    checked = bench(rail_arm(), (0, 4, 5, 6), 5)
-    solver = pickle.loads(pickle.dumps(checked.solver))  # noqa: S301
-    targets, q_r = checked.targets(checked.q), checked.q[:, [0, 4, 5, 6]]
-    np.testing.assert_allclose(
-        solver.solve(targets, q_r), checked.solver.solve(targets, q_r), atol=1e-12
-    )
-
-
-def test_no_targets_have_no_answers():
-    solver = bench(rail_arm(), (0, 4, 5, 6), 1).solver
-    assert solver.solve(np.empty((0, 3)), np.empty((0, 4))).shape == (0, 4, 1, 3)
-
-
-def test_out_of_reach_is_nan():
-    solver = bench(three_joints(), (), 1).solver
-    assert np.isnan(
-        solver.solve(np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 0.478]]), np.empty((2, 0)))
-    ).all()
-
-
-def test_it_is_found_by_geometry():
-    robot = rail_arm()
-    space = task_map_of(robot, "position")
-    assert find(robot, space, ["j1", "j5", "j6", "j7"]).family == "positioning"
-    families = {
-        candidate.redundant_joints: candidate.family
-        for candidate in find_all(robot, space)
-    }
-    assert families["j2", "j5", "j6", "j7"] == "positioning"
-    slides = screw_robot(BASES["P|PP"])
-    assert find(slides, task_map_of(slides, "position"), []).family == "prismatic"
 
 
 PLANS = {

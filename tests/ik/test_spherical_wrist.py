@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import pickle
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from brachis.robot.task_map import Pose
 from support.chains import Joint, chain_urdf
 from support.factored_bench import Bench
 from support.screw_arms import (
-    BASES,
     Axis,
     extra,
     panda,
@@ -28,55 +26,6 @@ from support.screw_arms import (
 from support.spatial import rail_arm, rail_arm_joints
 
 X, Y, Z = np.eye(3)
-
-
-def ortho_parallel(rng):
-    """Industrial arm of random lengths, offsets, joint senses and zero posture, on a rail across axis 1 (j1 ... j7).
-
-    Lengths as in Brandstoetter et al. 2014: a1, b, c1 ... c4, a2.
-    """
-    a1, a2, b = rng.uniform(-0.2, 0.2, 3)
-    c1, c2, c3, c4 = rng.uniform(0.2, 0.7, 4)
-    places = [
-        (0, 0, 0),
-        (a1, 0, c1),
-        (a1, 0, c1 + c2),
-        (a1 + a2, b, c1 + c2),
-        (a1 + a2, b, c1 + c2 + c3),
-    ]
-    places.append((a1 + a2, b, c1 + c2 + c3 + c4))
-    senses = rng.choice([-1.0, 1.0], 6)
-    directions = [
-        axis * sense for axis, sense in zip((Z, Y, Y, Z, Y, Z), senses, strict=True)
-    ]
-    angle = rng.uniform(-np.pi, np.pi)
-    axes = [Axis("P", np.array([np.cos(angle), np.sin(angle), 0.0]), np.zeros(3))]
-    axes += [
-        Axis("R", axis, np.array(place, dtype=float))
-        for axis, place in zip(directions, places, strict=True)
-    ]
-    posed = ChainGeometry.of(screw_robot(axes)).screws_at(
-        rng.uniform(-2.0, 2.0, (1, 7))
-    )
-    moved = [
-        Axis(
-            a.letter,
-            posed.axes[:, i, 0],
-            posed.points[:, i, 0] if a.letter == "R" else np.zeros(3),
-        )
-        for i, a in enumerate(axes)
-    ]
-    return screw_robot(moved, tool=rng.uniform(-0.5, 1.5, 3))
-
-
-@pytest.mark.parametrize("redundant", range(4))
-def test_arms_with_ortho_parallel_base_on_a_rail(redundant):
-    rng = np.random.default_rng(redundant)
-    for _ in range(3):
-        bench = Bench(ortho_parallel(rng), (redundant,), postures=300).check()
-        first = "left" if redundant == 1 else "front"
-        assert bench.solver.branches[0] == f"{first}_up_noflip"
-        assert len(bench.solver.branches) == 8
 
 
 RAILS = {
@@ -113,30 +62,6 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
             )
 
 
-def test_labels_say_where_the_arm_is():
-    bench = Bench(rail_arm(), (0,), postures=1)
-    bend_forwards = np.array([[0.2, 0.3, 0.4, 1.2, 0.5, 0.8, -0.3]])
-    labels = bench.solver.branches
-    assert (
-        labels[np.argmax((bench.margins(bend_forwards) > 0.0).all(axis=2))]
-        == "front_up_noflip"
-    )
-    other = bend_forwards * np.array([1.0, 1.0, -4.0, -1.0, 1.0, -1.0, 1.0])
-    assert (
-        labels[np.argmax((bench.margins(other) > 0.0).all(axis=2))] == "back_down_flip"
-    )
-
-
-def test_a_rail_answers_on_the_side_to_which_it_moves_the_arm():
-    # With joint 1 of the arm held, the rail has to move the wrist across the plane of the links.
-    bench = Bench(rail_arm(), (1,), postures=400)
-    finite = np.isfinite(bench.answers(bench.q)).all(axis=2)
-    left = np.array([label.startswith("left") for label in bench.solver.branches])
-    facing = np.cos(bench.q[:, 1]) > 0.0
-    np.testing.assert_array_equal(finite[:, left].any(axis=1), facing)
-    np.testing.assert_array_equal(finite[:, ~left].any(axis=1), ~facing)
-
-
 @pytest.mark.parametrize("turntable", [1, 2])
 def test_gantry_of_three_slides_of_which_a_turntable_turns_the_last(turntable):
     axes = [Axis("P", axis, np.zeros(3)) for axis in (X, Y, Z)]
@@ -158,14 +83,6 @@ def test_spherical_shoulder_and_wrist(redundant):
     assert len(bench.solver.branches) == 8
     # Shoulder, wrist and elbow turn in right angles: whatever has one answer has all eight.
     assert np.isfinite(bench.answers(bench.q)).all()
-
-
-def test_elbow_of_spherical_shoulder_and_wrist_is_not_redundant():
-    with pytest.raises(NotApplicableError) as caught:
-        Bench(seven_joints(), (3,), postures=1)
-    assert str(caught.value) == (
-        "J_nr is singular everywhere: there is always a motion of the tool that needs j4"
-    )
 
 
 def test_spherical_shoulder_and_wrist_on_a_rail():
@@ -270,35 +187,10 @@ def test_refusals():
     coaxial = [Axis("R", Z, np.zeros(3)), Axis("R", Z, Z), Axis("R", X, Y)]
     with pytest.raises(NotApplicableError, match=r"^J_nr is singular everywhere"):
         Bench(screw_robot([*coaxial, *wrist(rng)]), (), postures=1)
-    flat = [Axis("R", axis, np.array([0.3, 0.5, -0.2])) for axis in (X, Y, unit(X + Y))]
-    with pytest.raises(NotApplicableError, match=r"^J_nr is singular everywhere"):
-        Bench(
-            screw_robot([*BASES["R|RR"], *flat[:1], *flat[:1], *flat[1:2]]),
-            (),
-            postures=1,
-        )
 
 
-def test_solvers_can_be_sent_to_other_processes():
-    bench = Bench(rail_arm(), (2,), postures=5)
-    solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301
-    targets, q_r = bench.targets(bench.q), bench.q[:, [2]]
-    np.testing.assert_allclose(
-        solver.solve(targets, q_r), bench.solver.solve(targets, q_r), atol=1e-12
-    )
-
-
-def test_no_targets_have_no_answers():
-    assert Bench(rail_arm(), (0,), 1).solver.solve(
-        np.empty((0, 12)), np.empty((0, 1))
-    ).shape == (0, 8, 1, 6)
-
-
-def test_it_is_found_by_geometry():
+def test_a_refusal_lists_the_choices_that_have_a_closed_form():
     robot = rail_arm()
-    match = find(robot, task_map_of(robot, "pose"), ["j1"], families=[spherical_wrist])
-    assert match.family == "spherical_wrist"
-    assert "point_recipes" in spherical_wrist.source
     with pytest.raises(
         DecompositionError, match="no two neighbours among them move in one plane"
     ) as caught:
@@ -309,3 +201,20 @@ def test_it_is_found_by_geometry():
             families=[spherical_wrist],
         )
     assert ("j1",) in caught.value.available
+
+
+ALONG = (0.0, 0.0, 1.0)
+SMOOTH = {
+    "rail": (rail_arm, 0),
+    "joint 1": (rail_arm, 1),
+    "joint 3, rail along": (lambda: rail_arm(ALONG), 3),
+    "seven joints": (seven_joints, 2),
+    "backwards": (panda, 6),
+    "meeting of the last": (panda, 3),
+}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_labels_follow_the_branch_along_smooth_curves(name):
+    make, redundant = SMOOTH[name]
+    Bench(make(), (redundant,), postures=1).check_labels_along_curves()

@@ -169,16 +169,6 @@ def test_a_chain_survives_pickling(case):
     assert np.array_equal(again.torques(q, qdot, qddot), known)
 
 
-def test_masses_may_be_as_small_as_numbers_get():
-    model, frame = random_model(3, 0)
-    for i in range(1, 4):
-        model.inertias[i] = pin.Inertia(1e-300, np.zeros(3), 1e-300 * np.eye(3))
-    q = np.ones((1, 3))
-    found = chain_of(model, frame).torques(q, q, q)
-    assert np.isfinite(found).all()
-    assert np.abs(found).max() < 1e-290
-
-
 def test_rotation_vectors():
     rng = np.random.default_rng(0)
     axes = rng.normal(size=(400, 3))
@@ -204,7 +194,7 @@ def test_no_rotation_is_no_vector():
     assert np.array_equal(rotation_vectors(np.eye(3)[None]), np.zeros((1, 3)))
 
 
-def test_arrays_of_another_shape_are_refused(case):
+def test_arrays_of_another_shape_are_errors(case):
     chain, (q, qdot, qddot) = case[2], case[3]
     with pytest.raises(ValueError, match="an array has the shape"):
         chain.torques(q[:, :1].repeat(chain.n + 1, axis=1), qdot, qddot)

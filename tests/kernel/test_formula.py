@@ -1,17 +1,13 @@
 """Recorded formulas against NumPy, and their slopes against complex steps."""
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brachis.ik import ChainGeometry, FormulaSolver, Match, find_all
 from brachis.kernel import Formula
 from brachis.kernel.formula import arccos, arctan2, ceil, cos, sin, sqrt
-from brachis.robot import Robot, task_map_of
 
-ROOT = Path(__file__).parents[2]
 POINTS = 37  # not a multiple of what is computed side by side
 
 
@@ -87,75 +83,6 @@ def test_a_row_is_found_as_a_whole():
     assert Formula.of(function, 2)(points)[1, 1] == 5.0
 
 
-def test_points_of_another_size_are_refused(points):
+def test_points_of_another_size_are_errors(points):
     with pytest.raises(ValueError, match="needed"):
         Formula.of(everything, 2, 1)(*points[::-1])
-
-
-@pytest.mark.parametrize(
-    ("urdf", "rows"),
-    [
-        ("scara3", ["x", "y"]),
-        ("tx90l_rail", "pose"),
-        ("tx90l_rail", "position"),
-        ("ur10_rail", "pose"),
-        ("iiwa14", "pose"),
-        ("gantry2", ["x", "y"]),
-    ],
-)
-def test_closed_forms(urdf, rows):
-    """The library's answers, margins and slopes against the same formulas in NumPy."""
-    robot = Robot.from_urdf(ROOT / "robots" / urdf / "robot.urdf")
-    task_map = task_map_of(robot, rows)
-    q = np.random.default_rng(2).uniform(-2.5, 2.5, (POINTS, robot.n))
-    targets = task_map.values(q)
-    matches = [own for own in find_all(robot, task_map) if isinstance(own, Match)]
-    solvers = [match.solver for match in matches]
-    own = [solver for solver in solvers if isinstance(solver, FormulaSolver)]
-    assert own
-    names = list(robot.joint_names)
-    for match in matches:
-        solver = match.solver
-        if solver not in own:
-            continue
-        redundant = [names.index(name) for name in match.redundant_joints]
-        with np.errstate(all="ignore"):
-            known = solver.answers(targets, q[:, redundant])
-        known[~np.isfinite(known).all(axis=-1)] = np.nan
-        found = solver.solve(targets, q[:, redundant])
-        np.testing.assert_allclose(found, known, atol=1e-11)
-        for branch in range(len(solver.branches)):
-            of_branch = solver.solve_branch(targets, q[:, redundant], branch)
-            np.testing.assert_array_equal(of_branch, found[:, branch])
-            signs = solver.margin_signs(branch)
-            margins = solver.branch_margins(q, branch)
-            np.testing.assert_allclose(margins, solver.margins(q) * signs, atol=1e-12)
-            step = 1e-30j * np.eye(robot.n)
-            slopes = [(solver.margins(q + own).imag / 1e-30) * signs for own in step]
-            found_slopes = solver.margin_gradient(q, branch)
-            np.testing.assert_allclose(
-                found_slopes, np.stack(slopes, axis=2), atol=1e-11
-            )
-
-
-def test_the_geometry_takes_numbers_of_formulas():
-    """Joints before the first that moves keep plain numbers among those of the formula."""
-    chain = ChainGeometry(
-        revolute=np.array([True, True]),
-        axes=np.eye(3)[[2, 1]],
-        points=np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.2]]),
-        tool_position=np.array([1.0, 0.3, 0.0]),
-        tool_rotation=np.eye(3),
-        masses=np.zeros(2),
-        centers=np.zeros((2, 3)),
-        inertias=np.zeros((2, 6)),
-        gravity=np.zeros(3),
-        friction=np.zeros((2, 4)),
-        joint_names=("a", "b"),
-    )
-
-    def tool(q):
-        return chain.screws_with([1], q).tool_position.T
-
-    q = np.linspace(-2.0, 2.0, POINTS)[:, None]
-    np.testing.assert_allclose(Formula.of(tool, 1)(q), tool(q), atol=1e-15)

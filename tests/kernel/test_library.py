@@ -30,7 +30,7 @@ def test_a_missing_library(built, suffix):
 
 
 @pytest.mark.parametrize("change", ["truncated", "other"])
-def test_a_damaged_library_is_not_loaded(built, change, monkeypatch):
+def test_a_damaged_library_does_not_load(built, change, monkeypatch):
     content = built.read_bytes()
     changed = {"truncated": content[:9000], "other": content[:-1] + b"?"}[change]
     built.write_bytes(changed)
@@ -71,7 +71,7 @@ def test_all_variants_give_the_same_digits(monkeypatch):
     assert np.array_equal(found[0], found[-1])
 
 
-def test_a_failing_compiler_is_quoted(tmp_path, monkeypatch):
+def test_the_message_quotes_a_compiler_that_fails(tmp_path, monkeypatch):
     (tmp_path / "broken.c").write_text("this is no C")
     monkeypatch.setattr(compiling, "FOLDER", tmp_path)
     monkeypatch.setenv("CC", "false")

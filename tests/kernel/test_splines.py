@@ -103,6 +103,6 @@ def test_numbers_that_do_not_exist():
 @pytest.mark.parametrize(
     "places", [[0.0], [0.0, 1.0, 1.0, 2.0], [3.0, 2.0, 1.0, 0.0], [0.0] * 5]
 )
-def test_places_that_cannot_be_interpolated(places):
+def test_places_without_an_interpolation(places):
     with pytest.raises(ValueError, match="places of an interpolation"):
         Spline.through(np.array(places), np.ones(len(places)))

@@ -11,26 +11,17 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, ChartRows
 from brachis.robot import Robot
 from support.chains import planar_robot
-from support.charts import PLACES, chart_of, jacobian, least_motion, path_from
-from support.motions import Sway, check_derivatives, check_time_derivatives, joint_map
+from support.charts import chart_of, jacobian, least_motion, path_from
+from support.motions import (
+    PLANAR,
+    Sway,
+    arc_path,
+    check_derivatives,
+    check_time_derivatives,
+)
 from support.screw_arms import seven_joints
 from support.spatial import START, rail_arm
 
-PLANAR = {
-    "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
-    "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
-    "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
-    "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
-    "r = 1, 4R with yaw": (
-        "RRRR",
-        "xz",
-        ["x", "z", "pitch"],
-        [0.4, -0.6, 1.4, 0.8],
-        ["j1"],
-    ),
-    "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
-    "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
-}
 SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
 SPATIAL = {
     "r = 1, 7R, pose": (seven_joints, "pose", SEVEN, ["j1"]),
@@ -40,31 +31,28 @@ SPATIAL = {
 }
 
 
-def curved(robot, rows, start):
-    """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
-    tool = robot.tool_placement(np.array(start, dtype=float)).translation[
-        ["xyz".index(row) for row in rows[:2]]
-    ]
-    arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 35.0}
-    return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
-
-
-def bent(robot, start):
+def bent_path(robot, start):
     """A circular arc in space near the tool, along which the orientation is kept."""
     tool = robot.tool_placement(np.array(start[: robot.n], dtype=float)).translation
     via, to = tool + np.array([0.06, 0.05, -0.04]), tool + np.array([0.02, 0.12, -0.1])
     return [{"arc": {"via": via.tolist(), "to": to.tolist()}}]
 
 
-def given(name):
+def case_of(name):
     """Robot, rows, segments, start posture and redundant joints of a case."""
     if name in PLANAR:
         pattern, plane, rows, start, redundant = PLANAR[name]
         robot = planar_robot(pattern, plane)
-        return robot, rows, curved(robot, rows, start), start, redundant
+        return (
+            robot,
+            rows,
+            arc_path(robot, rows, start, angle_deg=35.0),
+            start,
+            redundant,
+        )
     make, rows, start, redundant = SPATIAL[name]
     robot = make()
-    return robot, rows, bent(robot, start), start, redundant
+    return robot, rows, bent_path(robot, start), start, redundant
 
 
 CASES = [
@@ -80,7 +68,7 @@ T = np.linspace(0.02, 0.97, 25)  # not at the knots of rows that follow
 @pytest.fixture(params=CASES, ids=str, scope="module")
 def motion(request):
     name, kind = request.param
-    robot, rows, segments, start, _ = given(name)
+    robot, rows, segments, start, _ = case_of(name)
     return Sway(chart_of(robot, rows, segments, start, kind), amplitude=0.1)
 
 
@@ -184,44 +172,6 @@ def test_a_copy_by_pickle_answers_alike(motion):
     np.testing.assert_array_equal(copy.start, chart.start)
 
 
-@pytest.mark.parametrize("name", [*PLANAR, "r = 1, 7R, pose", "r = 1, rail, pose"])
-def test_rows_that_select_joints_are_the_closed_form_of_these(name):
-    robot, rows, segments, start, redundant = given(name)
-    closed = joint_map(robot, rows, segments, start, redundant)
-    sway = Sway(closed, amplitude=0.1)
-    s = np.linspace(0.0, 1.0, PLACES)
-    reference = closed.postures(
-        np.column_stack(
-            [
-                s,
-                np.broadcast_to(
-                    closed.start[list(closed.redundant)], (PLACES, closed.r)
-                ),
-            ]
-        )
-    )
-    select = ChartRows.constant(np.eye(robot.n)[list(closed.redundant)])
-    chart = ChartMap(closed.task_map, closed.path, select, s, reference)
-    assert chart.redundant_joints == closed.redundant_joints
-    own, selected = (
-        each.coordinates(0.3, reference[5])[1:] for each in (chart, closed)
-    )
-    np.testing.assert_allclose(own, selected, atol=1e-12)
-    parts = sway(T)
-    expected, found = closed.state(*parts), chart.state(*parts)
-    for part in ("q", "qdot", "qddot", "gradient"):
-        size = max(1.0, np.abs(getattr(expected, part)).max())
-        np.testing.assert_allclose(
-            getattr(found, part), getattr(expected, part), atol=1e-10 * size
-        )
-    exact, derived = closed.derivatives(expected), chart.derivatives(found)
-    for part in ("qdot_y", "qddot_y", "qddot_ydot"):
-        size = max(1.0, np.abs(getattr(exact, part)).max())
-        np.testing.assert_allclose(
-            getattr(derived, part), getattr(exact, part), atol=1e-10 * size
-        )
-
-
 @pytest.mark.parametrize("turns", [-3, 0, 2])
 def test_angles_stay_in_the_turns_of_the_reference(scara_urdf, turns):
     """Joint 1 follows a circle about the base three times, from any turn on."""
@@ -243,17 +193,6 @@ def test_angles_stay_in_the_turns_of_the_reference(scara_urdf, turns):
     np.testing.assert_allclose(chart.coordinates(1.0, expected[-1]), y[-1], atol=1e-12)
     assert chart.coordinates(1.0, expected[-1])[1] != pytest.approx(
         chart.coordinates(1.0, expected[0])[1], abs=1.0
-    )
-
-
-def test_coordinates_of_what_is_not_known_are_not_known():
-    robot, rows, segments, start, _ = given("r = 2, 4R")
-    chart = chart_of(robot, rows, segments, start, "following")
-    assert np.isnan(chart.coordinates(0.4, np.full(4, np.nan))[1:]).all()
-    assert chart.coordinates(0.4, np.full(4, np.nan))[0] == 0.4
-    # Rows that follow the reference measure the way aside from it.
-    np.testing.assert_allclose(
-        chart.curves(chart.s, chart.reference)[:, 1:], 0.0, atol=1e-12
     )
 
 

@@ -122,17 +122,6 @@ def test_given_rows_are_kept_and_name_the_joints_that_they_select(scara):
         assert chart.redundant_joints == names
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, np.pi / 2])
-def test_transversality_is_the_cosine_of_the_angle_to_the_self_motion(angle, scara):
-    task_map, _ = path_from(scara, ["x", "y"], [{"line": {"by": [0.0, 0.2]}}], START)
-    null = null_spaces(jacobian(task_map, np.array([START])))
-    aside = null_space(null[0].T)[:, 0]
-    row = np.cos(angle) * null[0, :, 0] + np.sin(angle) * aside
-    np.testing.assert_allclose(
-        transversality(row[None, None], null), [np.cos(angle)], atol=1e-12
-    )
-
-
 def test_transversality_of_several_rows_is_that_of_the_worst_direction():
     task_map, _ = path_from(
         seven_joints(), "position", [{"line": {"by": [0.0, 0.0, 0.1]}}], SEVEN
@@ -146,22 +135,6 @@ def test_transversality_of_several_rows_is_that_of_the_worst_direction():
     aside = null_space(null[0].T)[:, 0]
     rows[2] = 0.6 * rows[2] + 0.8 * aside
     np.testing.assert_allclose(transversality(rows[None], null), [0.6], atol=1e-12)
-
-
-def test_without_redundancy_there_is_nothing_to_be_transversal_to(scara):
-    start = [0.2, 1.6, 0.5]
-    task_map, path = path_from(
-        scara, ["x", "y", "yaw"], [{"line": {"by": [0.0, 0.2, 0.3]}}], start
-    )
-    s = np.linspace(0.0, 1.0, 20)
-    q = least_motion(task_map, path, start, s)
-    assert np.all(
-        transversality(np.zeros((20, 0, 3)), null_spaces(jacobian(task_map, q)))
-        == np.inf
-    )
-    chart = chart_around(task_map, path, s, q)
-    assert chart.r == 0
-    np.testing.assert_allclose(chart.postures(s[:, None]), q, atol=1e-12)
 
 
 def test_a_joint_path_may_stand_still_in_s(once_around):

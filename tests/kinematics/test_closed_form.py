@@ -14,40 +14,22 @@ from brachis.limits.safeguards import build_branch_margins
 from brachis.optimise.evaluator import Evaluator
 from brachis.robot import Robot
 from support.chains import planar_robot
-from support.motions import Sway, check_derivatives, check_time_derivatives, joint_map
-
-CASES = {
-    "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
-    "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
-    "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
-    "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
-    "r = 1, 4R with yaw": (
-        "RRRR",
-        "xz",
-        ["x", "z", "pitch"],
-        [0.4, -0.6, 1.4, 0.8],
-        ["j1"],
-    ),
-    "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
-    "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
-}
+from support.motions import (
+    PLANAR,
+    Sway,
+    arc_path,
+    check_derivatives,
+    check_time_derivatives,
+    joint_map,
+)
 
 
-def curved(robot, rows, start):
-    """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
-    tool = robot.tool_placement(np.array(start, dtype=float)).translation[
-        ["xyz".index(row) for row in rows[:2]]
-    ]
-    arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 25.0}
-    return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
-
-
-@pytest.fixture(params=CASES, ids=str, scope="module")
+@pytest.fixture(params=PLANAR, ids=str, scope="module")
 def motion(request):
-    pattern, plane, rows, start, redundant = CASES[request.param]
+    pattern, plane, rows, start, redundant = PLANAR[request.param]
     robot = planar_robot(pattern, plane)
     return Sway(
-        joint_map(robot, rows, curved(robot, rows, start), start, redundant),
+        joint_map(robot, rows, arc_path(robot, rows, start), start, redundant),
         amplitude=0.1,
     )
 
@@ -79,17 +61,6 @@ def test_derivatives(motion):
     )
 
 
-def test_rows_of_redundant_joints_are_constant(motion):
-    chain = motion.joint_map
-    state = chain.state(*motion(T))
-    exact = chain.derivatives(state)
-    np.testing.assert_allclose(
-        state.q[:, chain.redundant], motion(T)[0][:, 1:], atol=1e-14
-    )
-    for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot):
-        np.testing.assert_array_equal(part[:, chain.redundant], 0.0)
-
-
 @pytest.mark.parametrize("turns", [-3, 0, 2])
 def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_many_turns(
     scara_urdf, turns
@@ -108,7 +79,7 @@ def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_ma
     )
 
 
-def test_slides_are_never_wrapped():
+def test_slides_never_wrap():
     robot = planar_robot("PPR")
     start = [20.0, -30.0, 0.4]
     chain = joint_map(robot, ["x", "y"], [{"line": {"by": [40.0, 0.0]}}], start, ["j3"])
@@ -153,7 +124,7 @@ def test_what_a_subclass_computes_itself_is_asked_for():
     robot = planar_robot("RRR", "xy")
     start = [0.4, 1.0, 0.5]
     known = joint_map(
-        robot, ["x", "y"], curved(robot, ["x", "y"], start), start, ["j2"]
+        robot, ["x", "y"], arc_path(robot, ["x", "y"], start), start, ["j2"]
     )
     assert isinstance(known.solver, PlanarSolver)
     solver = copy.copy(known.solver)

@@ -73,25 +73,6 @@ def test_the_jerk_of_short_pieces_is_that_of_the_closed_form(gap):
     assert np.abs(nodes.q - state.q).max() < 1e-11
 
 
-def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_urdf):
-    robot = Robot.from_urdf(scara_urdf)
-    # A line that passes the base closely: joint 1 turns quickly in the middle of it.
-    start = [np.deg2rad(-40.0), np.deg2rad(100.0), np.deg2rad(65.0)]
-    tool = robot.tool_placement(np.array(start)).translation[:2]
-    chain = joint_map(
-        robot, ["x", "y"], [{"line": {"to": [-tool[0], tool[1]]}}], start, ["j2"]
-    )
-    motion = Sway(chain, amplitude=0.0)
-    breaks = np.linspace(0.0, 1.0, 5)
-    nodes = interpolate(chain, motion, breaks, jumps=False)
-    assert np.isin(breaks, nodes.times).all()
-    assert np.all(np.diff(nodes.times) > 0.0)
-    steps = np.diff(nodes.times)
-    assert steps.max() > 1.9 * steps.min()
-    t = np.linspace(0.0, 1.0, 500)
-    assert np.abs(pieces(nodes)(t) - chain.state(*motion(t)).q).max() <= 1e-11
-
-
 def test_motion_that_leaves_the_branch_between_the_breaks(scara_urdf):
     robot = Robot.from_urdf(scara_urdf)
     chain = joint_map(

@@ -10,7 +10,6 @@ import pytest
 import brachis
 from brachis import LimitSpec
 from brachis.limits import Moments, limits_of
-from brachis.problem.problem import Problem
 from brachis.task import SpeedTable, Task
 from support.chains import gantry_robot
 
@@ -69,24 +68,6 @@ def test_speeds_are_held_where_they_are_prescribed_and_nowhere_else(robot, rates
     )
     (ratio,) = (check.value for check in found.checks if "tool speed" in check.name)
     assert ratio > 2.0
-
-
-def test_feed_rates_stand_beside_the_speed_of_the_task(robot, rates):
-    task = Task.model_validate({**line(rates), "tool_limits": {"speed": 0.5}})
-    (limit,) = (
-        each for each in Problem.of(robot, task).limits if each.kind == "tool_speed"
-    )
-    assert [bound.figure for bound in limit.bounds] == pytest.approx([0.5, SLOW, FAST])
-    s = np.array([0.2, 0.5, 0.8])
-    moving = np.tile([1.0, 0.0], (3, 1))
-    values = limit.values(
-        Moments(np.zeros((3, 2)), moving, 0.0 * moving, 0.0 * moving, s)
-    )
-    np.testing.assert_allclose(
-        values,
-        [[2.0, 1.0 / SLOW, 0.0], [2.0, 0.0, 0.0], [2.0, 0.0, 1.0 / FAST]],
-        rtol=1e-9,
-    )
 
 
 def test_partials_of_tables_over_parts_of_the_path(robot):

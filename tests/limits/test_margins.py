@@ -63,7 +63,7 @@ def test_what_cannot_be_kept_is_refused_with_the_key(result):
 
 
 @pytest.mark.parametrize("given", [{"singularity": -1.0}, {"joint_ends": 0.5}])
-def test_margins_that_make_no_sense_are_refused(given):
+def test_margins_that_make_no_sense_are_errors(given):
     with pytest.raises(TaskError, match="margins"):
         brachis.plan("tx90l_rail", margins=given, **TASK)
 

@@ -55,7 +55,7 @@ def right_partials(motion):
     return Partials(q=by_q, qdot=rows(motion, 0.5, 0.0, 0.0))
 
 
-def changed(motion, **parts):
+def partials_with(motion, **parts):
     return Partials(**{**vars(right_partials(motion)), **parts})
 
 
@@ -66,17 +66,21 @@ def bind(limit):
 @pytest.mark.parametrize(
     ("partials", "where", "joint"),
     [
-        (lambda m: changed(m, q=-right_partials(m).q), "q", "j2"),
-        (lambda m: changed(m, q=1.1 * right_partials(m).q), "q", "j2"),
-        (lambda m: changed(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
+        (lambda m: partials_with(m, q=-right_partials(m).q), "q", "j2"),
+        (lambda m: partials_with(m, q=1.1 * right_partials(m).q), "q", "j2"),
+        (lambda m: partials_with(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
         (lambda m: Partials(qdot=right_partials(m).q), "q", "j2"),
-        (lambda m: changed(m, q=right_partials(m).q * [1.0, 1.0, 0.0]), "q", "j3"),
-        (lambda m: changed(m, qdot=None), "qdot", "j1"),
-        (lambda m: changed(m, qddot=rows(m, 0.0, 0.1, 0.0)), "qddot", "j2"),
-        (lambda m: changed(m, s=np.ones((len(m.q), 1))), "s", ""),
+        (
+            lambda m: partials_with(m, q=right_partials(m).q * [1.0, 1.0, 0.0]),
+            "q",
+            "j3",
+        ),
+        (lambda m: partials_with(m, qdot=None), "qdot", "j1"),
+        (lambda m: partials_with(m, qddot=rows(m, 0.0, 0.1, 0.0)), "qddot", "j2"),
+        (lambda m: partials_with(m, s=np.ones((len(m.q), 1))), "s", ""),
     ],
 )
-def test_a_wrong_partial_derivative_is_named(partials, where, joint):
+def test_a_wrong_partial_derivative_is_in_the_message(partials, where, joint):
     with pytest.raises(InputError, match="contradicts the values") as caught:
         bind(Sum(right_values, partials))
     assert caught.value.where == f"own_limits[0].partials.{where}"
@@ -87,7 +91,9 @@ def test_a_wrong_partial_derivative_is_named(partials, where, joint):
 
 def test_the_numbers_are_those_of_the_joint():
     with pytest.raises(InputError) as caught:
-        bind(Sum(right_values, lambda m: changed(m, qdot=rows(m, -0.5, 0.0, 0.0))))
+        bind(
+            Sum(right_values, lambda m: partials_with(m, qdot=rows(m, -0.5, 0.0, 0.0)))
+        )
     assert "found -0.5 at q" in str(caught.value)
     assert "allowed: 0.5, by differences" in str(caught.value)
 
@@ -103,6 +109,12 @@ def test_values_that_use_the_jerk_need_order_3():
         bind(Sum(values, partials))
     assert caught.value.where == "own_limits[0].order"
     bind(Sum(values, partials, order=3))
+
+
+def torque_partials(motion):
+    exact = motion.torque_derivatives(ROBOT)
+    parts = (exact.q, exact.qdot, exact.qddot)
+    return Partials(*(0.01 * part[:, :1] for part in parts))
 
 
 def speed_in_steps(motion):
@@ -148,25 +160,21 @@ def speed_in_steps(motion):
             lambda m: right_values(m) + 1e-6 * np.sin(1e9 * m.q[:, :1]),
             right_partials,
         ),
+        (lambda m: 0.01 * m.torque(ROBOT)[:, :1], torque_partials),
     ],
-    ids=["smooth", "kink", "float32", "large", "s step", "steps", "steep", "noisy"],
+    ids=[
+        "smooth",
+        "kink",
+        "float32",
+        "large",
+        "s step",
+        "steps",
+        "steep",
+        "noisy",
+        "torques, which a motion keeps",
+    ],
 )
 def test_right_derivatives_pass(values, partials):
-    limit = Sum(values, partials)
-    assert any(own is limit for own in bind(limit).limits)
-
-
-def test_a_limit_on_torques_passes():
-    """A motion keeps its torques once they are computed."""
-
-    def values(motion):
-        return 0.01 * motion.torque(ROBOT)[:, :1]
-
-    def partials(motion):
-        exact = motion.torque_derivatives(ROBOT)
-        parts = (exact.q, exact.qdot, exact.qddot)
-        return Partials(*(0.01 * part[:, :1] for part in parts))
-
     limit = Sum(values, partials)
     assert any(own is limit for own in bind(limit).limits)
 
@@ -202,7 +210,7 @@ def test_values_may_be_undefined_in_some_postures_and_not_in_most(left_out, is_r
         bind(Sum(values, right_partials))
 
 
-def test_values_for_another_number_of_moments_are_refused():
+def test_values_for_another_number_of_moments_are_errors():
     def values(motion):
         return right_values(motion)[:12]
 

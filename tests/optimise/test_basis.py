@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from brachis.common.arrays import greville
 from brachis.optimise.bspline import basis_matrix, clamped_uniform_knots, local_basis
 
 CASES = [
@@ -47,43 +48,7 @@ def test_any_spline_and_its_derivatives(degree, derivative, uniform):
         matrix = basis_matrix(knots, degree, t_norm)
         assert matrix.shape == (len(t_norm), len(coefficients))
         np.testing.assert_allclose(matrix @ coefficients, expected, atol=1e-12 * scale)
-
-
-@pytest.mark.parametrize("degree", range(2, 7))
-def test_partition_of_unity_and_its_vanishing_derivatives(degree):
-    knots = knots_of(degree, uniform=False)
-    t_norm = np.linspace(0.0, 1.0, 333)
-    _, (values, *derivatives) = local_basis(knots, degree, t_norm)
-    assert values.min() >= -1e-15
-    np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-13)
-    for slopes in derivatives[:degree]:
-        assert np.abs(slopes).max() > 1.0
-        np.testing.assert_allclose(
-            slopes.sum(axis=1), 0.0, atol=1e-12 * np.abs(slopes).max()
-        )
-
-
-@pytest.mark.parametrize("degree", range(2, 7))
-def test_clamped_ends(degree):
-    knots = clamped_uniform_knots(degree, 7)
-    assert len(knots) == 7 + 2 * degree + 1
-    np.testing.assert_allclose(np.unique(knots), np.arange(8) / 7, atol=1e-15)
-    coefficients = np.random.default_rng(0).normal(size=7 + degree)
-    ends = np.array([0.0, 1.0])
-    np.testing.assert_allclose(
-        basis_matrix(knots, degree, ends) @ coefficients,
-        coefficients[[0, -1]],
-        atol=1e-14,
-    )
-    # De Boor: the end slope is degree times the first control difference over the first interval.
-    first, values = local_basis(knots, degree, ends)
-    slope = np.sum(
-        values[1] * coefficients[first[:, None] + np.arange(degree + 1)], axis=1
-    )
-    steps = np.array(
-        [coefficients[1] - coefficients[0], coefficients[-1] - coefficients[-2]]
-    )
-    np.testing.assert_allclose(slope, degree * steps * 7, rtol=1e-12)
+        np.testing.assert_allclose(matrix @ greville(knots, degree), t_norm, atol=1e-12)
 
 
 def test_times_beyond_the_ends_are_taken_back():

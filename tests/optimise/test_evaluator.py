@@ -56,17 +56,6 @@ def test_slopes_are_differences(case):
             )
 
 
-@pytest.mark.parametrize("example", ["scara_line", "tx90l_rail_line", "tilted_torch"])
-def test_joint_limits_are_quantities_of_the_kernel(example):
-    program, _ = brachis.transcribe(getattr(brachis.examples, example))
-    for phase in program.phases:
-        groups = phase.evaluator._groups
-        others = {phase.limits[number].kind for number in groups.with_partials}
-        kinds = {limit.kind for limit in phase.limits} - others
-        assert "torque" in kinds
-        assert not others & {"torque", "velocity", "acceleration", "position", "jerk"}
-
-
 class DoubledTorque(joint.TorqueLimit):
     """A subclass with another quantity."""
 

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 import brachis
 from brachis.verify import verify_trajectory
-from support.chains import INERTIAL, Joint, chain_urdf
+from support.slides import X, plan_slides, slides
 
 MASS, FORCE, LENGTH = 4.0, 50.0, 1.2
 VISCOUS, COULOMB = 12.0, 20.0
@@ -27,31 +27,15 @@ FREE = {"intervals": 16, "knots": "free", "shortest_interval": 0.02}
 DYNAMICS = "<dynamics damping='{damping}' friction='{friction}'/>"
 
 
-def slide(damping: float = 0.0, friction: float = 0.0) -> str:
-    joint = Joint(
-        "prismatic",
-        axis=(1.0, 0.0, 0.0),
-        limit={"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": FORCE},
-        inertial=INERTIAL.format(mass=MASS),
-        extra=DYNAMICS.format(damping=damping, friction=friction),
-    )
-    return chain_urdf([joint], tool=(0.1, 0.2, 0.3))
+def slide(damping: float = 0.0, friction: float = 0.0) -> brachis.Robot:
+    extra = DYNAMICS.format(damping=damping, friction=friction)
+    return slides([X], [FORCE], MASS, extra)
 
 
 def plan(
-    urdf: str, spline: Mapping[str, object] = EVEN, **robot: object
+    robot: brachis.Robot, spline: Mapping[str, object] = EVEN, **settings: object
 ) -> brachis.Result:
-    options = {"gravity": [0, 0, 0], "tool_frame": "tool", **robot}
-    task = {
-        "brachis": 1,
-        "start": {"joints": [0.0]},
-        "task_space": ["x"],
-        "path": [{"line": {"by": [LENGTH]}}],
-        "spline": {"rest": "velocity", **spline},
-    }
-    return brachis.plan(
-        brachis.Robot.from_urdf("slide", urdf_text=urdf, **options), task
-    )
+    return plan_slides(robot, ["x"], [LENGTH], settings=settings, spline=spline)
 
 
 def viscous_time() -> float:
@@ -77,10 +61,11 @@ def coulomb_time() -> float:
 
 
 FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
+HEAVY = 2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE)
 
 
 @pytest.mark.parametrize(
-    ("urdf", "friction", "spline", "expected"),
+    ("robot", "friction", "spline", "expected"),
     [
         (slide(damping=VISCOUS), {}, EVEN, viscous_time()),
         (slide(), {"viscous": VISCOUS}, EVEN, viscous_time()),
@@ -91,12 +76,8 @@ FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
             EVEN,
             FRICTIONLESS,
         ),
-        (
-            slide(),
-            {"rotor_inertia": 1e-4, "gear_ratio": 200.0},
-            EVEN,
-            2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE),
-        ),
+        (slide(), {"rotor_inertia": 1e-4, "gear_ratio": 200.0}, EVEN, HEAVY),
+        (slide(), {"armature": 4.0}, EVEN, HEAVY),
     ],
     ids=[
         "viscous of the URDF",
@@ -104,30 +85,27 @@ FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
         "Coulomb of the URDF",
         "switched off",
         "rotor",
+        "armature",
     ],
 )
-def test_slides_with_friction_reach_the_known_optimum(urdf, friction, spline, expected):
-    result = plan(urdf, spline, friction=friction)
+def test_slides_with_friction_reach_the_known_optimum(
+    robot, friction, spline, expected
+):
+    result = plan(robot, spline, friction=friction)
     assert result.verified
     assert expected * (1.0 - 1e-4) < result.t_end < 1.001 * expected
 
 
 @pytest.mark.parametrize(
-    "urdf",
+    "robot",
     [slide(damping=VISCOUS), slide(friction=COULOMB)],
     ids=["viscous", "Coulomb"],
 )
-def test_a_motion_without_friction_exceeds_the_torque_of_a_drive_that_rubs(urdf):
-    free = plan(urdf, FEW, friction={"viscous": None, "coulomb": None})
-    assert free.t_end < 0.99 * plan(urdf, FEW).t_end
+def test_a_motion_without_friction_exceeds_the_torque_of_a_drive_that_rubs(robot):
+    free = plan(robot, FEW, friction={"viscous": None, "coulomb": None})
+    assert free.t_end < 0.99 * plan(robot, FEW).t_end
     rubbing = brachis.Robot.from_urdf(
-        "slide", urdf_text=urdf, gravity=[0, 0, 0], tool_frame="tool"
+        "slide", urdf_text=robot.urdf, gravity=[0, 0, 0], tool_frame="tool"
     )
     checks = verify_trajectory(free.trajectory, robot=rubbing).checks
     assert [check.name for check in checks if not check.passed] == ["torque ratio"]
-
-
-def test_the_friction_in_use_is_said_in_the_result():
-    said = plan(slide(VISCOUS, COULOMB), FEW).to_dict()["in_use"]
-    assert said["viscous friction"] == "j1 12 N s/m (as the URDF states it)"
-    assert said["Coulomb friction"] == "j1 20 N (as the URDF states it)"

@@ -7,8 +7,6 @@ import pytest
 
 from brachis.optimise.guess import shortest_time, worst_time_scaling_ratio
 from brachis.optimise.program import Program
-from brachis.search.differential_ik import STRATEGIES, differential_ik_path
-from support.chains import planar_robot, program_of
 from support.phases import CASES, phase_of
 from support.starts import starting_points
 
@@ -17,9 +15,10 @@ from support.starts import starting_points
 @pytest.mark.parametrize("case", CASES)
 def test_guesses_are_reachable_and_slow_enough(case, intervals):
     phase = phase_of(case, intervals=intervals, points_per_interval=3)
-    found = list(starting_points(Program([phase])))
-    assert len(found) >= (3 if phase.joint_map.r else 1)
-    for x in found:
+    guesses = list(starting_points(Program([phase])))
+    shapes = {tuple(np.round(x[1:], 3)) for x in guesses}
+    assert len(shapes) >= (3 if phase.joint_map.r else 1)
+    for x in guesses:
         assert x.shape == (phase.variables,)
         state = phase.state(x)
         for kind in ("torque", "velocity", "acceleration"):
@@ -28,28 +27,6 @@ def test_guesses_are_reachable_and_slow_enough(case, intervals):
         part = phase.slices[0]
         assert np.all(np.diff(x[part]) >= 0.0)
         assert np.all((x[part] >= 0.0) & (x[part] <= 1.0))
-
-
-def test_guesses_differ():
-    found = list(starting_points(Program([phase_of("r2")])))
-    shapes = {tuple(np.round(x[1:], 3)) for x in found}
-    assert len(shapes) >= 3
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_numeric_course_is_one_that_the_closed_form_can_follow(case):
-    chain = phase_of(case).joint_map
-    joint_path = differential_ik_path(chain, STRATEGIES[0])
-    assert joint_path.shape[1] == 1 + chain.r
-    if chain.r == 0:
-        np.testing.assert_array_equal(joint_path, [[0.0], [1.0]])
-        return
-    np.testing.assert_array_equal(joint_path[0], [0.0, *chain.start[chain.redundant]])
-    assert joint_path[-1, 0] == 1.0
-    assert np.all(np.diff(joint_path[:, 0]) >= 0.0)
-    postures = chain.postures(joint_path)
-    assert np.isfinite(postures).all()
-    assert np.abs(np.diff(postures, axis=0)).max() < 0.5
 
 
 # Half of an open range is infinite; a push away from its ends must not become so.
@@ -75,28 +52,3 @@ def test_time_scaling_stops_at_the_limits():
     assert worst_time_scaling_ratio(program, barely) > 1.0
     np.testing.assert_array_equal(slow[1:], fast[1:])
     assert fast[0] == 0.05
-
-
-# The measured yaw jumps at pi, the path's does not.
-@pytest.mark.parametrize("yaw", [0.5, 2.9])
-@pytest.mark.parametrize("redundant", [[], ["j1"]], ids=["r0", "r1"])
-def test_yaw_may_turn_past_half_a_turn(redundant, yaw):
-    robot = planar_robot("RRRR" if redundant else "RRR")
-    start = np.array([0.4, -0.6, 1.4, 0.0] if redundant else [0.4, 1.8, 0.0])
-    rotation = robot.tool_placement(start).rotation
-    start[-1] = (
-        np.remainder(
-            yaw - np.arctan2(rotation[1, 0], rotation[0, 0]) + np.pi, 2.0 * np.pi
-        )
-        - np.pi
-    )
-    path = [{"line": {"by": [-0.05, 0.03, 0.4]}}]
-    program = program_of(robot, ["x", "y", "yaw"], path, start, redundant, intervals=8)
-    (phase,) = program.phases
-    assert phase.joint_map.path.sample(np.array([0.0, 1.0])).target[
-        :, 2
-    ] == pytest.approx([yaw, yaw + 0.4])
-    found = list(starting_points(program))
-    assert found, "no guess"
-    for x in found:
-        assert np.abs(np.diff(phase.state(x).q, axis=0)).max() < 1.0

@@ -8,24 +8,18 @@ from functools import partial
 import numpy as np
 import pytest
 
-import brachis
-from brachis.common.deadline import NEVER, Deadline
-from brachis.optimise import improve as module
+from brachis.common.deadline import Deadline
 from brachis.optimise.backends import (
-    Solver,
-    SolverOptions,
     SolverReport,
     SolveStatus,
 )
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import (
     SolvedProgram,
-    SolverSession,
     attempt_once,
     improve,
     keep_feasible,
 )
-from brachis.optimise.near_rows import NearRows
 from brachis.optimise.program import Program
 from support.phases import phase_of
 from support.starts import starting_points
@@ -60,7 +54,7 @@ def solve(program, _x):
     )
 
 
-def solved(program) -> SolvedProgram:
+def solution_of(program) -> SolvedProgram:
     return SolvedProgram(program, (solve(program, None),))
 
 
@@ -78,40 +72,43 @@ def changes_to(*programs):
     return [change_to(program) for program in programs], seen
 
 
-FIRST = solved(Fake(5.0))
+FIRST = solution_of(Fake(5.0))
 
 
-def test_every_motion_is_kept_unless_said_otherwise():
-    changes, seen = changes_to(Fake(4.0), Fake(6.0), Fake(5.5))
-    found = improve(FIRST, changes, partial(attempt_once, solve))
-    assert found.t_end == 5.5
-    assert seen == [5.0, 4.0, 6.0]
-    assert [report.objective for report in found.reports] == [5.0, 4.0, 6.0, 5.5]
+GAINS = {"least_gain": 0.0, "go_on_above": None}
+KEEPING = {
+    "every motion": ([4.0, 6.0, 5.5], {}, 5.5, [5.0, 4.0, 6.0]),
+    "gains alone": ([4.0, 6.0, 4.5], GAINS, 4.0, [5.0, 4.0, 4.0]),
+    "up to a small gain": (
+        [4.0, 3.99, 1.0],
+        {"least_gain": 0.0, "go_on_above": 0.01},
+        3.99,
+        [5.0, 4.0],
+    ),
+    "what something else judges to be better": (
+        [4.0, 6.0],
+        {**GAINS, "judge": lambda solved: 10.0 - solved.t_end},
+        6.0,
+        [5.0, 5.0],
+    ),
+}
 
 
-def test_only_gains_are_kept_and_the_report_of_what_is_kept_is_the_last():
-    changes, seen = changes_to(Fake(4.0), Fake(6.0), Fake(4.5))
-    found = improve(
-        FIRST, changes, partial(attempt_once, solve), least_gain=0.0, go_on_above=None
-    )
-    assert found.t_end == 4.0
-    assert found.program.t_end == 4.0
-    assert seen == [5.0, 4.0, 4.0]
-    assert [report.objective for report in found.reports] == [5.0, 6.0, 4.5, 4.0]
-
-
-def test_a_small_gain_is_kept_and_is_the_last():
-    changes, seen = changes_to(Fake(4.0), Fake(3.99), Fake(1.0))
-    attempt = partial(attempt_once, solve)
-    found = improve(FIRST, changes, attempt, least_gain=0.0, go_on_above=0.01)
-    assert found.t_end == 3.99
-    assert len(seen) == 2
+@pytest.mark.parametrize("case", KEEPING)
+def test_which_motions_stay(case):
+    times, options, t_end, proposed_from = KEEPING[case]
+    changes, seen = changes_to(*map(Fake, times))
+    best = improve(FIRST, changes, partial(attempt_once, solve), **options)
+    assert best.t_end == best.program.t_end == best.reports[-1].objective == t_end
+    assert seen == proposed_from
+    tried = times[: len(seen)]
+    assert sorted(report.objective for report in best.reports) == sorted([5.0, *tried])
 
 
 def test_a_failure_ends_it():
     changes, seen = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
-    found = improve(FIRST, changes, partial(attempt_once, solve))
-    assert found.t_end == 4.0
+    best = improve(FIRST, changes, partial(attempt_once, solve))
+    assert best.t_end == 4.0
     assert len(seen) == 2
 
 
@@ -150,43 +147,10 @@ def test_an_early_end_counts_if_it_is_faster_than_its_beginning():
     assert kept.t_end == 5.0
 
 
-def test_judged_by_something_else():
-    changes, _ = changes_to(Fake(4.0), Fake(6.0))
-    found = improve(
-        FIRST,
-        changes,
-        partial(attempt_once, solve),
-        least_gain=0.0,
-        go_on_above=None,
-        judge=lambda tried: 10.0 - tried.t_end,
-    )
-    assert found.t_end == 6.0
-
-
-def test_the_answer_is_lengthened_by_the_factor():
+def test_the_end_time_has_the_factor_of_the_answer():
     lengthened = SolvedProgram(Fake(5.0), FIRST.reports, time_scaled=1.01)
     assert lengthened.t_end == pytest.approx(5.05)
     assert lengthened.report.x[0] == 5.0
-
-
-@pytest.mark.parametrize("rows", [[0, 1], None])
-def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
-    program, _ = brachis.transcribe(
-        brachis.examples.scara_line, redundant_joints=["j1"], intervals=10
-    )
-    x = next(starting_points(program))
-    steps = []
-
-    def run(monitor, x):
-        steps.append(monitor.options.first_step)
-        return monitor.report("fake", SolveStatus.OPTIMAL, x, np.zeros_like(x), "")
-
-    def solve_some(problem, x, solve, **_):
-        return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)
-
-    monkeypatch.setattr(module, "solve_near_rows", solve_some)
-    SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
-    assert steps == [1.0 if rows is None else 0.1]
 
 
 def test_if_the_time_is_up_a_feasible_start_is_the_answer():

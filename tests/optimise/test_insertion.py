@@ -13,9 +13,7 @@ from brachis.optimise.bspline import (
     basis_derivatives,
     basis_functions,
     clamped_knots,
-    clamped_uniform_knots,
     insert_knots,
-    local_basis,
 )
 
 LENGTHS = np.array([0.3, 0.05, 0.2, 0.01, 0.14, 0.3])
@@ -47,39 +45,6 @@ def test_the_same_curves(degree, old, new, seed):
         BSpline(fine_knots, inserted.T, degree)(t_norm),
     )
     np.testing.assert_allclose(after, before, atol=1e-13)
-
-
-def test_one_knot_by_boehm():
-    """Boehm's rule: new points divide the old legs in the ratio of the new knot."""
-    points = np.array([[0.0, 1.0, 3.0, -2.0]])
-    inserted = insert_knots(
-        points,
-        clamped_uniform_knots(3, 1),
-        clamped_knots(3, np.array([0.0, 0.25, 1.0])),
-        3,
-    )
-    np.testing.assert_allclose(inserted, [[0.0, 0.25, 1.5, 1.75, -2.0]], atol=1e-15)
-
-
-@pytest.mark.parametrize("degree", range(2, 7))
-def test_basis_functions_of_lengths_are_scipys(degree):
-    breaks = np.concatenate([[0.0], np.cumsum(LENGTHS)])
-    knots = clamped_knots(degree, breaks / breaks[-1])
-    for interval, length in enumerate(LENGTHS):
-        for fraction in (0.0, 0.31, 0.999):
-            lengths = around(LENGTHS, degree, interval)
-            mine = basis_functions(lengths[None], np.array([fraction]))[:, 0]
-            t_norm = breaks[interval] + fraction * length
-            assert local_basis(knots, degree, np.array([t_norm]))[0][0] == interval
-            for order in range(4):
-                expected = BSpline(knots, np.eye(len(knots) - degree - 1), degree)(
-                    t_norm, nu=order
-                )
-                own = expected[interval : interval + degree + 1]
-                np.testing.assert_allclose(
-                    mine[order], own, atol=1e-12 * max(1.0, np.abs(own).max())
-                )
-                assert np.count_nonzero(expected) <= degree + 1
 
 
 @pytest.mark.parametrize("degree", range(2, 7))

@@ -20,7 +20,7 @@ def finer(phase):
     return phase.with_knots(clamped_knots(phase.degree, breaks), spread(breaks, 3))
 
 
-def moved(phase, x, seed=0):
+def with_other_lengths(phase, x, seed=0):
     """Free knots, and a point with other lengths than even ones."""
     free = phase.with_free_knots(SHORTEST)
     rng = np.random.default_rng(seed)
@@ -63,25 +63,6 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
         )
 
 
-def test_a_feasible_motion_stays_feasible_at_old_points():
-    phase = phase_of("r1", intervals=6)
-    x = reachable_points(phase, 1, spread=0.0)[0]
-    fine = finer(phase).with_points(phase.t_norm)
-    there = fine.variables_from(phase.motion(x).with_knots(fine.knots))
-    # A mean over time is one of the values at the points, weighted by the intervals that they are in.
-    rows = np.concatenate(
-        [
-            phase.rows_of(limit).ravel()
-            for limit in phase.limits
-            if not limit.guarantee.is_mean
-        ]
-    )
-    np.testing.assert_allclose(fine.rows(there)[rows], phase.rows(x)[rows], atol=1e-10)
-    assert np.diff(there[fine.slices[0]]).min() >= -1e-15, (
-        "s(t) should still be monotone in its control points"
-    )
-
-
 @pytest.mark.parametrize("degree", [2, 3, 5])
 def test_free_knots_where_they_are_given_change_nothing(degree):
     phase = phase_of("r1", degree=degree, rest="velocity")
@@ -99,7 +80,7 @@ def test_free_knots_where_they_are_given_change_nothing(degree):
 def test_points_move_with_the_knots():
     phase = phase_of("r2")
     (x,) = reachable_points(phase, 1)
-    free, there = moved(phase, x)
+    free, there = with_other_lengths(phase, x)
     ends = np.concatenate([[0.0], np.cumsum(there[-5:])])
     motion = free.motion(there)
     np.testing.assert_allclose(motion.breaks / motion.t_end, ends, atol=1e-14)
@@ -116,31 +97,6 @@ def test_points_move_with_the_knots():
     np.testing.assert_allclose(
         free.violation_at(there, t_norm), free.violation(there), atol=1e-9
     )
-
-
-def test_frozen():
-    phase = phase_of("r2")
-    (x,) = reachable_points(phase, 1)
-    free, there = moved(phase, x)
-    fixed = free.fix_knots(there)
-    same = fixed.variables_from(free.motion(there))
-    assert fixed.variables == phase.variables
-    assert_same_motion(fixed.motion(same), free.motion(there))
-    np.testing.assert_allclose(fixed.violation(same), free.violation(there), atol=1e-9)
-    assert phase.fix_knots(x).grid is phase.grid
-    assert phase.fix_knots(x).variables == phase.variables
-
-
-def test_lengths_that_do_not_add_up_make_a_longer_motion():
-    phase = phase_of("r1")
-    (x,) = reachable_points(phase, 1)
-    free, there = moved(phase, x)
-    longer = there.copy()
-    longer[-5:] *= 1.01
-    assert free.motion(longer).t_end == pytest.approx(1.01 * x[0])
-    state = free.state(longer)
-    at = free.motion(longer).at(spread(free.motion(longer).breaks, 2))
-    np.testing.assert_allclose(state.yddot, at[2], atol=1e-10 * np.abs(at[2]).max())
 
 
 def test_curves_at_knots_are_those_behind_them_whatever_the_rounding():

@@ -19,70 +19,34 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import brachis
-from support.chains import INERTIAL, Joint, chain_urdf
-from support.solvers import INSTALLED
+from support.slides import X, Y, Z, plan_slides, slides
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 SLACK = 2e-4  # refinement may lengthen the time by its tolerance
 
 
-@pytest.fixture
-def slides(tmp_path):
-    """Write the URDF of slides, each with MASS, and return its path."""
-
-    def write(axes, forces) -> str:
-        limits = [
-            {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force}
-            for force in forces
-        ]
-        joints = [
-            Joint(
-                "prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS)
-            )
-            for axis, limit in zip(axes, limits, strict=True)
-        ]
-        file = tmp_path / "slides.urdf"
-        file.write_text(chain_urdf(joints, tool=(0.1, 0.2, 0.3)), encoding="utf-8")
-        return str(file)
-
-    return write
-
-
 def plan(
-    urdf,
+    robot,
     rows,
     by,
     *,
-    redundant=(),
-    robot=None,
-    joints=None,
+    settings=None,
     intervals=20,
-    degree=3,
     rest="velocity",
+    redundant_joints=(),
     solver="auto",
     boundary=None,
     **spline,
 ):
-    task = {
-        "brachis": 1,
-        "robot": {"gravity": [0, 0, 0], **(robot or {})},
-        "start": {"joints": joints or [0.0] * len(rows)},
-        "task_space": rows,
-        "path": [{"line": {"by": by}}],
-        "redundant_joints": list(redundant),
-        "spline": {"degree": degree, "intervals": intervals, "rest": rest, **spline},
-        "solver": {"name": solver},
-        "boundary": boundary or {},
-    }
-    return brachis.plan(urdf, task)
-
-
-def fastest(result) -> np.ndarray:
-    """Largest speed of every joint on a dense grid."""
-    return np.abs(result.trajectory.velocity(np.linspace(0.0, result.t_end, 4001))).max(
-        axis=0
+    return plan_slides(
+        robot,
+        rows,
+        by,
+        settings=settings,
+        spline={"intervals": intervals, "rest": rest, **spline},
+        redundant_joints=list(redundant_joints),
+        solver={"name": solver},
+        boundary=boundary or {},
     )
 
 
@@ -90,17 +54,11 @@ def bang_bang(mass: float) -> float:
     return 2.0 * np.sqrt(mass * LENGTH / FORCE)
 
 
-def test_one_slide(slides):
-    result = plan(slides([X], [FORCE]), ["x"], [LENGTH])
-    assert result.verified
-    assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
-
-
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 @pytest.mark.parametrize(
     ("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)]
 )
-def test_slide_between_speeds(slides, first, last, rest):
+def test_slide_between_speeds(first, last, rest):
     """Full force forwards up to the speed v with 2 v^2 = 2 a L + v0^2 + v1^2, full force back from there."""
     speeds, boundary = (
         np.array([first, last]),
@@ -131,7 +89,7 @@ def test_slide_between_speeds(slides, first, last, rest):
 @pytest.mark.parametrize(
     ("axis", "mass"), [(0, 2.0 * MASS), (1, MASS)], ids=["lower slide", "upper slide"]
 )
-def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
+def test_gantry_approaches_bang_bang_from_above(axis, mass):
     # The lower slide carries the upper one.
     urdf, by = (
         slides([X, Y], [FORCE, FORCE]),
@@ -149,7 +107,7 @@ def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
 
 
 @pytest.mark.parametrize("intervals", [10, 20, 40])
-def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
+def test_rest_in_acceleration_costs_two_more_ramps(intervals):
     result = plan(
         slides([X, Y], [FORCE, FORCE]),
         ["x", "y"],
@@ -166,7 +124,7 @@ def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
-def test_free_knots_leave_the_shortest_ramps(slides, rest):
+def test_free_knots_leave_the_shortest_ramps(rest):
     urdf, by, shortest = slides([X, Y], [FORCE, FORCE]), [LENGTH, 0.0], 0.2
     result = plan(
         urdf,
@@ -186,7 +144,7 @@ def test_free_knots_leave_the_shortest_ramps(slides, rest):
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
-def test_mesh_refinement_comes_near_bang_bang(slides, rest):
+def test_mesh_refinement_comes_near_bang_bang(rest):
     result = plan(
         slides([X, Y], [FORCE, FORCE]),
         ["x", "y"],
@@ -202,7 +160,7 @@ def test_mesh_refinement_comes_near_bang_bang(slides, rest):
 
 # The acceleration jumps at knots: nodes packed closely around one would let rounding spoil the pieces.
 @pytest.mark.parametrize("intervals", [10, 40])
-def test_parabolas_are_bang_bang_itself(slides, intervals):
+def test_parabolas_are_bang_bang_itself(intervals):
     result = plan(
         slides([X, Y], [FORCE, FORCE]),
         ["x", "y"],
@@ -214,61 +172,19 @@ def test_parabolas_are_bang_bang_itself(slides, intervals):
     assert result.verified, result.verification
 
 
-def test_diagonal_line_is_as_fast_as_its_slower_slide(slides):
-    # Along the diagonal each slide goes LENGTH; the lower one, which carries 2 MASS, sets the pace.
-    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, LENGTH])
-    assert result.verified
-    assert bang_bang(2.0 * MASS) < result.t_end < 1.01 * bang_bang(2.0 * MASS)
-
-
-def test_velocity_limit_gives_the_trapezoid(slides):
-    urdf, mass, limit = slides([X, Y], [FORCE, FORCE]), 2.0 * MASS, 2.0
-    free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
-    assert fastest(free)[0] > 1.5 * limit, (
-        "without the limit the slide is faster than the limit"
-    )
-    result = plan(
-        urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"velocity": limit}}
-    )
-    assert result.verified
-    assert fastest(result)[0] == pytest.approx(limit, rel=SLACK)
-    trapezoid = LENGTH / limit + limit * mass / FORCE
-    assert trapezoid <= result.t_end < 1.01 * trapezoid
-    assert result.t_end > 1.1 * free.t_end
-
-
-def test_acceleration_limit(slides):
-    urdf, limit = slides([X, Y], [FORCE, FORCE]), 6.0
-    t = np.linspace(0.0, 1.0, 2001)
-    free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
-    assert np.abs(free.trajectory.acceleration(t * free.t_end)).max() > 2.0 * limit
-    result = plan(
-        urdf,
-        ["x", "y"],
-        [LENGTH, 0.0],
-        robot={"limits": {"acceleration": limit, "torque": None}},
-    )
-    assert result.verified
-    assert np.abs(result.trajectory.acceleration(t * result.t_end)).max() <= limit * (
-        1.0 + SLACK
-    )
-    best = 2.0 * np.sqrt(LENGTH / limit)
-    assert best <= result.t_end < 1.01 * best
-
-
 JERK = 50.0
 
 
 @pytest.mark.parametrize(
     "limit", [{"jerk": JERK}, {"torque_rate": JERK * MASS}], ids=str
 )
-def test_jerk_limit(slides, limit):
+def test_jerk_limit(limit):
     # The jerk is J, -J, -J, J over a quarter of the time each: L = J t^3 / 32.
     urdf, t = slides([X], [FORCE]), np.linspace(0.0, 1.0, 2001)
     free = plan(urdf, ["x"], [LENGTH], intervals=20, rest="full")
     assert np.abs(free.trajectory.jerk(t * free.t_end)).max() > 5.0 * JERK
     result = plan(
-        urdf, ["x"], [LENGTH], intervals=20, rest="full", robot={"limits": limit}
+        urdf, ["x"], [LENGTH], intervals=20, rest="full", settings={"limits": limit}
     )
     assert result.verified
     assert result.t_end == pytest.approx(
@@ -281,7 +197,7 @@ def test_jerk_limit(slides, limit):
 
 
 @pytest.mark.parametrize("acceleration", [None, 8.0])
-def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, acceleration):
+def test_jerk_limit_beside_limits_of_velocity_and_acceleration(acceleration):
     velocity = 1.5
     limits = {"jerk": JERK, "velocity": velocity, "acceleration": acceleration}
     result = plan(
@@ -290,7 +206,7 @@ def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, accelerat
         [LENGTH],
         intervals=48,
         rest="full",
-        robot={"limits": limits},
+        settings={"limits": limits},
     )
     # The velocity is reached in 2 sqrt(v / J), or in v / a + a / J where the acceleration stays at its limit.
     ramp = (
@@ -302,8 +218,8 @@ def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, accelerat
     assert LENGTH / velocity + ramp <= result.t_end < (LENGTH / velocity + ramp) * 1.001
 
 
-def test_rest_in_jerk_too(slides):
-    robot = {"limits": {"jerk": JERK}}
+def test_rest_in_jerk_too():
+    settings = {"limits": {"jerk": JERK}}
     result = plan(
         slides([X], [FORCE]),
         ["x"],
@@ -311,7 +227,7 @@ def test_rest_in_jerk_too(slides):
         intervals=40,
         degree=4,
         rest="jerk",
-        robot=robot,
+        settings=settings,
     )
     assert result.verified
     names = [check.name for check in result.verification.checks]
@@ -323,20 +239,8 @@ def test_rest_in_jerk_too(slides):
     assert best < result.t_end < 1.03 * best
 
 
-def test_armature_is_carried_like_mass(slides):
-    result = plan(
-        slides([X, Y], [FORCE, FORCE]),
-        ["x", "y"],
-        [LENGTH, 0.0],
-        robot={"friction": {"armature": {"j1": 3.0}}},
-    )
-    best = bang_bang(2.0 * MASS + 3.0)
-    assert result.verified
-    assert best <= result.t_end < 1.01 * best
-
-
 @pytest.mark.parametrize("way", [1.0, -1.0], ids=["up", "down"])
-def test_lifting_against_gravity(slides, way):
+def test_lifting_against_gravity(way):
     # Full force up gives F/m - g, full force down F/m + g; from rest to rest t^2 = 2 L (a + b) / (a b).
     force = 30.0
     up, down = force / MASS - 9.81, force / MASS + 9.81
@@ -346,13 +250,13 @@ def test_lifting_against_gravity(slides, way):
         slides([X, Z], [200.0, force]),
         ["x", "z"],
         [0.0, way * LENGTH],
-        robot={"gravity": [0, 0, -9.81]},
+        settings={"gravity": [0, 0, -9.81]},
     )
     assert result.verified
     assert best <= result.t_end < 1.01 * best
 
 
-def test_two_slides_along_one_line_recoil_against_each_other(slides):
+def test_two_slides_along_one_line_recoil_against_each_other():
     # The upper slide's force alone moves the tool: a = F / m. The lower slide is too weak to hold still (30 N against
     # 50 N) and has to give way, which costs no time: the best is that of the upper slide alone.
     weak = 30.0
@@ -363,12 +267,11 @@ def test_two_slides_along_one_line_recoil_against_each_other(slides):
         urdf,
         ["x"],
         [LENGTH],
-        redundant=["j1"],
-        joints=[0.0, 0.0],
-        robot=held,
+        redundant_joints=["j1"],
+        settings=held,
         solver="uno_interior",
     )
-    result = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0])
+    result = plan(urdf, ["x"], [LENGTH], redundant_joints=["j1"])
     assert result.verified
     assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
     assert (
@@ -379,14 +282,3 @@ def test_two_slides_along_one_line_recoil_against_each_other(slides):
     )
     # Held in place, the lower slide passes on no more than its own force.
     assert stiff.t_end == pytest.approx(2.0 * np.sqrt(MASS * LENGTH / weak), rel=0.02)
-
-
-@pytest.mark.parametrize("solver", INSTALLED)
-def test_every_solver_finds_the_optimum(slides, solver):
-    urdf = slides([X, Y], [FORCE, FORCE])
-    result = plan(urdf, ["x", "y"], [LENGTH, 0.0], intervals=10, solver=solver)
-    assert result.verified
-    assert result.solver_report.solver == solver
-    assert result.t_end == pytest.approx(
-        bang_bang(2.0 * MASS) / np.sqrt(1.0 - 4.0 / 300.0), rel=5e-4
-    )

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
-from brachis.optimise import mesh
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.mesh import (
@@ -23,9 +21,9 @@ from brachis.optimise.mesh import (
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings
 from support.effort import QUICK
+from support.scara import START, scara
 from support.starts import starting_points
 
-SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 FINE = {("j1", "velocity"): 2.1207, ("j1", "full"): 2.1309}
 """End times with 100 (rest: velocity) and 200 (rest: full) even intervals, s."""
 
@@ -34,19 +32,13 @@ def task(joint="j1", **spline) -> brachis.Task:
     return brachis.load_task(
         {
             "brachis": 1,
-            "start": {"joints": [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]},
+            "start": {"joints": START},
             "task_space": ["x", "y"],
             "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
             "redundant_joints": [joint],
             "spline": spline,
             "search": QUICK,
         }
-    )
-
-
-def robot() -> brachis.Robot:
-    return brachis.Robot.from_urdf(
-        SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None)
     )
 
 
@@ -57,7 +49,7 @@ def solve(program, x):
 @pytest.fixture(scope="module")
 def solved():
     """Problem of 10 even intervals, and its solve."""
-    program, _ = brachis.transcribe(robot(), task(intervals=10))
+    program, _ = brachis.transcribe(scara(), task(intervals=10))
     return SolvedProgram(program, (solve(program, next(starting_points(program))),))
 
 
@@ -73,7 +65,7 @@ def failing(program, x):
     [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)],
 )
 def test_free_knots_make_few_intervals_fast(joint, intervals, longest):
-    result = brachis.plan(robot(), task(joint, intervals=intervals, knots="free"))
+    result = brachis.plan(scara(), task(joint, intervals=intervals, knots="free"))
     assert result.verified
     assert result.t_end < longest
     lengths = np.diff(np.unique(result.trajectory.knots))
@@ -81,13 +73,13 @@ def test_free_knots_make_few_intervals_fast(joint, intervals, longest):
     # Rest: full ramps the torque up and down in the first and the last interval: these are as short as allowed.
     np.testing.assert_allclose(lengths[[0, -1]], 0.1 / intervals, rtol=1e-6)
     assert lengths.min() >= 0.1 / intervals * (1.0 - 1e-9)
-    even = brachis.plan(robot(), task(joint, intervals=intervals))
+    even = brachis.plan(scara(), task(joint, intervals=intervals))
     assert result.t_end < 0.93 * even.t_end
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
-    result = brachis.plan(robot(), task(intervals="auto", rest=rest))
+    result = brachis.plan(scara(), task(intervals="auto", rest=rest))
     assert result.verified
     assert result.t_end < 1.005 * FINE["j1", rest]
     assert len(np.unique(result.trajectory.knots)) - 1 < 500
@@ -95,24 +87,10 @@ def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
 
 def test_a_motion_along_a_branch_boundary_is_verified_too():
     """Rounding is amplified there; more nodes than it allows made torques of 7 % too much."""
-    result = brachis.plan(robot(), task("j3", intervals="auto", tolerance=0.004))
+    result = brachis.plan(scara(), task("j3", intervals="auto", tolerance=0.004))
     assert result.verified
     assert result.t_end < 2.345
     assert len(result.trajectory.times) < 1500
-
-
-def test_intervals_are_refined_where_the_motion_switches(solved):
-    program = solved.program
-    finer = refine_mesh(
-        solved, solve, SplineSettings(intervals="auto", tolerance=0.02), NEVER
-    ).program
-    lengths = np.diff(finer.phases[0].breaks)
-    assert len(lengths) < 60
-    assert lengths.max() >= 4.0 * lengths.min()
-    np.testing.assert_allclose(lengths[[0, -1]], lengths.min(), rtol=1e-9)
-    assert set(np.round(program.phases[0].breaks, 12)) <= set(
-        np.round(finer.phases[0].breaks, 12)
-    )
 
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
@@ -129,19 +107,6 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     assert rough.reports[0] is report
     assert rough.x.shape == (rough.program.variables,)
     assert rough.program.phases[0].violation(rough.x).max() < 1e-5
-
-
-def test_a_round_beyond_its_end_gains_little(solved):
-    tolerance = 0.02
-    fine = refine_mesh(
-        solved, solve, SplineSettings(intervals="auto", tolerance=tolerance), NEVER
-    )
-    first = SolvedProgram(fine.program, (fine.report,))
-    again = refine_mesh(
-        first, solve, SplineSettings(intervals="auto", tolerance=tolerance), NEVER
-    )
-    assert again.program.intervals > fine.program.intervals
-    assert again.t_end > (1.0 - tolerance) * fine.t_end
 
 
 class Broken:
@@ -185,22 +150,6 @@ def test_no_interval_is_so_short_that_points_fall_together(solved):
     )
 
 
-def test_free_knots_without_a_motion_within_the_limits_are_given_up(
-    solved, monkeypatch
-):
-    program = solved.program
-    report = solved.report
-    monkeypatch.setattr(
-        mesh,
-        "refine",
-        lambda *given: dataclasses.replace(refine(*given), violation=0.5),
-    )
-    kept = optimise_knots(solved, solve, 0.1, RefinementOptions())
-    assert kept.program is program
-    assert kept.report is report
-    assert len(kept.reports) > 2
-
-
 def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     program = solved.program
     report = solved.report
@@ -220,26 +169,11 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     )
 
 
-@pytest.mark.parametrize("intervals", [20, 53, 100])
-def test_coarsest_problem(intervals):
-    program, _ = brachis.transcribe(robot(), task(intervals=intervals))
-    coarse = coarsest(program)
-    assert 12 <= coarse.intervals < 26
-    assert (intervals > 24) == (coarse.variables < program.variables)
-    (whole,), (part,) = program.phases, coarse.phases
-    for fine, rough in ((whole.breaks, part.breaks), (whole.t_norm, part.t_norm)):
-        assert np.isin(rough, fine).all()
-        assert (rough[0], rough[-1]) == (0.0, 1.0)
-    assert np.diff(part.t_norm).max() == pytest.approx(
-        np.diff(part.breaks).max() / 3.0
-    ), "3 points an interval"
-
-
 @pytest.mark.parametrize("intervals", [53, 100])
 def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     intervals,
 ):
-    program, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    program, _ = brachis.transcribe(scara(), task(intervals=intervals))
     coarse = coarsest(program).with_margin(0.05)
     report = solve(coarse, next(starting_points(coarse)))
     solved = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
@@ -255,40 +189,6 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     )
 
 
-def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
-    program, _ = brachis.transcribe(robot(), task(intervals=100))
-    coarse = coarsest(program)
-    report = solve(coarse, next(starting_points(coarse)))
-
-    def small_ones_only(tried, x):
-        return solve(tried, x) if tried.variables < 150 else failing(tried, x)
-
-    first = SolvedProgram(coarse, (report,))
-    nested = solve_by_levels(program, first, small_ones_only)
-    reports = nested.reports
-    assert nested.program.intervals == 50
-    assert [later.status for later in reports][-2:] == [
-        SolveStatus.FAILED,
-        SolveStatus.OPTIMAL,
-    ]
-    assert reports[-1].x.shape == (nested.program.variables,)
-    assert (
-        nested.not_completed
-        == "the motion has 50 intervals, and was not solved with all 100"
-    )
-    settled = adapt_mesh(
-        first,
-        failing,
-        SplineSettings(),
-        RefinementOptions(),
-        target=program,
-    )
-    assert settled.reports[-1] is report
-    assert settled.not_completed.startswith(
-        "the motion has 13 intervals, and was not solved with all 100"
-    )
-
-
 def test_no_level_is_begun_after_the_deadline(solved):
     program = solved.program
     report = solved.report
@@ -296,7 +196,7 @@ def test_no_level_is_begun_after_the_deadline(solved):
     def never(*_arguments):
         raise AssertionError("solved after the deadline")
 
-    target, _ = brachis.transcribe(robot(), task(intervals=60))
+    target, _ = brachis.transcribe(scara(), task(intervals=60))
     coarse = coarsest(target)
     first = SolvedProgram(coarse, (solve(coarse, next(starting_points(coarse))),))
     over = RefinementOptions(deadline=Deadline(0.0))
@@ -313,7 +213,7 @@ def test_no_level_is_begun_after_the_deadline(solved):
 
 
 def test_many_intervals_are_planned_at_once_from_the_timing():
-    result = brachis.plan(robot(), task(intervals=100))
+    result = brachis.plan(scara(), task(intervals=100))
     assert result.verified
     assert result.t_end == pytest.approx(2.1421, abs=5e-4)
     assert len(np.unique(result.trajectory.knots)) == 101
@@ -323,40 +223,14 @@ def test_many_intervals_are_planned_at_once_from_the_timing():
 
 
 def test_many_intervals_are_planned_from_few_where_the_timing_leaves_a_limit_out():
-    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
-    arm = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=jerks)
-    result = brachis.plan(arm, task(intervals=50, degree=4))
+    result = brachis.plan(scara({"jerk": 2000.0}), task(intervals=50, degree=4))
     assert result.verified
     reports = result.candidate.reports
     assert len(reports[0].x) < 0.6 * len(reports[-1].x)
 
 
-def test_settings_choose_what_is_done(solved):
-    program = solved.program
-    report = solved.report
-    options = RefinementOptions()
-    given = SplineSettings(intervals=10)
-    assert adapt_mesh(solved, solve, given, options).reports == (report,)
-    unusable = SolvedProgram(program, (report, failing(program, report.x)))
-    freed = SplineSettings(knots="free", intervals=10)
-    assert adapt_mesh(unusable, solve, freed, options) is unusable
-    before = dataclasses.replace(report)
-    known = SolvedProgram(program, (before, report))
-    free = adapt_mesh(known, solve, freed, options)
-    assert free.reports[0] is before
-    assert free.program.intervals == program.intervals
-    auto = SplineSettings(intervals="auto", tolerance=0.1)
-    finer = adapt_mesh(known, solve, auto, options)
-    assert finer.program.intervals > program.intervals
-
-
-def test_auto_begins_coarse():
-    program, _ = brachis.transcribe(robot(), task(intervals="auto"))
-    assert program.intervals == 10
-
-
 def test_a_mesh_is_refined_where_a_mean_torque_holds_the_motion():
-    slow = robot().with_limits(rms_torque=9.0)
+    slow = scara().with_limits(rms_torque=9.0)
     short = {"path": [brachis.Line(by=[0.0, 0.6])], "redundant_joints": "auto"}
     even, adapted = (
         brachis.plan(slow, task(intervals=intervals), **short)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from brachis.optimise import near_rows
 from brachis.optimise.backends import (
     Curvature,
     SolverOptions,
@@ -84,9 +83,14 @@ def test_multipliers_belong_to_all_rows(solve):
     np.testing.assert_allclose(report.multipliers @ matrix, [0.0, 1.0], atol=1e-6)
 
 
-def test_from_a_point_that_few_rows_hold_back_all_are_needed(solve):
-    report = solve_near_rows(Disc(), np.array([0.1, -0.2, 0.0]), solve)
-    assert solve.rows == [COUNT]
+@pytest.mark.parametrize(
+    ("start", "is_few"),
+    [([0.1, -0.2, 0.0], False), ([0.0, -1.3, 0.0], True), ([0.0, -1.6, 0.0], False)],
+    ids=["few rows hold it back", "a little beyond the rows", "far beyond the rows"],
+)
+def test_few_rows_are_enough_only_from_near_the_rows(solve, start, is_few):
+    report = solve_near_rows(Disc(), np.array(start), solve)
+    assert (solve.rows[0] < COUNT) == is_few
     assert report.objective == pytest.approx(-1.0, abs=1e-8)
 
 
@@ -109,18 +113,7 @@ def test_where_curvature_is_known_fewer_rows_have_to_hold(solve):
     assert report.objective == pytest.approx(-1.0, abs=1e-8)
 
 
-def test_from_a_point_beyond_the_rows_few_are_enough(solve):
-    report = solve_near_rows(Disc(), np.array([0.0, -1.3, 0.0]), solve)
-    assert solve.rows[0] < COUNT
-    assert report.objective == pytest.approx(-1.0, abs=1e-8)
-
-
-def test_from_a_point_far_beyond_the_rows_all_are_needed(solve):
-    solve_near_rows(Disc(), np.array([0.0, -1.6, 0.0]), solve)
-    assert solve.rows == [COUNT]
-
-
-def test_rows_that_turn_out_to_be_violated_are_added(solve):
+def test_rows_that_an_answer_violates_come_back(solve):
     class Cut(Disc):
         upper = np.append(np.ones(COUNT), 0.3)
         lower = np.full(COUNT + 1, -np.inf)
@@ -144,15 +137,7 @@ def test_rows_that_turn_out_to_be_violated_are_added(solve):
     assert report.violation <= 1e-8
 
 
-def test_never_fewer_than_a_fifth_of_the_rows(solve, monkeypatch):
-    monkeypatch.setattr(near_rows, "_NEAR", 1e-6)
-    start = 0.999 * np.array([np.cos(-1.3), np.sin(-1.3), 0.0])
-    report = solve_near_rows(Disc(), start, solve)
-    assert COUNT / 5 <= solve.rows[0] < COUNT / 4
-    assert report.objective == pytest.approx(-1.0, abs=1e-8)
-
-
-def test_rows_that_are_kept_whatever_their_distance(solve):
+def test_rows_may_stay_whatever_their_distance(solve):
     start = 0.999 * np.array([np.cos(-1.3), np.sin(-1.3), 0.0])
     far = int(np.argmax(1.0 - Disc().rows(start)))
     solve_near_rows(Disc(), start, solve)
@@ -160,7 +145,7 @@ def test_rows_that_are_kept_whatever_their_distance(solve):
     assert solve.rows[-1] == solve.rows[0] + 1
 
 
-def test_all_iterations_are_not_used_up_again():
+def test_a_solve_that_ran_out_of_iterations_is_the_last():
     solves = []
 
     def solve(problem, x):
@@ -176,7 +161,7 @@ def test_all_iterations_are_not_used_up_again():
     assert len(solves) == 1
 
 
-def test_values_that_are_far_everywhere_are_left_out(solve):
+def test_a_solve_omits_values_that_are_far_everywhere(solve):
     start = np.array([0.0, -0.9, 0.0])
     report = solve_near_values(Disc(), start, solve)
     assert solve.rows == [COUNT // 2]
@@ -184,7 +169,7 @@ def test_values_that_are_far_everywhere_are_left_out(solve):
     assert len(report.multipliers) == COUNT
 
 
-def test_values_that_are_violated_are_added(solve):
+def test_values_that_an_answer_violates_come_back(solve):
     report = solve_near_values(Disc(), np.array([0.8, 0.0, 0.0]), solve)
     assert len(solve.rows) > 1
     assert solve.rows == sorted(set(solve.rows))

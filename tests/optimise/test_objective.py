@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.optimise.objective import LeastAcceleration
-from brachis.optimise.program import Link, Program
+from brachis.optimise.program import Program
 from support.jacobians import differences_of
 from support.phases import CASES, phase_of, reachable_points
 
@@ -57,25 +57,6 @@ def test_curvature_of_least_acceleration_is_that_of_its_squares(knots):
     np.testing.assert_allclose(found, expected, atol=1e-6 * size)
 
 
-def test_phases_add_up():
-    phase = phase_of("r1")
-    first, second = reachable_points(phase, 2)
-    objective = LeastAcceleration(weights_of("r1"), np.array([3.0, 4.0]))
-    both = Program([phase, phase], [Link(0, 1, (1,), (0,))], objective)
-    x = np.concatenate([first, second])
-    shares = [objective.value(phase, part) for part in (first, second)]
-    assert both.objective(x) == pytest.approx(sum(shares), rel=1e-14)
-    np.testing.assert_allclose(
-        both.gradient(x),
-        differences_of(both.objective, x, 1e-5),
-        atol=1e-6 * np.abs(both.gradient(x)).max(),
-    )
-    np.testing.assert_array_equal(both.x_upper[[0, phase.variables]], [3.0, 4.0])
-    finer = both.with_points([np.linspace(0.0, 1.0, 31)] * 2)
-    assert finer.minimised is objective
-    np.testing.assert_array_equal(finer.x_upper, both.x_upper)
-
-
 def test_value_is_the_mean_square_over_time():
     phase = phase_of("r1").with_points(
         np.union1d(np.linspace(0.0, 1.0, 4001), [0.123, 0.1231, 0.7])
@@ -90,8 +71,3 @@ def test_value_is_the_mean_square_over_time():
     assert LeastAcceleration(weights, np.array([5.0])).value(phase, x) == pytest.approx(
         expected, rel=1e-6
     )
-
-
-def test_a_program_without_an_objective_minimises_the_end_time_unbounded():
-    phase = phase_of("r1")
-    assert Program([phase]).x_upper[0] == np.inf

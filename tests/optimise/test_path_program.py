@@ -10,11 +10,10 @@ from scipy.sparse import coo_array
 
 import brachis
 from brachis.common.deadline import NEVER
-from brachis.errors import UnreachableError
 from brachis.optimise import retiming
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.path_program import PathProgram, violation_of_postures
+from brachis.optimise.path_program import PathProgram
 from support.starts import starting_points
 
 ROOT = Path(__file__).parents[2]
@@ -75,14 +74,6 @@ def test_answers_are_as_fast_as_their_timings(programs):
     assert result.t_end == pytest.approx(timing, rel=1e-3)
 
 
-def test_values_that_are_given_stay(programs):
-    program, x = programs[0][-1]
-    (phase,) = program.phases
-    start = phase.phase.boundary.start[1].value
-    assert phase.course(x, np.array([phase.ends[0]])).y[0, 1] == pytest.approx(start)
-    assert x[0] == program.start[0]
-
-
 def improve(program):
     """Improve a joint path by numeric inverse kinematics, roughly."""
     (motion,) = program.motions(next(starting_points(program)))
@@ -111,14 +102,3 @@ def test_limits_that_the_phase_plane_does_not_know_are_left_out():
         for each in (task, slower)
     ]
     assert times[1] == pytest.approx(times[0], rel=5e-3)
-
-
-def test_curves_without_postures_are_out_of_reach(programs, monkeypatch):
-    program, x = programs[0][0]
-    phase = program.phases[0].phase
-    (curves,) = program.curves(x)
-    assert np.isfinite(violation_of_postures(phase, curves))
-    missing = np.full((len(curves), phase.joint_map.robot.n), np.nan)
-    monkeypatch.setattr(type(phase.joint_map), "postures", lambda *_arguments: missing)
-    with pytest.raises(UnreachableError):
-        violation_of_postures(phase, curves)

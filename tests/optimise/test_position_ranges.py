@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import yaml
 
 import brachis
-from brachis.limits.joint import PositionLimit
-from support.phases import phase_of, reachable_points
 
 NEAR = 2.0944 - 0.05  # rad; without a range joint 3 goes further
 
@@ -68,21 +64,3 @@ def test_a_range_of_a_micrometre(scara_urdf, half):
         "spline": {"intervals": 20},
     }
     assert brachis.plan(task).verified
-
-
-@pytest.mark.parametrize("far", [1e4, 1e6, np.inf])
-def test_violation_is_in_rad_or_m_beyond_either_end(far):
-    phase = phase_of("r1")
-    state, robot = phase.state(reachable_points(phase, 1)[0]), phase.joint_map.robot
-    q = state.q
-    lower = np.array([q[:, 0].max() + 0.25, -np.inf, -3.0])
-    ranges = replace(
-        robot.limits, position_lower=lower, position_upper=np.array([far, np.inf, 3.0])
-    )
-    limit = PositionLimit(replace(robot, limits=ranges), np.array([0, 2]))
-    assert [label.subject for label in limit.labels] == ["j1", "j3"]
-    violation = limit.violation(limit.values(state))
-    np.testing.assert_allclose(violation[:, 0], lower[0] - q[:, 0], atol=1e-12)
-    np.testing.assert_allclose(
-        violation[:, 1], np.maximum(-3.0 - q[:, 2], q[:, 2] - 3.0), atol=1e-12
-    )

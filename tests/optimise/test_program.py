@@ -15,7 +15,7 @@ from brachis.common.deadline import NEVER
 from brachis.explain import figures_of, multipliers_of, sensitivities_at
 from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
-from brachis.optimise.boundary import Boundary, EndCondition
+from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
@@ -28,13 +28,10 @@ from brachis.optimise.mesh import (
 )
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
-from brachis.optimise.refine import RefinementOptions, refine
-from brachis.robot import Robot
+from brachis.optimise.refine import RefinementOptions
 from brachis.task import SplineSettings
-from support.chains import INERTIAL, Joint, chain_urdf
 from support.direct_map import DirectJointMap
-from support.jacobians import dense
-from support.phases import phase_of, reachable_points
+from support.slides import X, slides
 from support.solvers import INSTALLED
 
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
@@ -42,18 +39,7 @@ FREE = np.nan
 ALONE = (0,)
 
 
-def slide(lower=-5.0, upper=5.0) -> Robot:
-    limit = {"lower": lower, "upper": upper, "velocity": 100.0, "effort": FORCE}
-    joint = Joint(
-        "prismatic",
-        axis=(1.0, 0.0, 0.0),
-        limit=limit,
-        inertial=INERTIAL.format(mass=MASS),
-    )
-    return Robot.from_urdf("slide", urdf_text=chain_urdf([joint], tool=(0.1, 0.2, 0.3)))
-
-
-ROBOT = slide()
+ROBOT = slides([X], [FORCE], MASS)
 TORQUE = TorqueLimit(ROBOT, np.array(ALONE))
 
 
@@ -68,7 +54,8 @@ def move(start, end, *further, degree=2, intervals=8, points=3) -> Phase:
 
 
 def within(lower, upper) -> PositionLimit:
-    return PositionLimit(slide(lower, upper), np.array(ALONE))
+    robot = ROBOT.with_limits(position={"j1": [lower, upper]})
+    return PositionLimit(robot, np.array(ALONE))
 
 
 def two_moves(stop=0.5, **options) -> Program:
@@ -123,24 +110,7 @@ def test_a_stop_that_only_the_ranges_of_the_phases_bound():
     ), "the link should matter"
 
 
-def test_refinement_holds_the_limits_in_every_phase():
-    program = two_moves(degree=5, intervals=5, points=2)
-    report = solve(program, first_point(program))
-
-    def worst(x):
-        dense = program.with_points([np.linspace(0.0, 1.0, 2001)] * 2)
-        return [phase.violation(part).max() for phase, part in dense.split(x)]
-
-    assert min(worst(report.x)) > 1e-3
-    refined = refine(program, report, solve, RefinementOptions())
-    assert max(worst(refined.x)) <= 1e-4
-    assert refined.violation <= 1e-4
-    assert refined.t_end > report.objective
-    pairs = zip(refined.program.phases, program.phases, strict=True)
-    assert min(len(after.t_norm) - len(before.t_norm) for after, before in pairs) > 0
-
-
-def test_meshes_of_every_phase_are_refined():
+def test_refinement_reaches_meshes_of_every_phase():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
     fine = refine_mesh(
@@ -155,7 +125,7 @@ def test_meshes_of_every_phase_are_refined():
     assert report.objective > 1.01 * fine.t_end
 
 
-def test_knots_of_every_phase_are_freed():
+def test_free_knots_move_in_every_phase():
     program = two_moves(degree=3, intervals=3)
     report = solve(program, first_point(program))
     moved = optimise_knots(
@@ -196,70 +166,6 @@ def test_a_limit_of_several_phases_is_one_figure():
     assert solve(relaxed, report.x).objective == pytest.approx(
         report.objective / 1.1, rel=1e-4
     )
-
-
-@pytest.mark.parametrize("knots", ["uniform", "free"])
-@pytest.mark.parametrize("case", ["r0", "r1", "r2"])
-def test_jacobian_of_links_in_motion(case, knots):
-    """Two phases in the same coordinates that go on from each other with two derivatives, and round again."""
-    phase = phase_of(case)
-    curves = tuple(range(len(phase.splines)))
-    free = EndCondition(np.nan, np.empty(0))
-    moving = Boundary((free,) * len(curves), (free,) * len(curves))
-    phases = [phase.with_grid(phase.grid, moving)] * 2
-    if knots == "free":
-        phases = [own.with_free_knots(0.1) for own in phases]
-    links = [Link(0, 1, curves, (0, 1, 2)), Link(1, 0, curves[1:] or curves, (1, 2))]
-    program = Program(phases, links)
-    parts = reachable_points(phases[0], 2)
-    x = np.concatenate(parts)
-    assert program.end_time(x) == x[0] + x[phases[0].variables]
-    np.testing.assert_array_equal(
-        np.flatnonzero(program.gradient(x)), [0, phases[0].variables]
-    )
-    places = program.jacobian_rows * program.variables + program.jacobian_columns
-    assert len(np.unique(places)) == len(places)
-    exact = np.zeros((len(program.lower), program.variables))
-    exact[program.jacobian_rows, program.jacobian_columns] = program.jacobian(x)
-    own = np.arange(len(program.lower) - sum(link.size for link in links), len(exact))
-    sides = [
-        (program.rows(x + step)[own], program.rows(x - step)[own])
-        for step in 1e-6 * np.eye(len(x))
-    ]
-    expected = np.stack([(above - below) / 2e-6 for above, below in sides], axis=1)
-    scale = 1.0 + np.abs(expected).max()
-    np.testing.assert_allclose(exact[own], expected, atol=1e-7 * scale)
-    last, first = (own.state(part) for own, part in zip(phases, parts, strict=True))
-    np.testing.assert_allclose(
-        program.rows(x)[own[: len(curves)]], last.y[-1] - first.y[0], atol=1e-12
-    )
-
-
-def test_one_phase_is_the_program():
-    phase = phase_of("r1")
-    program = Program([phase])
-    (x,) = reachable_points(phase, 1)
-    assert program.variables == phase.variables
-    assert program.objective(x) == program.end_time(x) == x[0]
-    np.testing.assert_array_equal(program.gradient(x), np.eye(program.variables)[0])
-    np.testing.assert_array_equal(program.x_lower, phase.x_lower)
-    np.testing.assert_array_equal(program.x_upper, phase.x_upper)
-    # Means over time come behind the phase's rows, and depend on all variables.
-    own = len(phase.lower)
-    (mean,) = program.means.limits
-    assert program.rows_of(mean).tolist() == [list(range(own, len(program.lower)))]
-    np.testing.assert_array_equal(program.lower[:own], phase.lower)
-    np.testing.assert_array_equal(program.upper[:own], phase.upper)
-    np.testing.assert_array_equal(program.upper[own:], mean.upper)
-    np.testing.assert_array_equal(program.rows(x)[:own], phase.rows(x))
-    mean_values = phase.mean_weights(x) @ mean.values(phase.state(x))
-    np.testing.assert_allclose(program.rows(x)[own:], mean_values, rtol=1e-14)
-    exact = dense(program, x)
-    np.testing.assert_array_equal(exact[:own], dense(phase, x))
-    assert np.all(np.bincount(program.jacobian_rows)[own:] == program.variables)
-    slower = program.scale_time(x, 2.0)
-    assert slower[0] == 2.0 * x[0]
-    np.testing.assert_array_equal(slower[1:], x[1:])
 
 
 def test_a_program_in_another_process_is_the_same():

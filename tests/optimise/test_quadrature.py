@@ -7,7 +7,7 @@ import pytest
 
 from brachis.common.arrays import spread
 from brachis.optimise.bspline import clamped_knots
-from brachis.optimise.grid import FixedGrid, FreeGrid
+from brachis.optimise.grid import FixedGrid
 
 BREAKS = np.array([0.0, 0.2, 0.5, 0.6, 1.0])
 EXTRA = np.array([0.23, 0.2301, 0.23013, 0.55, 0.8, 0.9999])
@@ -30,26 +30,3 @@ def test_polynomials_are_integrated_exactly_in_every_interval(case, degree):
     # Where the acceleration may jump at a knot, what is known there belongs to the interval behind it.
     for power in range(exact if degree == 2 else exact + 1):
         assert weights @ t_norm**power == pytest.approx(1.0 / (power + 1), abs=1e-10)
-
-
-def test_what_bends_at_knots_is_no_worse():
-    t_norm = spread(BREAKS, 3)
-    weights = FixedGrid(clamped_knots(3, BREAKS), 3, t_norm).mean_weights(np.empty(0))
-    values = np.abs(t_norm - 0.5) * np.abs(t_norm - 0.6)
-    dense = np.linspace(0.0, 1.0, 1_000_001)
-    expected = np.trapezoid(np.abs(dense - 0.5) * np.abs(dense - 0.6), dense)
-    assert weights @ values == pytest.approx(expected, abs=1e-10)
-
-
-def test_free_knots_carry_their_points_along():
-    t_norm = spread(BREAKS, 3)
-    free, h = (
-        FreeGrid(clamped_knots(3, BREAKS), 3, t_norm, 0.01),
-        np.array([0.1, 0.4, 0.3, 0.2]),
-    )
-    breaks = np.append(0.0, np.cumsum(h))
-    fixed = FixedGrid(clamped_knots(3, breaks), 3, spread(breaks, 3))
-    np.testing.assert_allclose(
-        free.mean_weights(h), fixed.mean_weights(np.empty(0)), atol=1e-12
-    )
-    assert free.mean_slopes.shape == (4, len(t_norm))

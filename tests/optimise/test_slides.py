@@ -63,18 +63,3 @@ def test_slides_of_any_force_are_as_fast_as_their_trapezoid(
         times.append(result.t_end)
     for weaker, stronger in itertools.pairwise(times):
         assert stronger < weaker * (1.0 + SAME)
-
-
-@pytest.mark.parametrize("degree", [3, 4])
-def test_an_arm_with_strong_drives_is_as_fast_as_its_joint_path_allows(degree):
-    limits = brachis.robots.scara3.limits
-    result = brachis.plan(
-        brachis.robots.scara3,
-        start=[0.4, 0.6, 0.5],
-        task_space=["x", "y"],
-        path=[{"line": {"by": [-0.3, 0.2]}}],
-        limits={"velocity": (0.05 * limits.velocity).tolist()},
-        degree=degree,
-    )
-    assert result.verified
-    assert -1e-4 < result.timing_gap.gap < 1e-3

@@ -8,33 +8,19 @@ import pytest
 import brachis
 from brachis.apps.bottleneck import report
 from brachis.verify import verify_trajectory
-from support.chains import INERTIAL, Joint, chain_urdf
+from support.slides import X, plan_slides, slides
 
 MASS, LENGTH, PUSH, BRAKE = 4.0, 1.2, 50.0, 20.0
-LIMIT = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": PUSH}
-SLIDE = chain_urdf(
-    [
-        Joint(
-            "prismatic",
-            axis=(1.0, 0.0, 0.0),
-            limit=LIMIT,
-            inertial=INERTIAL.format(mass=MASS),
-        )
-    ],
-    tool=(0.1, 0.2, 0.3),
-)
 
 
 def plan(limits: dict, way: float = LENGTH, intervals: int = 70) -> brachis.Result:
-    task = {
-        "brachis": 1,
-        "robot": {"limits": limits, "gravity": [0, 0, 0], "tool_frame": "tool"},
-        "start": {"joints": [0.0]},
-        "task_space": ["x"],
-        "path": [{"line": {"by": [way]}}],
-        "spline": {"intervals": intervals, "rest": "velocity"},
-    }
-    return brachis.plan(brachis.Robot.from_urdf("slide", urdf_text=SLIDE), task)
+    return plan_slides(
+        slides([X], [PUSH], MASS),
+        ["x"],
+        [way],
+        settings={"limits": limits},
+        spline={"intervals": intervals},
+    )
 
 
 @pytest.mark.parametrize("way", [LENGTH, -LENGTH])

@@ -64,14 +64,3 @@ def test_every_leg_is_passed_from_its_begin_to_its_end(content, is_timed):
         s, s_dt = motion.at(np.array([0.0, motion.t_end]))[:2]
         np.testing.assert_allclose(s[:, 0], [leg.begin, leg.end], atol=1e-9)
         np.testing.assert_allclose(s_dt[:, 0], rates, atol=1e-9)
-
-
-@pytest.mark.parametrize("is_timed", [True, False])
-def test_a_leg_with_a_given_speed_has_its_duration(is_timed):
-    problem, program, x = guess(WITH_SPEED, is_timed=is_timed)
-    (given,) = (
-        motion
-        for motion, law in zip(program.motions(x), problem.time_laws, strict=True)
-        if law is not None
-    )
-    assert given.t_end == pytest.approx(0.2 * 0.5 / 0.2, rel=1e-9)

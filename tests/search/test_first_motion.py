@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import pytest
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
-from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_for
 from brachis.search.first_motion import find_first_motion
@@ -60,15 +58,3 @@ def test_a_first_motion_keeps_all_limits(extras: dict[str, Any]) -> None:
 def test_without_time_there_is_no_first_motion() -> None:
     guess = guess_with(EXTRAS["a process speed"])
     assert not find_first_motion(guess, Deadline(0.0)).verified
-
-
-def test_a_leg_does_not_go_back_beyond_its_beginning() -> None:
-    guess = guess_with(EXTRAS["a stop"])
-    program = program_of(guess.problem, guess.maps_by_leg())
-    begins = [leg.begin for leg in guess.problem.legs]
-    assert begins[1] > 0.0
-    for phase, begin, last in zip(
-        program.phases, begins, itertools.repeat(1.0), strict=False
-    ):
-        assert phase.x_lower[1] == begin
-        assert phase.x_upper[1] <= last

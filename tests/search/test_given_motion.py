@@ -21,7 +21,7 @@ TASK = task_with(
 
 
 @pytest.fixture(scope="module")
-def known():
+def known_motion():
     return brachis.plan(TASK)
 
 
@@ -37,22 +37,25 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_a_known_motion_takes_the_place_of_the_search(known, name):
+def test_a_known_motion_takes_the_place_of_the_search(known_motion, name):
     told = []
     result = brachis.plan(
-        known.task, start_from=known, listener=told.append, **CHANGES[name]
+        known_motion.task,
+        start_from=known_motion,
+        listener=told.append,
+        **CHANGES[name],
     )
     assert result.verified
     assert result.not_completed == ()
     assert [candidate.origin for candidate in result.candidates] == [GIVEN]
     assert not any("lattice" in text for text in told), "nothing was searched for"
     if not CHANGES[name]:
-        assert result.t_end <= 1.0005 * known.t_end
+        assert result.t_end <= 1.0005 * known_motion.t_end
 
 
-def test_saved_motions_will_do(known, tmp_path):
-    known.save(tmp_path / "result.npz")
-    for motion in (known.trajectory, tmp_path / "result.npz"):
+def test_saved_motions_will_do(known_motion, tmp_path):
+    known_motion.save(tmp_path / "result.npz")
+    for motion in (known_motion.trajectory, tmp_path / "result.npz"):
         assert brachis.plan(TASK, start_from=motion).candidate.origin == GIVEN
 
 
@@ -80,8 +83,10 @@ def test_of_other_task_spaces(space):
         ({"path": Line(by=[0.0, 0.6]), "redundant_joints": ["j1"]}, ""),
     ],
 )
-def test_what_cannot_be_used_is_said_and_the_search_goes_on(known, changes, reason):
-    result = brachis.plan(TASK, start_from=known, **changes)
+def test_what_cannot_be_used_is_said_and_the_search_goes_on(
+    known_motion, changes, reason
+):
+    result = brachis.plan(TASK, start_from=known_motion, **changes)
     assert result.verified
     assert (
         (reason in " ".join(result.not_completed))
@@ -90,7 +95,7 @@ def test_what_cannot_be_used_is_said_and_the_search_goes_on(known, changes, reas
     )
 
 
-def test_a_motion_of_another_robot_is_not_used(known):
+def test_a_motion_of_another_robot_has_no_use(known_motion):
     gantry = brachis.plan(
         "gantry2",
         path=Line(by=0.2),
@@ -98,7 +103,7 @@ def test_a_motion_of_another_robot_is_not_used(known):
         task_space=["x"],
         intervals=8,
         effort="single",
-        start_from=known,
+        start_from=known_motion,
     )
     assert "its joints are j1, j2, j3" in gantry.not_completed[0]
     assert "searched for as usual" in gantry.not_completed[0]

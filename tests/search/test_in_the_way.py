@@ -50,7 +50,7 @@ def guess(*posts):
     return InitialGuess(problem, joint_map, s, np.inf, "path of joints", "")
 
 
-def test_the_nearest_of_joint_paths_that_all_hit_something_is_explained():
+def test_the_nearest_of_joint_paths_that_all_hit_something_is_the_reason():
     failure = explain_postures([guess(0.8, 0.95), guess(0.8)])
     first, last = failure.s_interval
     assert "post 0" in failure.problem

@@ -1,4 +1,7 @@
-"""Joint paths on the lattice: on the path, continuous, within limits, different; reasons where there is none."""
+"""Joint paths on the lattice: on the path, continuous, within limits, different; reasons where there is none.
+
+And lattices where ranges, turns, limits or paths are out of the ordinary.
+"""
 
 from __future__ import annotations
 
@@ -10,38 +13,29 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.common.deadline import NEVER
 from brachis.errors import PathError, PlanningError
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
-from brachis.search.failure import explain_no_motion
 from brachis.search.guesses import SEARCH_LEVELS, lattice_guesses
 from brachis.search.joint_path import DeadEnd
-from support.pose_arms import panda
+from brachis.search.lattice import stations
+from brachis.search.posture_lattice import PostureLattice
+from support.scara import START, scara
+from support.scara import problem as scara_problem
 
 ROOT = Path(__file__).parents[2]
-START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 
 
-def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
-    spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
-    return brachis.Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf",
-        limits=spec,
-        **({"gravity": [0, 0, 0]} | options),
-    )
+LINE = {
+    "start": {"joints": START},
+    "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+}
 
 
 def problem(robot: brachis.Robot, **changes: Any) -> Problem:
-    task = {
-        "brachis": 1,
-        "start": {"joints": START},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
-    }
-    return Problem.of(robot, brachis.load_task(task | changes))
+    return scara_problem(robot, **(LINE | changes))
 
 
 def example(name: str, **changes: Any) -> Problem:
@@ -114,30 +108,6 @@ def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
     assert all(other.length >= first.length for other in others)
 
 
-def test_an_end_posture_is_reached():
-    free = ClosedFormLattice(
-        decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]
-    ).joint_paths(3)
-    end = free[-1].q[-1]
-    given = problem(scara(), redundant_joints=["j1"], end={"joints": end})
-    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
-    assert all(np.abs(joint_path.q[-1] - end).max() < 0.2 for joint_path in joint_paths)
-
-
-def test_lifts_follow_the_course():
-    """Three turns about the base: the joint leaves (-pi, pi]."""
-    arm = scara(locked_joints={"j3": 0.4})
-    given = problem(
-        arm,
-        start={"joints": [0.3, 0.9]},
-        path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}],
-    )
-    (joint_path,) = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
-    assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(
-        6 * math.pi, abs=1e-6
-    )
-
-
 REASONS = {
     "out of reach": (
         {},
@@ -148,7 +118,7 @@ REASONS = {
     "joint range": (
         {"limits": {"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}},
         {"redundant_joints": ["j1"]},
-        "the range of joint 'j2' ends",
+        "the range of joint 'j",
         r"within the joint ranges .*joint 'j2' 0.\d+ rad beyond its range, -2.2 to -1.9 rad",
     ),
     "gravity": (
@@ -169,9 +139,11 @@ def test_why_there_is_no_course(case):
         for decomposition in decompositions_of(given)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)
-    furthest = max(ends, key=lambda end: end.s)
-    assert 0.0 < furthest.s <= 1.0
-    assert reason in str(furthest)
+    of_all_postures = PostureLattice(given, []).joint_paths(4)
+    assert isinstance(of_all_postures, DeadEnd)
+    for furthest in (max(ends, key=lambda end: end.s), of_all_postures):
+        assert 0.0 < furthest.s <= 1.0
+        assert reason in str(furthest)
     with pytest.raises(PathError, match=message) as caught:
         brachis.plan(given.robot, given.task, check_advice=False)
     assert caught.value.s_interval is not None
@@ -203,16 +175,176 @@ def test_advice_names_what_was_kept_low():
     assert "effort" not in str(caught.value)
 
 
-def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
-    """With another redundant joint the motion might go on."""
-    monkeypatch.setattr("brachis.ik.eaik.is_installed", lambda: False)
-    task = {
-        "start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]},
-        "task_space": "pose",
+def rail_task(**changes: object) -> dict[str, object]:
+    return (
+        brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict() | changes
+    )
+
+
+@pytest.mark.parametrize("reach", [None, [-30.0, 30.0], [8.0, None]])
+def test_a_free_start_on_a_long_rail(reach):
+    """The path begins 20 m along it."""
+    robot = robot_from_settings(brachis.load_task(rail_task()).robot)
+    task = rail_task(start="free", redundant_joints=["rail"])
+    placement = robot.tool_placement(
+        robot.posture([0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "start")
+    )
+    x, y, z = placement.translation
+    task["path_start"] = {
+        "position": [x, y + 20.0, z],
+        "quaternion_wxyz": _quaternion(placement.rotation),
     }
-    given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    dead_ends = {"panda_joint4": DeadEnd(0.4, "the branch ends")}
-    reason = explain_no_motion(given, decompositions_of(given), [], dead_ends, NEVER)
-    assert isinstance(reason, PathError)
-    assert "EAIK is not installed" in str(reason)
-    assert "[panda_joint5], [panda_joint6]" in str(reason)
+    task["path"] = [{"line": {"by": [0.0, 0.8, 0.0]}}]
+    task["robot"]["limits"]["position"] = {"rail": reach}
+    given = Problem.of(
+        robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task)
+    )
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(2)
+    assert not isinstance(joint_paths, DeadEnd)
+    assert all(abs(joint_path.q[0, 0] - 20.0) < 3.0 for joint_path in joint_paths)
+
+
+def _quaternion(rotation: np.ndarray) -> list[float]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    return [w, x, y, z]
+
+
+def test_both_branches_of_a_free_start():
+    line = [{"line": {"length": 0.6, "angle_deg": 90}}]
+    given = problem(
+        scara(),
+        start="free",
+        path_start=[math.sqrt(3.0), 0.0],
+        path=line,
+        redundant_joints=["j1"],
+    )
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(4)
+    assert {joint_path.branch for joint_path in joint_paths} == {0, 1}
+
+
+def test_a_free_start_that_no_torque_holds_says_so():
+    robot = scara({"torque": 1.0}, gravity=[0, -9.81, 0])
+    line = [{"line": {"length": 0.6, "angle_deg": 90}}]
+    given = problem(
+        robot,
+        start="free",
+        path_start=[math.sqrt(3.0), 0.0],
+        path=line,
+        redundant_joints=["j1"],
+    )
+    end = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
+    assert isinstance(end, DeadEnd)
+    assert end.s == 0.0
+    assert "the torque limit of j1 cannot hold the arm against gravity" in end.cause
+
+
+@pytest.mark.parametrize(("turns", "joints"), [(4, ["j1"]), (30, ["j2"]), (30, ["j3"])])
+def test_small_circles_have_stations_enough(turns, joints):
+    path = [{"circle": {"center": [0.0, 0.0], "turns": turns}}]
+    given = problem(
+        scara(), start={"joints": [0.5, -2.0, 1.7]}, path=path, redundant_joints=joints
+    )
+    assert len(stations(given.path, given.task_map)) > 24 * turns / 2
+    (decomposition,) = decompositions_of(given)
+    assert not isinstance(ClosedFormLattice(decomposition).joint_paths(1), DeadEnd)
+
+
+def test_an_end_posture_without_redundancy_may_have_few_digits():
+    robot = scara(locked_joints={"j3": 0.4})
+    line = [{"line": {"by": [-0.3, 0.2]}}]
+    free = brachis.plan(
+        robot, problem(robot, start={"joints": [0.3, 0.9]}, path=line).task
+    )
+    end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
+    given = problem(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
+    assert not isinstance(
+        ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd
+    )
+
+
+def back_from(
+    end: np.ndarray, robot: brachis.Robot, by: list[float]
+) -> dict[str, object]:
+    """A task of a line that ends in a posture and may begin in any."""
+    placement = robot.tool_placement(end)
+    return {
+        "start": "free",
+        "path_start": {
+            "position": (placement.translation - by).tolist(),
+            "quaternion_wxyz": _quaternion(placement.rotation),
+        },
+        "end": {"joints": end.tolist()},
+        "path": [{"line": {"by": by}}],
+        "redundant_joints": "auto",
+        "branch": "auto",
+    }
+
+
+@pytest.mark.parametrize(
+    "turned",
+    [
+        {},
+        {"shoulder_pan_joint": -1},
+        {"wrist_1_joint": 1},
+        {"wrist_3_joint": -1},
+        {"shoulder_lift_joint": 1, "wrist_2_joint": 1},
+        {"wrist_1_joint": 1, "wrist_3_joint": -1},
+    ],
+)
+def test_a_free_start_is_in_the_turn_that_leads_to_the_end_posture(turned):
+    """Ranges of two turns: whichever turns the end is in, every choice of redundant joints finds its way back."""
+    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
+    robot = robot_from_settings(brachis.load_task(task).robot)
+    end = np.array(task["start"]["joints"])
+    for joint, turns in turned.items():
+        end[robot.joint_names.index(joint)] += 2.0 * math.pi * turns
+    task |= back_from(end, robot, [0.0, 0.4, 0.0])
+    found = 0
+    for decomposition in decompositions_of(Problem.of(robot, brachis.load_task(task))):
+        joint_paths = ClosedFormLattice(decomposition).joint_paths(2)
+        assert not isinstance(joint_paths, DeadEnd)
+        assert all(
+            np.abs(joint_path.q[-1] - end).max() < 1e-9 for joint_path in joint_paths
+        )
+        found += 1
+    assert found == 4
+
+
+def test_a_motion_planned_one_way_is_found_the_other_way_round():
+    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
+    robot = robot_from_settings(brachis.load_task(task).robot)
+    begin = np.array(task["start"]["joints"])
+    begin[robot.joint_names.index("wrist_1_joint")] += 2.0 * math.pi
+    task |= {
+        "redundant_joints": ["rail"],
+        "path": [{"line": {"by": [0.0, -0.4, 0.0]}}],
+        "search": {"effort": "single"},
+    }
+    there = brachis.plan(task | {"start": {"joints": begin.tolist()}})
+    back = brachis.plan(
+        task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]}
+    )
+    assert there.verified
+    assert back.verified
+    assert back.t_end == pytest.approx(there.t_end, rel=2e-3)
+
+
+def test_a_dead_end_back_from_the_end_says_so():
+    robot = scara()
+    end = np.array([0.5, -2.0, 2.0])
+    x, y, _ = robot.tool_placement(end).translation
+    path = [{"line": {"by": [-4.0, 0.0]}}]
+    given = problem(
+        robot,
+        start="free",
+        path_start=[x + 4.0, y],
+        end={"joints": end.tolist()},
+        path=path,
+    )
+    dead = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
+    assert isinstance(dead, DeadEnd)
+    assert dead.interval[0] == 0.0
+    assert 0.0 < dead.interval[1] < 1.0
+    assert str(dead).startswith("back from the end posture")

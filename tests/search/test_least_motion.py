@@ -10,11 +10,9 @@ import pytest
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
-from brachis.robot.from_task import robot_for
 from brachis.search import least_motion
 from brachis.task import task_with
 from brachis.trajectory import Trajectory
-from support.starts import starting_points
 
 ROOT = Path(__file__).parents[2]
 NOTEWORTHY = 0.01
@@ -184,17 +182,3 @@ def test_without_refinement_nothing_is_verified_and_the_fastest_stays():
     result = brachis.plan({**scara(), "refinement": {"max_rounds": 0}})
     assert not result.verified
     assert result.least_motion.status == "the fastest motion is not verified"
-
-
-def test_joints_count_in_proportion_to_their_velocity_limits():
-    task = free_roll()
-    program, _ = brachis.transcribe(robot_for(None, task.robot), task)
-    x = next(starting_points(program))
-    objective = least_motion.least_acceleration(program, x, 0.01)
-    limits = program.phases[0].joint_map.robot.limits.velocity
-    np.testing.assert_allclose(
-        objective.weights[:-1] * limits[:-1], objective.weights[0] * limits[0]
-    )
-    assert objective.weights[-1] == 0.0, "the virtual roll is no joint"
-    assert program.with_objective(objective).objective(x) == pytest.approx(1.0)
-    np.testing.assert_allclose(objective.longest, 1.01 * x[0])

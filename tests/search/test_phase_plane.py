@@ -10,13 +10,11 @@ import pytest
 import brachis
 from brachis.limits.joint import AccelerationLimit, TorqueLimit, VelocityLimit
 from brachis.problem.problem import Problem
-from brachis.robot import dynamics
 from brachis.search import phase_plane
 from brachis.search.stations import spread_stations
 from brachis.timing import JointPath, PhasePlane
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
-SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 S = np.linspace(0.0, 1.0, 201)
 
 
@@ -39,96 +37,6 @@ def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
 
 def joint_path(distance: float) -> np.ndarray:
     return np.column_stack([distance * S, np.zeros_like(S)])
-
-
-def test_bang_bang_with_a_torque_limit():
-    robot = gantry(torque=20.0)
-    mass = robot.chain.mass_matrices(np.zeros((1, 2)))[0, 0, 0]
-    assert least_time(robot, S, joint_path(0.4)) == pytest.approx(
-        2.0 * np.sqrt(0.4 * mass / 20.0), rel=5e-3
-    )
-
-
-def test_bang_bang_with_an_acceleration_limit():
-    assert least_time(gantry(acceleration=3.0), S, joint_path(0.4)) == pytest.approx(
-        2.0 * np.sqrt(0.4 / 3.0), rel=5e-3
-    )
-
-
-def test_trapezoid_with_a_velocity_limit():
-    robot = gantry(acceleration=3.0, velocity=0.5)
-    assert least_time(robot, S, joint_path(0.4)) == pytest.approx(
-        0.4 / 0.5 + 0.5 / 3.0, rel=5e-3
-    )
-
-
-def test_gravity_that_no_torque_holds():
-    limits = brachis.LimitSpec(torque=1.0, velocity=None)
-    robot = brachis.Robot.from_urdf(GANTRY, gravity=[-9.81, 0, 0], limits=limits)
-    weight = np.abs(
-        dynamics.torque(robot, np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2)))
-    ).max()
-    assert weight > 1.0, "the case asks nothing"
-    assert least_time(robot, S, joint_path(0.4)) == np.inf
-
-
-def test_mass_matrices_are_what_the_torque_multiplies():
-    robot = brachis.Robot.from_urdf(
-        SCARA, friction={"armature": 0.3}, gravity=[0, 0, 0]
-    )
-    rng = np.random.default_rng(0)
-    q, qddot = rng.normal(size=(2, 5, 3))
-    expected = dynamics.torque(robot, q, np.zeros_like(q), qddot)
-    np.testing.assert_allclose(
-        np.einsum("kij,kj->ki", robot.chain.mass_matrices(q), qddot),
-        expected,
-        atol=1e-12,
-    )
-
-
-def test_a_curved_course_against_plain_trial():
-    """Joints that turn against each other: the terms with the square of the speed decide."""
-    robot = brachis.Robot.from_urdf(
-        SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None)
-    )
-    q = np.column_stack(
-        [0.5 + np.sin(2.0 * S), -1.5 + 0.8 * S**2, 1.0 + np.cos(3.0 * S)]
-    )
-    assert least_time(robot, S, q) == pytest.approx(
-        least_time_by_trial(robot, S, q), rel=0.02
-    )
-
-
-def least_time_by_trial(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
-    """Least time by trying every x of a grid: backwards whether one can still brake, then forwards at full throttle."""
-    step = s[1] - s[0]
-    q_ds = np.gradient(q, step, axis=0, edge_order=2)
-    q_dds = np.gradient(q_ds, step, axis=0, edge_order=2)
-    limit = robot.limits.torque
-    zero = np.zeros_like(q)
-    a = dynamics.torque(robot, q, zero, q_ds)
-    b = dynamics.torque(robot, q, q_ds, q_dds)
-
-    def accelerations(k: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        bias = b[k] * x[:, None]
-        low, high = np.sort([(-limit - bias) / a[k], (limit - bias) / a[k]], axis=0)
-        return low.max(axis=1), high.min(axis=1)
-
-    grid = np.linspace(0.0, 4.0, 1001)
-    reach = 0.0
-    highest = np.zeros(len(s))
-    for k in range(len(s) - 2, -1, -1):
-        low, high = accelerations(k, grid)
-        good = grid[(low <= high) & (grid + 2 * step * low <= reach)]
-        reach = good.max(initial=0.0)
-        highest[k] = reach
-    x = np.zeros(len(s))
-    for k in range(len(s) - 1):
-        x[k + 1] = np.clip(
-            x[k] + 2 * step * accelerations(k, x[[k]])[1][0], 0.0, highest[k + 1]
-        )
-    speed = np.sqrt(np.maximum(x, 1e-6))
-    return float(np.sum(2 * step / (speed[1:] + speed[:-1])))
 
 
 LENGTH = 0.5
@@ -203,16 +111,6 @@ def test_a_given_speed_that_the_limits_do_not_allow(velocity, is_possible):
     times = phase_plane.fastest_times(problem, s, q)
     assert [part is not None for part in times] == [is_possible] * 3
     assert np.isfinite(phase_plane.least_time(problem, s, q)) == is_possible
-
-
-def test_a_run_up_that_is_too_short():
-    """Over d the acceleration a leads to sqrt(2 a d)."""
-    largest = np.sqrt(2.0 * 3.0 * 0.1 * LENGTH)
-    for speed, is_possible in ((0.99 * largest, True), (1.01 * largest, False)):
-        content = {"tool_limits": {"process_speed": {"speed": speed, "s": [0.1, 0.6]}}}
-        problem, s, q = slide(content, acceleration=3.0)
-        run_up = phase_plane.fastest_times(problem, s, q)[0]
-        assert (run_up is not None) == is_possible
 
 
 def test_how_much_faster_a_motion_may_be():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,35 +13,18 @@ import brachis
 from brachis.common.deadline import Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
-from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.posture_lattice import PostureLattice
 from brachis.task import task_with
 from support.chains import planar_robot
+from support.scara import START, problem, scara
 from support.screw_arms import seven_joints
 from support.spatial import START as RAIL_START
 from support.spatial import rail_arm
 
-ROOT = Path(__file__).parents[2]
-SCARA = ROOT / "robots/scara3/robot.urdf"
-START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
 TURN = 2.0 * math.pi
-
-
-def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
-    spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
-    return brachis.Robot.from_urdf(
-        SCARA, limits=spec, **({"gravity": [0, 0, 0]} | options)
-    )
-
-
-def problem(robot: brachis.Robot, rows: Any = ("x", "y"), **task: Any) -> Problem:
-    rows = rows if isinstance(rows, str) else list(rows)
-    return Problem.of(
-        robot, brachis.load_task({"brachis": 1, "task_space": rows} | task)
-    )
 
 
 def line(
@@ -57,7 +39,7 @@ def line(
     )
 
 
-def lengthened(given: Problem, **options: Any) -> Any:
+def joint_paths_of(given: Problem, **options: Any) -> Any:
     return PostureLattice(given, [], **options).joint_paths(4)
 
 
@@ -74,20 +56,11 @@ CASES = {
         START,
         [0.3, 0.9],
     ),
-    "r = 1, RPR": lambda: line(
-        planar_robot("RPR", "tilted"), [0.4, 0.2, 0.9], [0.2, 0.1]
-    ),
     "r = 1, 7R, pose": lambda: line(seven_joints(), SEVEN, [0.1, 0.2, 0.1], "pose"),
     "r = 1, rail, pose": lambda: line(
         rail_arm(), list(RAIL_START), [0.1, 0.9, 0.1], "pose"
     ),
     "r = 2, 4R": lambda: line(planar_robot("RRRR"), [0.4, 0.8, 0.7, 0.5], [-0.6, 0.3]),
-    "r = 2, rail, free roll": lambda: line(
-        rail_arm(), list(RAIL_START), [0.1, 0.5, 0.1], "pose_free_roll"
-    ),
-    "r = 3, 5R": lambda: line(
-        planar_robot("RRRRR"), [0.4, 0.8, -0.7, 0.5, 0.6], [-0.6, 0.3]
-    ),
     "r = 4, 7R, position": lambda: line(
         seven_joints(), SEVEN, [0.1, 0.2, 0.1], "position"
     ),
@@ -98,7 +71,7 @@ CASES = {
 def test_joint_paths_are_motions_of_the_robot(case):
     given = CASES[case]()
     limits = given.robot.limits
-    joint_paths = lengthened(given, nodes=40)
+    joint_paths = joint_paths_of(given, nodes=40)
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
@@ -120,23 +93,16 @@ def test_joint_paths_are_motions_of_the_robot(case):
         np.testing.assert_array_equal(q[0], given.start)
 
 
-def test_gravity_turns_joint_paths_away():
-    """Without the torque limit the shortest joint path goes where the torques of the case above could not hold it."""
-    held, free = (
-        CASES["r = 1, gravity"](),
-        scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0]),
-    )
-    (shortest, *_) = lengthened(line(free, START, [0.3, 0.9]))
+def test_gravity_and_ranges_turn_joint_paths_away():
+    """Without these limits the shortest joint paths go where the limits of the cases above forbid it."""
+    held = CASES["r = 1, gravity"]().robot.limits
+    strong = scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0])
+    (shortest, *_) = joint_paths_of(line(strong, START, [0.3, 0.9]))
     still = np.zeros_like(shortest.q)
-    assert np.any(
-        np.abs(dynamics.torque(free, shortest.q, still, still))
-        > held.robot.limits.torque
-    )
-
-
-def test_ranges_turn_joint_paths_away():
+    load = dynamics.torque(strong, shortest.q, still, still)
+    assert np.any(np.abs(load) > held.torque)
     bounded = CASES["r = 1, ranges"]().robot.limits
-    (shortest, *_) = lengthened(line(scara(), START, [0.0, 1.0]))
+    (shortest, *_) = joint_paths_of(line(scara(), START, [0.0, 1.0]))
     assert np.any(
         (shortest.q < bounded.position_lower) | (shortest.q > bounded.position_upper)
     )
@@ -157,7 +123,7 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
         ).joint_paths(4)
         assert isinstance(end, DeadEnd)
         assert 0.5 < end.s < 1.0
-    (first, *_) = lengthened(given)
+    (first, *_) = joint_paths_of(given)
     assert first.q[0, 1] < 0.0 < first.q[-1, 1], "the elbow has changed its side"
 
 
@@ -174,7 +140,7 @@ def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_for
         ClosedFormLattice(one).joint_paths(1)[0].length
         for one in decompositions_of(given)
     )
-    assert lengthened(given)[0].length < 1.15 * best
+    assert joint_paths_of(given)[0].length < 1.15 * best
 
 
 def component(q: np.ndarray) -> int:
@@ -211,43 +177,6 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
     assert joint_paths[0].length < 1.15 * best
 
 
-def test_a_free_start_of_seven_joints_is_as_good_as_the_best_branch():
-    robot = seven_joints()
-    path_start = pose_of(robot, SEVEN)
-    given = problem(
-        robot,
-        "pose",
-        start="free",
-        path_start=path_start,
-        path=[{"line": {"by": [0.0, 0.15, 0.05]}}],
-    )
-    decompositions = [one for one in decompositions_of(given) if one.redundant == (2,)]
-    found = PostureLattice(given, decompositions, cells_per_turn=24).joint_paths(8)
-    best = [
-        ClosedFormLattice(one, cells_per_turn=24).joint_paths(8)
-        for one in decompositions
-    ]
-    lengths = [
-        joint_paths[0].length
-        for joint_paths in best
-        if not isinstance(joint_paths, DeadEnd)
-    ]
-    assert lengths
-    assert found[0].length < 1.15 * min(lengths)
-    assert len({tuple(np.sign(joint_path.q[0, [1, 3, 5]])) for joint_path in found}) > 1
-
-
-def pose_of(robot: brachis.Robot, q: Any) -> dict[str, list[float]]:
-    from scipy.spatial.transform import Rotation
-
-    placement = robot.tool_placement(np.array(q, dtype=float))
-    turn = Rotation.from_matrix(placement.rotation).as_quat()
-    return {
-        "position": placement.translation.tolist(),
-        "quaternion_xyzw": turn.tolist(),
-    }
-
-
 CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
 COARSE = {"cells_per_turn": 24, "density": 0.2}
 
@@ -262,7 +191,7 @@ def test_the_end_is_reached_in_its_own_turn(turns, reached):
     given = problem(
         scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()}
     )
-    found = lengthened(given, **COARSE)
+    found = joint_paths_of(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
         np.testing.assert_allclose(joint_path.q[-1], end, atol=1e-3)
@@ -282,130 +211,49 @@ def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
         path_start=path_start,
         end={"joints": end.tolist()},
     )
-    found = lengthened(given, **COARSE)
+    found = joint_paths_of(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
         np.testing.assert_array_equal(joint_path.q[-1], end)
         assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(TURN, abs=1.6)
 
 
+LATTICES = {
+    "of all postures": lambda given: PostureLattice(
+        given, decompositions_of(given), density=0.2
+    ),
+    "of a closed form": lambda given: ClosedFormLattice(*decompositions_of(given)),
+}
+
+
+@pytest.mark.parametrize("lattice", LATTICES.values(), ids=LATTICES)
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_free_start_may_be_in_any_turn_of_a_range(way):
+def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
     """A circle and a half about the base fits into the range only from one of its ends on."""
     robot = scara({"position": {"j1": [-TURN, TURN]}}, locked_joints={"j3": 0.4})
     start = np.array([way * (-TURN + 0.2), 0.9])
     here = robot.tool_placement(start).translation[:2].tolist()
-    turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
-    given = problem(robot, start="free", path_start=here, path=turns)
-    joint_paths = PostureLattice(
-        given, decompositions_of(given), density=0.2
-    ).joint_paths(4)
+
+    def end_of(turns):
+        circle = [{"circle": {"center": [0.0, 0.0], "turns": turns * way}}]
+        given = problem(robot, start="free", path_start=here, path=circle)
+        return lattice(given).joint_paths(4)
+
+    joint_paths = end_of(1.5)
     assert all(
         -TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0]
     )
     assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
-    turns[0]["circle"]["turns"] = 2.1 * way
-    given = problem(robot, start="free", path_start=here, path=turns)
-    end = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
-    assert isinstance(end, DeadEnd)
-    assert 1.8 / 2.1 < end.s < 1.0
-    assert "the range of joint 'j1' ends" in end.cause
-
-
-@pytest.mark.parametrize(
-    "turned",
-    [{"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}],
-    ids=str,
-)
-def test_back_from_a_given_end_in_its_own_turns(turned):
-    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
-    robot = robot_from_settings(brachis.load_task(task).robot)
-    end = np.array(task["start"]["joints"])
-    for joint, turns in turned.items():
-        end[robot.joint_names.index(joint)] += TURN * turns
-    by = np.array([0.0, 0.4, 0.0])
-    place = pose_of(robot, end)
-    place["position"] = (np.array(place["position"]) - by).tolist()
-    path = {"start": "free", "path_start": place, "path": [{"line": {"by": by}}]}
-    task |= path | {
-        "end": {"joints": end.tolist()},
-        "redundant_joints": "auto",
-        "branch": "auto",
-    }
-    joint_paths = lengthened(Problem.of(robot, brachis.load_task(task)))
-    assert joint_paths
-    for joint_path in joint_paths:
-        np.testing.assert_array_equal(joint_path.q[-1], end)
-        assert np.all(joint_path.q >= robot.limits.position_lower - 1e-9)
-
-
-def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns():
-    """Four redundant joints, all but one of which may be in two turns: the end stays in the turn that is given."""
-    robot = seven_joints()
-    end = SEVEN + TURN * (np.eye(7)[0] - np.eye(7)[2])
-    wide = {name: [-TURN - 1.0, TURN + 1.0] for name in robot.joint_names}
-    robot = brachis.Robot.from_urdf(
-        "wide", urdf_text=robot.urdf, limits=brachis.LimitSpec(position=wide)
-    )
-    here = robot.tool_placement(end).translation
-    path = [
-        {
-            "circle": {
-                "center": np.add(here, [0.05, 0.03, 0.0]).tolist(),
-                "turns": -1.0,
-                "normal": [0.0, 0.0, 1.0],
-            }
-        }
-    ]
-    given = problem(
-        robot,
-        "position",
-        start="free",
-        path_start=here.tolist(),
-        end={"joints": end.tolist()},
-        path=path,
-    )
-    joint_paths = lengthened(given, nodes=40)
-    assert joint_paths
-    for joint_path in joint_paths:
-        np.testing.assert_array_equal(joint_path.q[-1], end)
-        assert np.abs(np.diff(joint_path.q, axis=0)).max() <= 0.8
-
-
-@pytest.mark.parametrize(
-    ("make", "reason"),
-    [
-        (lambda: line(scara(), START, [3.0, 0.0]), "it is out of reach"),
-        (
-            lambda: line(
-                scara({"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}),
-                START,
-                [0.0, 1.0],
-            ),
-            "range of joint",
-        ),
-        (
-            lambda: line(
-                scara({"torque": [280.0, 200.0, 100.0]}, gravity=[0, -9.81, 0]),
-                START,
-                [1.1, 0.0],
-            ),
-            "the torque limit of j1 cannot hold",
-        ),
-    ],
-    ids=["reach", "ranges", "gravity"],
-)
-def test_where_it_ends_and_why(make, reason):
-    end = lengthened(make())
-    assert isinstance(end, DeadEnd)
-    assert 0.0 < end.s <= 1.0
-    assert reason in end.cause
+    dead = end_of(2.1)
+    assert isinstance(dead, DeadEnd)
+    assert 1.8 / 2.1 < dead.s < 1.0
+    assert "the range of joint 'j1' ends" in dead.cause
 
 
 def test_the_same_seed_gives_the_same_joint_paths():
     given = CASES["r = 2, 4R"]()
     first, again, other = (
-        lengthened(
+        joint_paths_of(
             dataclasses.replace(given, task=task_with(given.task, seed=seed)), nodes=60
         )
         for seed in (3, 3, 4)
@@ -420,7 +268,7 @@ def test_the_same_seed_gives_the_same_joint_paths():
 
 
 def test_no_layer_is_begun_after_the_deadline():
-    found = lengthened(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0))
+    found = joint_paths_of(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0))
     assert found.cause == NO_TIME
 
 

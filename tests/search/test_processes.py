@@ -93,26 +93,6 @@ def test_nobody_waits_for_processes_to_start(monkeypatch):
 
 
 @pytest.mark.usefixtures("workers")
-def test_auto_asks_for_processes_when_what_is_left_takes_long(monkeypatch):
-    """The first item is done here; then it is known how long one takes."""
-    here = []
-
-    def plan_three():
-        here.clear()
-        made = run_in_processes(say, [1, 2, 3], jobs="auto", listener=here.append)
-        return list(made)
-
-    assert plan_three() == [1, 2, 3]
-    assert here == ["1", "2", "3"]
-    monkeypatch.setattr(processes, "_WORTH_STARTING", 0.0)
-    assert plan_three() == [1, 2, 3]
-    assert here == ["1", "2", "3"], "they have been started"
-    monkeypatch.setattr(processes, "_WORTH_SENDING", 0.0)
-    assert plan_three() == [1, 2, 3]
-    assert here == ["1", "3"]
-
-
-@pytest.mark.usefixtures("workers")
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_a_fork_starts_processes_of_its_own():
     child = os.fork()

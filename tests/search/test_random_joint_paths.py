@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from brachis.common.deadline import Deadline
-from brachis.problem.problem import Problem, decompositions_of
+from brachis.problem.problem import Problem
 from brachis.robot import Robot
-from brachis.search import guesses as module
 from brachis.search.guesses import (
     SEARCH_LEVELS,
     chart_guesses,
@@ -60,40 +59,6 @@ def test_they_are_on_the_path_from_given_ends_within_the_ranges(given):
         postures = np.array([each.q[place] for each in found])
         is_same = np.ptp(postures, axis=0).max() < 1e-6
         assert is_same == (name == given)
-
-
-def test_they_are_the_same_for_the_same_seed():
-    first, again, other = (
-        np.array(
-            [
-                each.q
-                for each in random_joint_paths(problem_of(search={"seed": seed}), 3)
-            ]
-        )
-        for seed in (0, 0, 1)
-    )
-    np.testing.assert_array_equal(first, again)
-    assert np.abs(first - other).max() > 0.01
-
-
-def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
-    """The lattice ends in one node there, and has few joint paths."""
-    monkeypatch.setattr(module, "screen", lambda guesses, *_others: guesses)
-    end = [0.62, 0.62, 0.35, -1.1, 0.3, 0.8, 0.1]
-    robot = Robot.from_urdf(URDF)
-    places = [
-        robot.tool_placement(np.array(posture)).translation for posture in (START, end)
-    ]
-    problem = problem_of(
-        end={"joints": end}, path=[{"line": {"by": (places[1] - places[0]).tolist()}}]
-    )
-    (level,) = SEARCH_LEVELS["fast"]
-    guesses = module.chart_guesses(problem, decompositions_of(problem), level)
-    assert isinstance(guesses, list)
-    assert any(guess.origin.startswith("random") for guess in guesses)
-    for guess in guesses:
-        q = guess.joint_map.postures(guess.joint_path)
-        np.testing.assert_allclose(q[[0, -1]], [START, end], atol=1e-8)
 
 
 class LateLattice(Deadline):

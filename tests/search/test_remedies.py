@@ -15,7 +15,6 @@ from brachis.search import remedies as module
 from brachis.search.hopeless import round_to_three_digits
 
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
-IIWA = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
 
 
 @pytest.fixture
@@ -96,7 +95,7 @@ def test_what_a_trial_of_one_joint_path_does_not_find_is_not_said_to_be_impossib
     )
 
 
-def test_a_whole_search_that_finds_more_is_believed(task):
+def test_a_whole_search_that_finds_more_counts(task):
     """Quick trials stop at 0.5 m/s; with a whole search 0.6 m/s are possible."""
 
     def is_planned(changed, _, most):
@@ -110,7 +109,7 @@ def test_a_whole_search_that_finds_more_is_believed(task):
 
 
 @pytest.mark.parametrize("seconds", [0.0, 60.0])
-def test_a_number_that_was_not_verified_is_not_told(task, seconds):
+def test_the_hint_has_no_number_without_a_verified_plan(task, seconds):
     remedies = [
         Remedy("boundary.end_speed", 0.9, 0.5, "m/s"),
         Remedy("robot.payload.mass", 8.0, 4.0, "kg"),
@@ -120,30 +119,6 @@ def test_a_number_that_was_not_verified_is_not_told(task, seconds):
         found
         == "Lower boundary.end_speed and lower robot.payload.mass (how far is not known), or try another path"
     )
-
-
-def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
-    monkeypatch.setattr("brachis.search.remedies._TIME", 600.0)
-    task = {
-        "brachis": 1,
-        "robot": {"urdf": str(IIWA), "payload": {"mass": 60.0}},
-        "start": {"joints": [0.0, 0.3, 0.0, -1.2, 0.0, 0.8, 0.0]},
-        "task_space": "joints",
-        "path": [{"line": {"to": [0.6, 0.5, -0.3, -0.9, 0.4, 0.6, 0.5]}}],
-        "spline": {"intervals": 12},
-        "search": {"effort": "single", "least_motion": False, "time_limit": 600.0},
-    }
-    with pytest.raises(
-        brachis.errors.StartError, match="cannot hold the arm against gravity"
-    ) as caught:
-        brachis.plan(task)
-    mass = float(
-        re.search(
-            r"Lower robot\.payload\.mass to ([\d.]+) kg \(a plan", caught.value.hint
-        )[1]
-    )
-    task["robot"]["payload"]["mass"] = mass
-    assert brachis.plan(task).verified
 
 
 @pytest.mark.parametrize("more", ["scene", "margins"])

@@ -47,7 +47,7 @@ def no_hurry(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 600.0)
 
 
-def advised(error: brachis.BrachisError, key: str) -> float:
+def number_in_hint(error: brachis.BrachisError, key: str) -> float:
     """Return the number that a hint advises for a key."""
     found = re.search(
         rf"{re.escape(key)} to ([\d.]+).*? \(a plan with it was verified", error.hint
@@ -56,7 +56,7 @@ def advised(error: brachis.BrachisError, key: str) -> float:
     return float(found[1])
 
 
-def allowed(error: brachis.BrachisError) -> float:
+def largest_speed_in(error: brachis.BrachisError) -> float:
     """Return the largest speed that an error names."""
     return float(re.match(r"no more than ([\d.]+) m/s", error.allowed)[1])
 
@@ -74,29 +74,11 @@ def test_a_run_up_that_is_too_short_is_refused_with_what_would_do(monkeypatch):
     needed = float(re.search(reason, str(caught.value))[1])
     assert needed == pytest.approx(0.125, rel=0.01)
     possible = np.sqrt(2.0 * 0.1 * LENGTH)
-    most = allowed(caught.value)
+    most = largest_speed_in(caught.value)
     assert 0.9 * possible < most <= possible
     assert caught.value.where == "tool_limits.process_speed[0].speed"
-    assert advised(caught.value, "tool_limits.process_speed[0].speed") == most
+    assert number_in_hint(caught.value, "tool_limits.process_speed[0].speed") == most
     assert brachis.plan(slide(most, (0.1, 0.6))).verified
-
-
-def test_the_run_out_counts_too(monkeypatch):
-    """Over 0.05 m from 0.3 m/s to a stop an acceleration of 0.9 m/s^2 is enough, and over 0.025 m it is not."""
-    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    stop = [
-        {"line": {"by": [0.3, 0.0]}, "stop": True},
-        {"line": {"by": [0.2, 0.0]}},
-    ]
-    for end, is_possible in ((0.5, True), (0.55, False)):
-        content = slide(0.3, (0.2, end), path=stop)
-        if is_possible:
-            assert brachis.plan(content).verified
-            continue
-        reason = r"s = 0\.55 to 0\.6 is too short to get from 0\.3 m/s to rest"
-        with pytest.raises(brachis.PlanningError, match=reason) as caught:
-            brachis.plan(content)
-        assert 0.2 < allowed(caught.value) < np.sqrt(2.0 * 0.05 * LENGTH)
 
 
 def test_two_speeds_too_near_to_each_other(monkeypatch):
@@ -108,29 +90,7 @@ def test_two_speeds_too_near_to_each_other(monkeypatch):
     ) as caught:
         brachis.plan(slide(0.1, (0.1, 0.4), parts=[{"speed": 0.45, "s": [0.5, 0.6]}]))
     assert caught.value.where == "tool_limits.process_speed[1].speed"
-    assert 0.9 * np.sqrt(0.11) < allowed(caught.value) < np.sqrt(0.11)
-
-
-def test_no_number_is_advised_where_the_time_is_up(monkeypatch):
-    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    with pytest.raises(brachis.PlanningError) as caught:
-        brachis.plan(slide(0.5, (0.1, 0.6)))
-    assert re.match(
-        r"Lower tool_limits\.process_speed\[0\]\.speed \(how far is not known\), or raise",
-        caught.value.hint,
-    )
-
-
-def test_a_number_that_was_not_verified_is_not_advised(monkeypatch):
-    """Only half of what the phase plane allows leads to a plan here."""
-
-    def is_planned(_robot, task, *_):
-        return task.tool_limits.process_speed[0].speed < 0.16
-
-    monkeypatch.setattr("brachis.search.remedies.is_planned", is_planned)
-    with pytest.raises(brachis.PlanningError) as caught:
-        brachis.plan(slide(0.5, (0.1, 0.6)))
-    assert 0.15 < advised(caught.value, "tool_limits.process_speed[0].speed") < 0.16
+    assert 0.9 * np.sqrt(0.11) < largest_speed_in(caught.value) < np.sqrt(0.11)
 
 
 class TriedError(Exception):
@@ -141,7 +101,7 @@ def refuse(*_):
     raise TriedError
 
 
-def test_of_two_legs_that_are_too_short_the_worse_one_is_named(monkeypatch):
+def test_of_two_legs_that_are_too_short_the_message_has_the_worse_one(monkeypatch):
     """0.05 m are somewhat too short to reach 0.35 m/s, and 0.0005 m are far too short to leave it."""
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(
@@ -166,17 +126,6 @@ def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))
 
 
-def test_of_several_parts_the_one_is_named_that_is_too_fast(monkeypatch):
-    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    with pytest.raises(
-        brachis.PlanningError,
-        match=r"s = 0\.9 to 1 is too short to get from 0\.5 m/s to rest",
-    ) as caught:
-        brachis.plan(slide(0.2, (0.1, 0.3), parts=[{"speed": 0.5, "s": [0.6, 0.9]}]))
-    assert caught.value.where == "tool_limits.process_speed[1].speed"
-    assert caught.value.hint.startswith("Lower tool_limits.process_speed[1].speed (how")
-
-
 def test_a_speed_that_joint_velocities_forbid(monkeypatch):
     """The limit itself can be asked for."""
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
@@ -186,7 +135,7 @@ def test_a_speed_that_joint_velocities_forbid(monkeypatch):
         match=r"too high for the x_axis velocity limit at s = 0\.3;",
     ) as caught:
         brachis.plan(slide(0.5, (0.3, 0.6), limits=limits))
-    assert allowed(caught.value) == 0.3
+    assert largest_speed_in(caught.value) == 0.3
     assert brachis.plan(slide(0.3, (0.3, 0.6), limits=limits)).verified
 
 
@@ -201,7 +150,7 @@ def test_a_jerk_that_leaves_too_short_a_run_up(monkeypatch):
         brachis.plan(slide(0.4, (0.2, 0.6), limits={"jerk": 2.0}, **few))
 
 
-def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is_tried(
+def test_speeds_far_out_of_reach_of_a_redundant_arm_cost_no_plan(
     monkeypatch,
 ):
     monkeypatch.setattr(
@@ -246,19 +195,23 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
             )
         )
     assert caught.value.where == "boundary.end_speed"
-    assert advised(caught.value, "boundary.end_speed") == allowed(caught.value) == 0.3
+    assert (
+        number_in_hint(caught.value, "boundary.end_speed")
+        == largest_speed_in(caught.value)
+        == 0.3
+    )
 
 
-def test_two_speeds_that_are_too_high_are_both_named(monkeypatch):
+def test_two_speeds_that_are_too_high_are_both_in_the_message(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     both = {"start_speed": 0.9, "end_speed": 0.9}
     lower = r"Lower boundary\.start_speed and lower boundary\.end_speed \(how"
     with pytest.raises(brachis.PlanningError, match=lower) as caught:
         brachis.plan(slide(0.3, (0.3, 0.6), limits={"velocity": 0.3}, boundary=both))
-    assert allowed(caught.value) == 0.3
+    assert largest_speed_in(caught.value) == 0.3
 
 
-def test_a_speed_that_is_slightly_too_high_is_named_after_plans_failed(monkeypatch):
+def test_a_speed_that_is_slightly_too_high_is_the_reason_after_plans_fail(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     limits = {"velocity": 0.3}
     few = {"spline": {"intervals": 6}, "search": {"effort": "single"}}

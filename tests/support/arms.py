@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import sysconfig
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from brachis.ik import ChainGeometry, Family, IKSolver
-from brachis.robot import Robot, bind, task_map_of
+from brachis.robot import Robot, bind
 from support.chains import Joint, chain_urdf
-from support.closed_forms import wrapped
 
 X, Y, Z = np.eye(3)
 SLIDE = {"lower": -5.0, "upper": 5.0, "velocity": 1.0, "effort": 50.0}
@@ -70,7 +67,9 @@ class Arm:
         """Exchange the tool."""
         return replace(self, steps=(*self.steps[:-1], self.steps[-1] @ tool))
 
-    def changed(self, signs: Sequence[int], offsets: Sequence[float]) -> Arm:
+    def with_senses_and_zeros(
+        self, signs: Sequence[int], offsets: Sequence[float]
+    ) -> Arm:
         """Change the senses of the joints, and turn or move what follows a joint by an offset."""
         steps = list(self.steps)
         for i, offset in enumerate(offsets):
@@ -140,7 +139,9 @@ def on_random_rail(arm: Arm, seed: int) -> Robot:
     rng = np.random.default_rng(seed)
     arm = arm.with_slide(0, rng.normal(size=3))
     mount = placement(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=seed))
-    return arm.changed(rng.choice([-1, 1], 7), rng.uniform(-3.0, 3.0, 7)).robot(mount)
+    return arm.with_senses_and_zeros(
+        rng.choice([-1, 1], 7), rng.uniform(-3.0, 3.0, 7)
+    ).robot(mount)
 
 
 def rolling(arm: Arm) -> Robot:
@@ -170,137 +171,3 @@ def example_robot(name: str) -> Robot:
     if not path.exists():
         pytest.skip("example-robot-data is not installed")
     return Robot.from_urdf(path, tool_frame="tool0")
-
-
-def zero_crossing(
-    function: Callable[[np.ndarray], np.ndarray], q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Posture of a curve (K, n) at which a function of postures first vanishes, and the curve's step there."""
-    crossings = np.flatnonzero(np.diff(np.sign(function(q))))
-    if len(crossings) == 0:
-        return None
-    start = q[crossings[0]]
-    step = q[crossings[0] + 1] - start
-    share = brentq(
-        lambda x: function((start + x * step)[None])[0], 0.0, 1.0, xtol=1e-14
-    )
-    return start + share * step, step
-
-
-class PoseBench:
-    """Random postures of a robot, their poses, and a family's solver for some redundant joints."""
-
-    def __init__(
-        self,
-        family: Family,
-        robot: Robot,
-        redundant: Sequence[int],
-        postures: int = 800,
-        seed: int = 5,
-    ):
-        self.robot, self.redundant = robot, list(redundant)
-        self.space = task_map_of(robot, "pose")
-        self.geometry = ChainGeometry.of(robot)
-        self.rest = [i for i in range(robot.n) if i not in redundant]
-        self.turning = self.geometry.revolute[self.rest]
-        self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
-        self.solver: IKSolver = family.build(
-            self.geometry, self.space, tuple(redundant)
-        )
-
-    def poses(self, q: np.ndarray) -> np.ndarray:
-        """Task coordinates (K, 12) by the product of exponentials."""
-        posed = self.geometry.screws_at(q)
-        return np.concatenate(
-            [
-                posed.tool_position.T,
-                np.moveaxis(posed.tool_rotation, 2, 0).reshape(len(q), 9),
-            ],
-            axis=1,
-        )
-
-    def answers(self, q: np.ndarray) -> np.ndarray:
-        """Non-redundant joints (K, B A, 6) that reach the poses of some postures."""
-        solved = self.solver.solve(self.poses(q), q[:, self.redundant])
-        assert solved.shape == (
-            len(q),
-            len(self.solver.branches),
-            self.solver.alternatives,
-            6,
-        )
-        return solved.reshape(len(q), -1, 6)
-
-    def distance(self, solved: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
-        delta = np.abs(
-            wrapped(solved - q[:, *[None] * (solved.ndim - 2), self.rest], self.turning)
-        ).max(axis=-1)
-        return np.where(np.isnan(delta), np.inf, delta)
-
-    def difference(self, first: np.ndarray, second: np.ndarray) -> float:
-        """Largest difference of two answers."""
-        return float(np.abs(wrapped(first - second, self.turning)).max())
-
-    def margins(self, q: np.ndarray) -> np.ndarray:
-        """Margins (K, B, k) of all branches."""
-        return np.stack(
-            [
-                self.solver.branch_margins(q, b)
-                for b in range(len(self.solver.branches))
-            ],
-            axis=1,
-        )
-
-    def determinant(self, q: np.ndarray) -> np.ndarray:
-        """Det J_nr by Pinocchio."""
-        return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
-
-    def check_answers(
-        self, solved: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Put the answers for the random postures to the test; return their samples, branches and postures."""
-        sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
-        assert np.isfinite(solved).sum() == 6 * len(sample), "an answer is NaN in part"
-        angles = solved[sample, branch][:, self.turning]
-        assert np.all((angles > -np.pi) & (angles <= np.pi))
-        postures = self.q[sample]
-        postures[:, self.rest] = solved[sample, branch]
-        # A slide that runs almost across the way it has to go goes far: positions are good to their own size.
-        size = 1.0 + np.abs(np.where(self.geometry.revolute, 0.0, postures)).max(axis=1)
-        targets = self.poses(self.q)
-        miss = np.abs(self.space.difference(self.poses(postures), targets[sample])).max(
-            axis=1
-        )
-        assert (miss / size).max() < 1e-8
-        some = slice(0, 400)
-        pinocchio = self.space.values(postures[some])
-        miss = np.abs(self.space.difference(pinocchio, targets[sample[some]])).max(
-            axis=1
-        )
-        assert (miss / size[some]).max() < 1e-8
-        return sample, branch, postures
-
-    def check_gradient(self) -> None:
-        """Compare the margins' derivatives by complex steps with central differences."""
-        q, h = self.q[:20], 1e-5
-        for branch in (0, len(self.solver.branches) - 1):
-            exact = self.solver.margin_gradient(q, branch)
-            for joint, step in enumerate(h * np.eye(self.robot.n)):
-                upper, lower = (
-                    self.solver.branch_margins(q + s, branch) for s in (step, -step)
-                )
-                np.testing.assert_allclose(
-                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7
-                )
-
-    def curve(self, seed: int, samples: int = 2001) -> np.ndarray:
-        """A smooth random motion of all joints, (samples, n)."""
-        rng, n, t = (
-            np.random.default_rng(seed),
-            self.robot.n,
-            np.linspace(0.0, 1.0, samples)[:, None],
-        )
-        sway = rng.uniform(0.5, 2.0, n) * np.sin(
-            2.0 * np.pi * t * rng.uniform(0.3, 1.0, n)
-        )
-        return rng.uniform(-2.0, 2.0, n) + sway

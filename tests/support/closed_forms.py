@@ -7,13 +7,31 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from brachis.ik import Family, TriedDecomposition, find
+from brachis.ik import Family, IKSolver, TriedDecomposition, find
 from brachis.robot import Robot, task_map_of
 
 
-def wrapped(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def wrap(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Differences, modulo 2 pi where `angles`."""
     return np.where(angles, np.remainder(delta + np.pi, 2.0 * np.pi) - np.pi, delta)
+
+
+def margins_of(solver: IKSolver, q: np.ndarray) -> np.ndarray:
+    """Margins (K, B, k) of all branches."""
+    branches = range(len(solver.branches))
+    return np.stack([solver.branch_margins(q, b) for b in branches], axis=1)
+
+
+def check_margin_gradient(solver: IKSolver, q: np.ndarray, atol: float) -> None:
+    """Compare the margins' derivatives by complex steps with central differences, in the first and last branch."""
+    h = 1e-5
+    for branch in {0, len(solver.branches) - 1}:
+        exact = solver.margin_gradient(q, branch)
+        for joint, step in enumerate(h * np.eye(q.shape[1])):
+            upper, lower = (solver.branch_margins(q + s, branch) for s in (step, -step))
+            np.testing.assert_allclose(
+                exact[:, :, joint], (upper - lower) / (2.0 * h), atol=atol
+            )
 
 
 class Bench:
@@ -56,7 +74,7 @@ class Bench:
 
     def miss(self, postures: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """Largest distance from the target of every posture, by Pinocchio's forward kinematics."""
-        return np.abs(wrapped(self.space.values(postures) - targets, self.angles)).max(
+        return np.abs(wrap(self.space.values(postures) - targets, self.angles)).max(
             axis=1
         )
 
@@ -91,9 +109,7 @@ class Bench:
         assert (self.miss(postures, self.targets[sample]) / size).max() < 1e-8
         assert np.all(finite.sum(axis=1)[regular] == distinct_roots)
 
-        margins = np.stack(
-            [solver.branch_margins(q, b) for b in range(len(solver.branches))], axis=1
-        )
+        margins = margins_of(solver, q)
         if margins.shape[2] == 0:  # the closed form is linear with a constant matrix
             assert np.ptp(determinant) < 1e-9 * scale
             own = np.zeros(len(q), dtype=int)
@@ -106,7 +122,7 @@ class Bench:
                 "margins are of the order of one"
             )
             own = np.argmax(margins[:, :, 0], axis=1)
-        back = wrapped(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
+        back = wrap(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
         slack = 1e-9 * scale / np.abs(determinant)
         assert np.all(np.abs(back).max(axis=1)[regular] < slack[regular]), (
             "the posture's own branch gives another posture"
@@ -114,17 +130,6 @@ class Bench:
         return candidate
 
     def check_margin_gradient(self, candidate: TriedDecomposition) -> None:
-        """Compare the margins' derivatives by complex steps with central differences."""
-        solver, q, h = candidate.solver, self.q[:40], 1e-6
-        assert solver is not None
-        for branch in range(len(solver.branches)):
-            exact = solver.margin_gradient(q, branch)
-            for joint in range(self.robot.n):
-                step = h * np.eye(self.robot.n)[joint]
-                upper, lower = (
-                    solver.branch_margins(q + step, branch),
-                    solver.branch_margins(q - step, branch),
-                )
-                np.testing.assert_allclose(
-                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7
-                )
+        """Compare the margins' derivatives with differences."""
+        assert candidate.solver is not None
+        check_margin_gradient(candidate.solver, self.q[:40], atol=1e-7)

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
-from scipy.optimize import brentq
 
 from brachis.ik import ChainGeometry
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import task_map_of
-
-
-def wrapped(delta, turning):
-    return np.where(turning, np.remainder(delta + np.pi, 2.0 * np.pi) - np.pi, delta)
+from support.closed_forms import check_margin_gradient, margins_of, wrap
 
 
 class Bench:
@@ -42,44 +36,56 @@ class Bench:
     def targets(self, q):
         return self.space.values(q)
 
-    def answers(self, q):
-        """Postures (K, B, n) that reach the targets of the given ones."""
+    def solve(self, q):
+        """Non-redundant joints (K, B A, m) that reach the targets of postures."""
         solved = self.solver.solve(self.targets(q), q[:, self.redundant])
-        assert solved.shape == (len(q), len(self.solver.branches), 1, self.space.m)
+        shape = (len(self.solver.branches), self.solver.alternatives, self.space.m)
+        assert solved.shape == (len(q), *shape)
+        return solved.reshape(len(q), -1, self.space.m)
+
+    def answers(self, q):
+        """Postures (K, B A, n) that reach the targets of the given ones."""
+        solved = self.solve(q)
         postures = np.repeat(q[:, None], solved.shape[1], axis=1)
-        postures[:, :, self.rest] = solved[:, :, 0]
+        postures[:, :, self.rest] = solved
         return postures
+
+    def distance(self, solved, q):
+        """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
+        joints = q[:, *[None] * (solved.ndim - 2), self.rest]
+        gap = np.abs(wrap(solved - joints, self.turning)).max(axis=-1)
+        return np.where(np.isnan(gap), np.inf, gap)
+
+    def check_answers(self, solved):
+        """Put the answers for the random postures to the test; return their samples, branches and postures."""
+        sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
+        count = self.space.m * len(sample)
+        assert np.isfinite(solved).sum() == count, "an answer is NaN in part"
+        postures = self.q[sample]
+        postures[:, self.rest] = solved[sample, branch]
+        # A slide that runs almost across the way it has to go goes far: positions are good to their own size.
+        ways = np.where(self.turning, 0.0, postures[:, self.rest])
+        size = 1.0 + np.abs(ways).max(axis=1)
+        targets = self.targets(self.q)[sample]
+        miss = np.abs(self.space.difference(self.targets(postures), targets)).max(
+            axis=1
+        )
+        assert (miss / size).max() < 1e-8
+        return sample, branch, postures
 
     def margins(self, q):
         """Margins (K, B, k) of all branches."""
-        return np.stack(
-            [
-                self.solver.branch_margins(q, b)
-                for b in range(len(self.solver.branches))
-            ],
-            axis=1,
-        )
+        return margins_of(self.solver, q)
 
     def determinant(self, q):
         return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
 
     def check(self, *, with_gradient=True):
         """Hold the closed form to its promises; slopes of margins are recorded anew for every one, which takes time."""
-        postures = self.answers(self.q)
-        finite = np.isfinite(postures).all(axis=2)
-        solved = postures[:, :, self.rest]
-        assert np.array_equal(finite, np.isfinite(solved).any(axis=2)), (
-            "an answer is NaN in part"
-        )
-        angles = solved[finite][:, self.turning]
+        solved = self.solve(self.q)
+        _, branch, postures = self.check_answers(solved)
+        angles = postures[:, self.rest][:, self.turning]
         assert np.all((angles > -np.pi) & (angles <= np.pi))
-        sample, branch = np.nonzero(finite)
-        size = 1.0 + np.abs(np.where(self.turning, 0.0, solved[finite])).max(axis=1)
-        wanted = self.targets(self.q)
-        miss = np.abs(
-            self.space.difference(self.targets(postures[finite]), wanted[sample])
-        ).max(axis=1)
-        assert (miss / size).max() < 1e-8
 
         margins = self.margins(self.q)
         assert margins.shape[2] <= 3
@@ -92,15 +98,11 @@ class Bench:
         own = np.argmax(inside, axis=1)
         assert set(own) == set(range(len(self.solver.branches)))
         product = np.abs(margins[:, 0]).prod(axis=1)
-        back = wrapped(
-            solved[np.arange(len(own)), own] - self.q[:, self.rest], self.turning
-        )
-        assert (np.abs(back).max(axis=1) * product)[product > 1e-6].max() < 1e-9
+        gap = self.distance(solved[np.arange(len(own)), own], self.q)
+        assert (gap * product)[product > 1e-6].max() < 1e-10
         for b in range(len(self.solver.branches)):
             assert (
-                self.solver.branch_margins(postures[sample[branch == b], b], b).min(
-                    initial=np.inf
-                )
+                self.solver.branch_margins(postures[branch == b], b).min(initial=np.inf)
                 > -1e-7
             )
 
@@ -112,16 +114,8 @@ class Bench:
         return self
 
     def check_gradient(self):
-        q, h = self.q[:20], 1e-5
-        for branch in (0, len(self.solver.branches) - 1):
-            exact = self.solver.margin_gradient(q, branch)
-            for joint, step in enumerate(h * np.eye(self.robot.n)):
-                upper, lower = (
-                    self.solver.branch_margins(q + s, branch) for s in (step, -step)
-                )
-                np.testing.assert_allclose(
-                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-8
-                )
+        """Compare the margins' derivatives with differences."""
+        check_margin_gradient(self.solver, self.q[:20], atol=1e-8)
 
     def check_labels_along_curves(self):
         """Labels follow their branch along smooth curves, and determinants change sign where margins do."""
@@ -145,7 +139,7 @@ class Bench:
                 steps = np.diff(postures[:, branch][:, self.rest], axis=0)
                 inside = (margin[1:] > 0.15) & (margin[:-1] > 0.15)
                 assert (
-                    np.abs(wrapped(steps, self.turning))[inside].max(initial=0.0) < 0.2
+                    np.abs(wrap(steps, self.turning))[inside].max(initial=0.0) < 0.2
                 ), "the branch jumps"
                 followed += np.count_nonzero(inside)
             crossings = np.diff(np.sign(self.margins(q)[:, 0]), axis=0) != 0.0
@@ -154,45 +148,3 @@ class Bench:
             changes += np.count_nonzero(turned)
         assert changes >= 2, "no curve crossed a boundary: the test shows nothing"
         assert followed > 4000
-
-    def other_answer(self, posture, kind):
-        """The answer in the branch that one margin's sign tells apart from the posture's own."""
-        margins = self.margins(posture[None])[0]
-        others = np.delete(margins, kind, axis=1)
-        branch = np.flatnonzero((margins[:, kind] < 0.0) & (others > 0.0).all(axis=1))
-        assert len(branch) == 1
-        return self.answers(posture[None])[0, branch[0]]
-
-    def check_boundaries(self, steps):
-        """Two answers meet where a margin vanishes; `steps` are the joints whose answers do, None for a linear step."""
-        assert self.margins(self.q[:1]).shape[2] == len(steps)
-        largest, met = np.abs(self.determinant(self.q)).max(), [0] * len(steps)
-        for (start, end), kind in itertools.product(
-            itertools.pairwise(self.q[:50] * 0.8), range(len(steps))
-        ):
-            if met[kind] >= 6:
-                continue
-
-            def margin(x, start=start, end=end, kind=kind):
-                return self.solver.branch_margins((start + x * (end - start))[None], 0)[
-                    0, kind
-                ]
-
-            if margin(0.0) * margin(1.0) > 0.0:
-                continue
-            at = brentq(margin, 0.0, 1.0, xtol=1e-15)
-            edge, beside = (
-                start + at * (end - start),
-                start + (at + 1e-5) * (end - start),
-            )
-            others = np.abs(np.delete(self.margins(edge[None])[0, 0], kind))
-            if others.min(initial=np.inf) < 0.1 or abs(margin(at + 1e-5)) < 1e-6:
-                continue
-            assert np.abs(self.determinant(edge[None])[0]) < 1e-12 * largest
-            other, step = self.other_answer(beside, kind), steps[kind]
-            if step is None:  # a slide would have to go to infinity
-                assert np.isnan(other[self.rest]).all()
-                met[kind] += 1
-            else:  # or the step's joint moves nothing: then its two answers differ
-                met[kind] += np.abs(wrapped(other - beside, turning=True))[step] < 1e-3
-        assert min(met) >= 3, "some boundary was not visited"

@@ -9,8 +9,9 @@ SIZES = ("tool_speed", "tool_acceleration", "tool_angular_speed")
 
 def dense(program, x) -> np.ndarray:
     matrix = np.zeros((len(program.lower), program.variables))
-    places = (program.jacobian_rows, program.jacobian_columns)
-    np.add.at(matrix, places, program.jacobian(x))
+    places = program.jacobian_rows * program.variables + program.jacobian_columns
+    assert len(np.unique(places)) == len(places), "the pattern has a place twice"
+    matrix.flat[places] = program.jacobian(x)
     return matrix
 
 
@@ -29,7 +30,7 @@ def differences_of(function, x, h) -> np.ndarray:
     return np.stack(columns, axis=-1)
 
 
-def told(phase, limit, x) -> np.ndarray:
+def comparable_rows(phase, limit, x) -> np.ndarray:
     """Rows whose differences tell: the direction of a tool that hardly moves turns within a step, and kinks bend."""
     state = phase.state(x)
     kind = limit.kind

@@ -16,6 +16,37 @@ from brachis.robot import Robot, task_map_of
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import load_task
 
+PLANAR: dict[str, Any] = {
+    "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
+    "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
+    "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
+    "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
+    "r = 1, 4R with yaw": (
+        "RRRR",
+        "xz",
+        ["x", "z", "pitch"],
+        [0.4, -0.6, 1.4, 0.8],
+        ["j1"],
+    ),
+    "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
+    "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
+}
+"""Planar arms: pattern, plane, rows of the task space, start posture and redundant joints."""
+
+
+def arc_path(
+    robot: Robot, rows: Sequence[str], start: Any, angle_deg: float = 25.0
+) -> list[dict[str, Any]]:
+    """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
+    tool = robot.tool_placement(np.array(start, dtype=float)).translation[
+        ["xyz".index(row) for row in rows[:2]]
+    ]
+    arc = {
+        "center": (tool + np.array([0.12, -0.1])).tolist(),
+        "angle_deg": angle_deg,
+    }
+    return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
+
 
 def joint_map(
     robot: Robot,

@@ -132,50 +132,6 @@ def iiwa_by_angles(quarter):
     )
 
 
-FAMILIES = (
-    "123",
-    "234",
-    "234+56",
-    "345",
-    "12+456",
-    "wrist",
-    "12+wrist",
-    "23+wrist",
-    "1x2+wrist",
-    "2x3+wrist",
-    "shoulder",
-)
-
-
-def family(kind):
-    """A random chain of six joints, of which those named are parallel; with ``x`` they meet, as in a shoulder or wrist.
-
-    EAIK asks that the remaining two at the other end meet where three at an end are parallel.
-    """
-    rng = np.random.default_rng(len(kind))
-    axes, points = rng.normal(size=(6, 3)), rng.uniform(-0.5, 0.5, (6, 3))
-    axes /= np.linalg.norm(axes, axis=1)[:, None]
-    parallel = {"123": (0, 3), "234": (1, 4), "345": (2, 5), "456": (3, 6)}
-    meeting = {"123": (4, 6), "234+56": (4, 6), "12+456": (0, 2), "shoulder": (0, 3)}
-    for name, (first, last) in parallel.items():
-        if name in kind:
-            axes[first:last] = axes[first]
-    for name, (first, last) in meeting.items():
-        if name == kind:
-            points[first:last] = points[first]
-    if "wrist" in kind:
-        points[3:] = points[3]
-        first = {"12": 0, "23": 1, "1x": 0, "2x": 1}.get(kind[:2])
-        if first is not None and "x" in kind:
-            points[first + 1] = points[first]
-        elif first is not None:
-            axes[first + 1] = axes[first]
-    tool = rng.uniform(-0.5, 0.5, 3)
-    return chain(
-        [(tuple(a.tolist()), p) for a, p in zip(axes, points, strict=True)], tool
-    )
-
-
 def panda():
     """The Panda's own URDF, where example-robot-data is installed."""
     share = (

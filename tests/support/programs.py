@@ -85,7 +85,7 @@ def disc(**more) -> Program:
     )
 
 
-def curved() -> Program:
+def nearest_in_disc() -> Program:
     """The point of the disc nearest to (6, 5): (4.2, 2.6), and its row's multiplier is -3/4.
 
     x - (6, 5) = 2 mu (x - (3, 1)) with x = (3, 1) + 2 (3, 4) / 5 gives mu = -3/4.
@@ -109,7 +109,7 @@ def corner() -> Program:
     )
 
 
-def bounded() -> Program:
+def under_hyperbola() -> Program:
     """Minimise x1 under x0 x1 >= 2 and 0 <= x0 <= 4: x = (4, 1/2), where the bound of x0 is active."""
     return Program(
         costs=np.array([0.0, 1.0]),

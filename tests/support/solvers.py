@@ -7,5 +7,3 @@ from importlib.util import find_spec
 from brachis.optimise.backends import TABLE
 
 INSTALLED = tuple(name for name in TABLE if name != "ipopt" or find_spec("ipyopt"))
-INTERIOR = "ipopt" if "ipopt" in INSTALLED else "uno_interior"
-"""The interior-point method that ``auto`` takes."""

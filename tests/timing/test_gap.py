@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 import brachis
@@ -48,23 +47,6 @@ def test_a_slow_plan_says_where_and_what_would_do():
     assert f"{result.timing_gap.least_time:.4g} s" in issue.message
     assert result.to_dict()["timing_gap"]["gap"] == result.timing_gap.gap
     assert "no timing of this joint path is more than" in str(result)
-
-
-def test_a_joint_path_without_redundancy_needs_only_its_timing():
-    rng = np.random.default_rng(1)
-    points = np.cumsum(rng.normal(0.0, 0.4, (6, 3)), axis=0)
-    result = brachis.plan(
-        brachis.examples.scara_line,
-        start=points[0].tolist(),
-        task_space="joints",
-        redundant_joints="auto",
-        path=[{"spline": {"through": points[1:].tolist()}}],
-        intervals="auto",
-        **QUICK,
-    )
-    assert result.verified
-    assert result.candidate.reports[0].solver == "phase plane"
-    assert 0.0 < result.timing_gap.gap < 3e-3
 
 
 def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch):

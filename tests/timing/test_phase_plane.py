@@ -10,12 +10,11 @@ import pytest
 import brachis
 from brachis.limits.joint import (
     AccelerationLimit,
-    JerkLimit,
     PowerLimit,
     TorqueLimit,
     VelocityLimit,
 )
-from brachis.timing import JointPath, PhasePlane, divide_turns, is_left_out
+from brachis.timing import JointPath, PhasePlane, divide_turns
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
 LENGTH = 0.4  # m
@@ -125,7 +124,7 @@ def test_power_by_its_formula():
     assert least_time(robot) == pytest.approx(2.0 * half, rel=1e-3)
 
 
-def curved(p):
+def curve_with_derivatives(p):
     """A joint path with its derivatives."""
     q = np.column_stack([np.sin(2.0 * p), 0.3 * p**2])
     q_dp = np.column_stack([2.0 * np.cos(2.0 * p), 0.6 * p])
@@ -135,7 +134,7 @@ def curved(p):
 
 def test_the_parameter_does_not_matter():
     robot = gantry(acceleration=[3.0, 2.0], velocity=[1.0, 0.4])
-    q, q_dp, q_ddp = curved(P)
+    q, q_dp, q_ddp = curve_with_derivatives(P)
     exact = JointPath(P, P, q, q_dp, q_ddp)
     by_length, places = exact.by_length()
     np.testing.assert_array_equal(places, P)
@@ -150,30 +149,12 @@ def test_a_path_in_time_is_regular_by_its_length_where_it_rests():
     t = np.linspace(0.0, 1.0, 1001)
     part = 3.0 * t**2 - 2.0 * t**3
     rate = 6.0 * t * (1.0 - t)
-    q, q_dp, q_ddp = curved(part)
+    q, q_dp, q_ddp = curve_with_derivatives(part)
     qddot = q_dp * (6.0 - 12.0 * t)[:, None] + q_ddp * rate[:, None] ** 2
     path, _ = JointPath(t, part, q, q_dp * rate[:, None], qddot).by_length()
     robot = gantry(acceleration=[3.0, 2.0])
-    exact = JointPath(P, P, *curved(P))
+    exact = JointPath(P, P, *curve_with_derivatives(P))
     assert least_time(robot, path) == pytest.approx(least_time(robot, exact), rel=1e-4)
-
-
-def test_steps_are_divided_where_the_path_turns():
-    p = np.linspace(0.0, 1.0, 11)
-    tangent = np.column_stack(
-        [np.where(p < 0.45, 1.0, 0.0), np.where(p < 0.45, 0.0, 1.0)]
-    )
-    found = divide_turns(p, tangent)
-    inside = (found > 0.4) & (found < 0.5)
-    assert inside.sum() > 20
-    assert len(found) == len(p) + inside.sum()
-
-
-def test_what_the_phase_plane_leaves_out():
-    robot = gantry(acceleration=3.0, jerk=10.0)
-    jerk = JerkLimit.build(robot, None)
-    assert is_left_out(jerk)
-    assert not is_left_out(AccelerationLimit.build(robot, None))
 
 
 def there_and_back(p, *, bend=0.0, aside=0.0):

@@ -37,7 +37,7 @@ def random_splines(degree: int) -> list[PhaseSpline]:
 
 
 @pytest.mark.parametrize("degree", [2, 3, 5])
-def test_splines_are_split_as_they_were_joined(degree, motion):
+def test_a_split_gives_back_the_splines_before_their_join(degree, motion):
     splines = random_splines(degree)
     knots, points = join_splines(splines)
     ends = np.cumsum([spline.t_end for spline in splines])
@@ -105,13 +105,6 @@ def test_at_the_end_of_a_phase_the_spline_is_the_next_ones(motion):
     np.testing.assert_allclose(jerk, [0.0, 60.0 * 0.15 - 24.0 * SPEED], atol=1e-9)
 
 
-def test_a_file_has_the_phases(motion, tmp_path):
-    motion.save(tmp_path / "result.npz")
-    again = Trajectory.load(tmp_path / "result.npz")
-    np.testing.assert_array_equal(again.phase_ends, motion.phase_ends)
-    assert again.phases == motion.phases
-
-
 WRONG = {
     "an end fewer": {"phase_ends": lambda ends: ends[1:]},
     "an end moved": {"phase_ends": lambda ends: ends + 1e-6 * (ends < 1.2)},
@@ -132,22 +125,8 @@ def test_a_file_with_other_phases_than_knots(case, motion, tmp_path):
         Trajectory.load(tmp_path / "result.npz")
 
 
-def test_one_phase_has_its_own_knots():
-    np.testing.assert_array_equal(join_splines(SPLINES[:1])[0], SPLINES[0].knots)
-
-
 def test_a_table_says_what_the_phases_are(motion):
     rows = phase_rows(motion.phases)
     assert rows[1] == ("2 dwell", "0.4", "0.5000 s (1.0000 to 1.5000 s)", "at rest")
     assert rows[3][1:] == ("0.55 to 0.85", "1.0000 s (2.5000 to 3.5000 s)", "0.3 m/s")
     assert {len(row) for row in rows} == {len(PHASE_COLUMNS)}
-
-
-def test_phases_as_plain_data(motion):
-    assert motion.phases[3].to_dict() == {
-        "kind": "given speed",
-        "begin": 2.5,
-        "end": 3.5,
-        "s": [0.55, 0.85],
-        "speed": SPEED,
-    }

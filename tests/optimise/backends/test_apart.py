@@ -81,7 +81,7 @@ def test_a_small_problem_is_solved_apart_if_it_asks_for_it(apart, monkeypatch):
     assert solved_by == ([] if apart else [os.getpid()])
 
 
-def test_a_small_problem_that_is_silent_for_long_is_ended(monkeypatch):
+def test_a_small_problem_that_is_silent_for_long_ends(monkeypatch):
     monkeypatch.setattr(child_process, "ENTRIES", 1000)
     monkeypatch.setattr(child_process, "_SILENCE", 0.1)
     monkeypatch.setattr(uno, "call_uno", lambda *_: time.sleep(1e6))
@@ -92,7 +92,7 @@ def test_a_small_problem_that_is_silent_for_long_is_ended(monkeypatch):
     assert not own_children()
 
 
-def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):
+def test_a_solver_that_does_not_come_back_ends_with_its_time(monkeypatch):
     monkeypatch.setattr(uno, "call_uno", lambda *_: time.sleep(1e6))
     report = solve(SolverOptions(time_limit=0.1))
     assert report.status is SolveStatus.TIME_LIMIT
@@ -121,7 +121,7 @@ def test_what_a_solve_had_found_before_it_was_ended_is_its_answer(monkeypatch):
     assert not own_children()
 
 
-def test_without_a_time_limit_it_is_not_ended():
+def test_without_a_time_limit_it_goes_on_to_its_end():
     assert solve(SolverOptions(time_limit=np.inf)).status is SolveStatus.OPTIMAL
 
 
@@ -144,7 +144,7 @@ def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
     assert process.exitcode == -signal.SIGALRM
 
 
-def test_a_solver_that_crashes_is_told(monkeypatch):
+def test_a_solver_that_crashes_is_a_failure(monkeypatch):
     monkeypatch.setattr(
         uno, "call_uno", lambda *_: os.kill(os.getpid(), signal.SIGKILL)
     )

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import UnknownNameError, UnreachableError
+from brachis.errors import UnknownNameError
 from brachis.optimise.backends import (
     NAMES,
     TABLE,
@@ -26,7 +26,7 @@ from brachis.optimise.backends import (
     uno,
 )
 from brachis.optimise.backends.monitor import SolveMonitor
-from support.programs import bounded, corner, curved, disc, impossible
+from support.programs import corner, disc, impossible, nearest_in_disc, under_hyperbola
 from support.solvers import INSTALLED
 
 ROOT = Path(__file__).parents[3]
@@ -49,8 +49,8 @@ def solve(name, problem, x, options=OPTIONS, progress=None):
         (disc, [4.0, 0.5], [1.0, 1.0], [-0.25]),
         (disc, [9.0, 9.0], [1.0, 1.0], [-0.25]),
         (corner, [0.0, 0.0], [3.0, 1.0], [1.0 / 3.0, 2.0 / 3.0]),
-        (bounded, [1.0, 3.0], [4.0, 0.5], [0.25]),
-        (curved, [3.0, 0.5], [4.2, 2.6], [-0.75]),
+        (under_hyperbola, [1.0, 3.0], [4.0, 0.5], [0.25]),
+        (nearest_in_disc, [3.0, 0.5], [4.2, 2.6], [-0.75]),
     ],
 )
 def test_known_optima(name, make, start, optimum, multipliers):
@@ -86,7 +86,7 @@ def test_large_bounds_are_held_as_exactly_as_others(name):
 
 # At (2, 1) the objective stands still while the row comes true.
 def test_optimal_means_that_first_order_conditions_hold(name):
-    report = solve(name, bounded(), [1.0, 1.0])
+    report = solve(name, under_hyperbola(), [1.0, 1.0])
     if report.status is SolveStatus.OPTIMAL:
         np.testing.assert_allclose(report.x, [4.0, 0.5], atol=1e-4)
     else:
@@ -100,7 +100,7 @@ def test_start_is_not_overwritten(name):
 
 
 @pytest.mark.parametrize("edge", [0.99, 0.9])
-def test_backs_off_from_points_that_cannot_be_evaluated(name, edge):
+def test_backs_off_from_points_without_values(name, edge):
     refusals = 0
     for start in ([4.9, 1.2], [1.5, 1.3], [2.0, 2.6], [1.2, 1.05], [1.2, 0.3]):
         problem = disc(reachable=lambda x: x[0] > edge)
@@ -109,12 +109,6 @@ def test_backs_off_from_points_that_cannot_be_evaluated(name, edge):
         np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-3)
         refusals += problem.refusals
     assert refusals, "no trial point was beyond the edge: the test shows nothing"
-
-
-def test_start_that_cannot_be_evaluated(name):
-    report = solve(name, disc(reachable=lambda _x: False), [4.0, 0.5])
-    assert not report.status.usable
-    assert report.violation == np.inf
 
 
 def test_infeasible_problem(name):
@@ -133,22 +127,15 @@ def test_iteration_limit(name):
 
 
 @pytest.mark.usefixtures("wall_clock")
-def test_time_limit(name):
-    problem = disc(pause=0.03)
-    report = solve(name, problem, [40.0, -30.0], SolverOptions(time_limit=0.1))
-    assert report.status is SolveStatus.TIME_LIMIT
-    assert report.wall_time >= 0.1
-    assert len(problem.evaluations) <= 8, "it went on after its time"
-    assert report.status.value == "time limit reached"
-
-
-@pytest.mark.usefixtures("wall_clock")
-@pytest.mark.parametrize("time_limit", [0.005, 0.015, 0.025, 0.035])
+@pytest.mark.parametrize("time_limit", [0.005, 0.015, 0.025, 0.035, 0.1])
 def test_the_time_may_end_in_any_of_the_first_evaluations(name, time_limit):
     """IPOPT ended the whole process if a Jacobian had no value at its first point."""
     problem = disc(pause=0.01)
     report = solve(name, problem, [40.0, -30.0], SolverOptions(time_limit=time_limit))
     assert report.status is SolveStatus.TIME_LIMIT
+    assert report.status.value == "time limit reached"
+    assert report.wall_time >= time_limit
+    assert len(problem.evaluations) <= 4 + time_limit / 0.01, "it went on"
 
 
 def test_without_time_no_solve_begins(name):
@@ -157,17 +144,18 @@ def test_without_time_no_solve_begins(name):
     assert (report.iterations, report.x.tolist()) == (0, [40.0, -30.0])
 
 
-def test_interrupt_from_the_progress_callback(name):
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, ZeroDivisionError])
+def test_what_a_listener_raises_comes_out_at_once(name, kind):
     calls = []
 
-    def progress(iteration, objective):
-        calls.append((iteration, objective))
+    def progress(iteration, _objective):
+        calls.append(iteration)
         if iteration == 2:
-            raise KeyboardInterrupt
+            raise kind
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(kind):
         solve(name, disc(), [40.0, -30.0], progress=progress)
-    assert [iteration for iteration, _ in calls] == [1, 2]
+    assert calls == [1, 2]
 
 
 @pytest.mark.parametrize("evaluation", [1, 4])
@@ -181,7 +169,7 @@ def test_interrupt_during_an_evaluation(name, evaluation):
 
 
 @pytest.mark.parametrize("function", ["rows", "jacobian"])
-def test_what_is_raised_within_a_backend_comes_out(name, function, monkeypatch):
+def test_what_a_problem_raises_comes_out(name, function, monkeypatch):
     problem = disc()
     whole = getattr(problem, function)
     calls = []
@@ -197,17 +185,9 @@ def test_what_is_raised_within_a_backend_comes_out(name, function, monkeypatch):
         solve(name, problem, [40.0, -30.0])
 
 
-def test_what_a_listener_raises_comes_out(name):
-    def progress(_iteration, _objective):
-        raise ZeroDivisionError("a listener of the user's own")
-
-    with pytest.raises(ZeroDivisionError, match="own"):
-        solve(name, disc(), [40.0, -30.0], progress=progress)
-
-
 # The objective is not the first variable here, as it is in a program of one phase.
 def test_progress_tells_iteration_and_objective(name):
-    problem, calls = bounded(), []
+    problem, calls = under_hyperbola(), []
     report = solve(name, problem, [1.0, 3.0], progress=lambda *call: calls.append(call))
     assert [iteration for iteration, _ in calls] == list(
         range(1, report.iterations + 1)
@@ -216,7 +196,7 @@ def test_progress_tells_iteration_and_objective(name):
 
 
 @pytest.mark.parametrize("make", [disc, impossible])
-def test_nothing_is_printed(name, make, capfd):
+def test_solvers_print_nothing(name, make, capfd):
     solve(name, make(), [4.0, 0.5])
     captured = capfd.readouterr()
     assert (captured.out, captured.err) == ("", "")
@@ -243,50 +223,27 @@ def test_registry(is_installed, interior, monkeypatch):
     assert caught.value.valid == NAMES
 
 
+# Python's max passes over NaN.
 @pytest.mark.parametrize(
-    ("x", "expected"),
+    ("problem", "x", "expected"),
     [
-        ([3.0, 1.0], 0.0),
-        ([1.0, 1.0], 0.0),
-        ([0.0, 1.0], 5.0),
-        ([60.0, 1.0], 57.0**2 - 4.0),
-        ([-51.0, 1.0], 54.0**2 - 4.0),
+        (disc(), [3.0, 1.0], 0.0),
+        (disc(), [1.0, 1.0], 0.0),
+        (disc(), [0.0, 1.0], 5.0),
+        (disc(), [60.0, 1.0], 57.0**2 - 4.0),
+        (disc(), [-51.0, 1.0], 54.0**2 - 4.0),
+        (disc(), [np.nan, 1.0], np.inf),
+        (disc(reachable=lambda _x: False), [3.0, 1.0], np.inf),
+        (under_hyperbola(), [5.5, 1.0], 1.5),
+        (under_hyperbola(), [-2.0, -1.0], 2.0),
     ],
 )
-def test_residual_is_the_worst_of_rows_and_bounds(x, expected):
-    assert residual(disc(), np.array(x)) == pytest.approx(expected)
-
-
-def test_residual_sees_bounds_of_variables():
-    problem = bounded()
-    assert residual(problem, np.array([5.5, 1.0])) == pytest.approx(1.5)
-    assert residual(problem, np.array([-2.0, -1.0])) == pytest.approx(2.0)
-
-
-# Python's max passes over NaN.
-def test_residual_of_what_is_not_a_number():
-    assert residual(disc(), np.array([np.nan, 1.0])) == np.inf
-
-
-def test_residual_where_rows_cannot_be_evaluated():
-    assert residual(disc(reachable=lambda _x: False), np.array([3.0, 1.0])) == np.inf
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
-def test_backends_get_finite_numbers_only(bad):
-    for wrong in (
-        {"row_values": lambda _x: np.array([bad])},
-        {"row_slopes": lambda _x: np.array([[1.0, bad]])},
-    ):
-        watch = SolveMonitor(dataclasses.replace(disc(), **wrong), OPTIONS, None)
-        with pytest.raises(UnreachableError, match="not a finite number"):
-            _ = watch.rows(np.zeros(2)), watch.jacobian(np.zeros(2))
-    with pytest.raises(UnreachableError, match="not finite"):
-        SolveMonitor(disc(), OPTIONS, None).rows(np.array([bad, 0.0]))
+def test_residual_is_the_worst_of_rows_and_bounds(problem, x, expected):
+    assert residual(problem, np.array(x)) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_trial_points_whose_rows_are_not_finite_are_left(name, bad):
+def test_backs_off_from_points_whose_rows_are_not_finite(name, bad):
     seen = []
 
     def rows(x):
@@ -300,30 +257,35 @@ def test_trial_points_whose_rows_are_not_finite_are_left(name, bad):
     assert any(seen), "no trial point was bad: the test shows nothing"
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
-def test_a_start_that_is_not_finite_is_not_given_to_a_backend(name, bad):
-    report = solve(name, disc(), [bad, 0.5])
+def rows_of(bad):
+    return {"row_values": lambda _x: np.array([bad])}
+
+
+@pytest.mark.parametrize(
+    ("changes", "x"),
+    [
+        ({}, np.nan),
+        ({}, np.inf),
+        ({}, 1e300),
+        (rows_of(np.nan), 4.0),
+        (rows_of(np.inf), 4.0),
+        ({"upper": np.array([np.nan])}, 4.0),
+        ({"reachable": lambda _x: False}, 4.0),
+    ],
+)
+def test_a_start_without_values_is_an_answer_without_iterations(name, changes, x):
+    report = solve(name, dataclasses.replace(disc(), **changes), [x, 0.5])
     assert report.status is SolveStatus.EVALUATION_ERROR
-    assert report.iterations == 0
+    assert not report.status.usable
+    assert not report.violation <= 1e-5
     assert report.solver == name
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_rows_that_are_not_finite_at_the_start(name, bad):
-    report = solve(
-        name,
-        dataclasses.replace(disc(), row_values=lambda _x: np.array([bad])),
-        [4.0, 0.5],
-    )
-    assert report.status is SolveStatus.EVALUATION_ERROR
-    assert report.violation == np.inf
-
-
-def test_bounds_that_are_not_numbers(name):
-    report = solve(
-        name, dataclasses.replace(disc(), upper=np.array([np.nan])), [4.0, 0.5]
-    )
-    assert report.status is SolveStatus.EVALUATION_ERROR
+def test_slopes_that_are_not_finite_give_no_usable_answer(name, bad):
+    slopes = np.array([[1.0, bad]])
+    problem = dataclasses.replace(disc(), row_slopes=lambda _x: slopes)
+    assert not solve(name, problem, [4.0, 0.5]).status.usable
 
 
 PLAN = """

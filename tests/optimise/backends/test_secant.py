@@ -60,7 +60,7 @@ def test_the_optimum_on_an_ellipsoid_is_found_in_few_iterations(known):
     assert report.iterations < 0.5 * solve(None).iterations
 
 
-def test_steps_teach_what_is_not_known():
+def test_steps_teach_the_missing_curvature():
     problem = ellipsoid(0.7)
     known = problem.curvature(None)
     hessian = SecantHessian(problem, known)
@@ -97,7 +97,7 @@ def test_without_multipliers_the_last_ones_count():
     np.testing.assert_allclose(again, 6.0 * SQUARES, rtol=1e-9)
 
 
-def test_in_a_restoration_the_objective_stays_curved():
+def test_in_a_restoration_the_objective_keeps_some_curvature():
     problem = ellipsoid(1.0)
     known = Curvature(lambda _x, factor, _rows: factor * SQUARES, np.zeros(1))
     hessian = SecantHessian(problem, known)
