@@ -445,7 +445,7 @@ class Alike:
         (Given(), "own_limits: this is not a list"),
         ([Alike()], r"the class Alike; allowed: .* inherits brachis\.limits\.Limit"),
     ],
-    ids=str,
+    ids=["a class", "a number", "a text", "no list", "no heir"],
 )
 def test_what_is_no_list_of_limits_is_an_error(line_result, own_limits, said):
     with pytest.raises(InputError, match=said):
