@@ -1,17 +1,29 @@
-"""brachis: ``search.effort: single`` for the chosen joint; the answer counts when it is verified."""
+"""brachis: one guess for the chosen joint, or a search over all joints; an answer counts when it is verified."""
 
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import brachis
 from peers.lines import Answer, Line
 
 
 def solve(line: Line) -> Answer:
-    """Plan without the least motion, as the others do."""
+    """Plan from one guess, without the least motion, as the others do."""
+    return _plan(line, effort="single")
+
+
+def search(line: Line) -> Answer:
+    """Plan with all joints and the usual effort, in one process."""
+    return _plan(line, effort="fast", redundant_joints="auto")
+
+
+def _plan(line: Line, effort: str, **keys: Any) -> Answer:
+    """Plan with some keys of the task changed."""
     began = time.process_time()
-    result = brachis.plan(line.task, search={"effort": "single", "least_motion": False})
+    settings = {"effort": effort, "jobs": 1, "least_motion": False}
+    result = brachis.plan(line.task, search=settings, **keys)
     ended = time.process_time()
     trajectory = result.trajectory
     return Answer(

@@ -23,6 +23,7 @@ from peers.lines import LINES, Answer, Line, check
 
 SOLVERS = {
     "brachis": by_brachis.solve,
+    "brachis, search over all joints": by_brachis.search,
     "CasADi and IPOPT": by_casadi.solve,
     "Drake": by_drake.solve,
     "toppra after pseudo-inverse": by_toppra.solve,
