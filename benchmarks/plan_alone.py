@@ -1,7 +1,7 @@
 """Plan one task file in this process, and print what it took as JSON: ``python benchmarks/plan_alone.py TASK``.
 
 `work.py` starts it for every plan, so that memory and processor time are those of one plan, with the processes that it
-starts. A plan before it loads what is loaded on first use.
+starts. A plan before it, and some imports, load what is loaded on first use.
 """
 
 from __future__ import annotations
@@ -10,6 +10,12 @@ import json
 import sys
 import warnings
 from pathlib import Path
+
+import scipy.interpolate
+import scipy.linalg
+import scipy.optimize
+import scipy.sparse.linalg
+import scipy.spatial  # noqa: F401  (the same is loaded whatever a plan needs of it)
 
 import brachis
 from brachis.errors import BrachisWarning
