@@ -390,6 +390,14 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     assert left in result.not_completed
 
 
+def test_time_is_kept_for_a_first_motion_while_nothing_is_verified(robot, clock):
+    clock.jump(portfolio.Search, "_rank", at=1, by=56.0)  # of 60 s
+    result = brachis.plan(robot, task())
+    assert result.interrupted
+    assert result.verified
+    assert any("first motion alone" in text for text in result.not_completed)
+
+
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, clock):
     calls = clock.jump(PostureLattice, "_next", at=5)
     message = r"within the time limit of 60 s: the lattice of all postures was not searched completely; .*\. Raise"

@@ -15,8 +15,8 @@ from brachis.errors import BrachisError, UrdfError
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 from brachis.search.given_motion import lock_idle, widen_plan, without_tolerances
-from brachis.search.portfolio import Search, SearchOutcome
-from brachis.search.stages import FinishedCandidate
+from brachis.search.portfolio import Search
+from brachis.search.stages import FinishedCandidate, SearchOutcome
 from brachis.task import Task, Tolerances
 from brachis.trajectory import Trajectory
 

@@ -5,7 +5,8 @@
 3. In the order of these times candidates are solved over time, refined and verified, as long as they may beat the best
    verified one. Refinement slows all motions by about as much. So a motion that does not beat the best one before its
    refinement is not refined.
-4. Where there is little time, a motion near a joint path is found before all else (see `first_motion`).
+4. A motion near a joint path is found before all else where there is little time, and at the end of the time where
+   nothing is verified by then (see `first_motion`).
 5. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
@@ -17,7 +18,7 @@ import contextlib
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -47,6 +48,7 @@ from brachis.search.stages import (
     InitialGuess,
     Marks,
     RankedCandidate,
+    SearchOutcome,
     begin_candidate,
     fail,
     round_end_time,
@@ -58,30 +60,12 @@ _LEAST_COST = 0.5
 of the smallest cost so far. With 10 intervals they cost joint paths of a planar arm 17 to 20 % of the time."""
 _RANKING_SHARE = 0.6
 """Part of the time left after which no joint path is improved while nothing is verified."""
+_RESERVE = 0.1
+"""Part of the time that is kept for a first motion while nothing is verified; no more than `LITTLE_TIME`."""
 _LATER = 0.2
-"""Seconds after its end that the search goes on while nothing is verified."""
+"""Seconds after its end that the search goes on if there was no first motion."""
 _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
-
-
-@dataclass(frozen=True)
-class SearchOutcome:
-    """What came of a search that found a motion; see `Search`.
-
-    Attributes
-    ----------
-    best : FinishedCandidate
-    candidates : tuple of Candidate
-        All that was looked at, the fastest verified one first.
-    interrupted : bool
-    not_completed : tuple of str
-        In plain words.
-    """
-
-    best: FinishedCandidate
-    candidates: tuple[Candidate, ...]
-    interrupted: bool
-    not_completed: tuple[str, ...]
 
 
 class Search:
@@ -130,6 +114,7 @@ class Search:
         self._waiting: list[int] = []
         self._finished: list[RankedCandidate] = []
         self._first_motion: FinishedCandidate | None = None
+        self._reserve = min(_RESERVE * deadline.left, LITTLE_TIME)
         self._least_ratio = 0.0
         self._to_beat = Marks()
 
@@ -178,13 +163,22 @@ class Search:
         """
         guess_batches = self._find_guesses(motion, exact)
         for batch in itertools.islice(guess_batches, max_batches):
-            if not self._has_motion and self._deadline.left < LITTLE_TIME:
-                self._first_motion = find_first_motion_of(
-                    batch.guesses, self._deadline, self._listener
-                )
+            if self._deadline.left < LITTLE_TIME:
+                self._find_first_motion(batch.guesses)
             self._rank(batch)
             self._refine_and_verify(batch)
-        self.interrupted |= self._deadline.passed  # the last solves may be cut short
+        self.interrupted |= self._latest.passed  # the last solves may be cut short
+        if self.interrupted and self._reserve > 0.0:
+            self._find_first_motion(self.guesses)
+
+    def _find_first_motion(self, guesses: Sequence[InitialGuess]) -> None:
+        """Find a motion near the joint path of a guess, unless one is known."""
+        if self._has_motion:
+            return
+        self._first_motion = find_first_motion_of(
+            guesses, self._deadline, self._listener
+        )
+        self._reserve = -_LATER
 
     def _find_guesses(
         self, motion: Trajectory | None, exact: FinishedCandidate | None
@@ -207,7 +201,7 @@ class Search:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:
                 return
-            if self._deadline.passed:
+            if self._latest.passed:
                 self.interrupted = True
                 if not batch.fallback:
                     self._add_guesses(batch)
@@ -385,8 +379,10 @@ class Search:
 
     @property
     def _latest(self) -> Deadline:
-        """When the last work ends: a little later while nothing is verified."""
-        return self._deadline if self._has_motion else self._deadline.extend(_LATER)
+        """When the last work ends: earlier while nothing is verified, and later if there is no first motion."""
+        if self._has_motion:
+            return self._deadline
+        return self._deadline.extend(-self._reserve)
 
     @property
     def _has_motion(self) -> bool:

@@ -375,3 +375,23 @@ class FinishedCandidate(Candidate):
     def without_program(self) -> FinishedCandidate:
         """Return the candidate as it is: its program is the answer."""
         return self
+
+
+@dataclass(frozen=True)
+class SearchOutcome:
+    """What came of a search that found a motion; see `brachis.search.portfolio.Search`.
+
+    Attributes
+    ----------
+    best : FinishedCandidate
+    candidates : tuple of Candidate
+        All that was looked at, the fastest verified one first.
+    interrupted : bool
+    not_completed : tuple of str
+        In plain words.
+    """
+
+    best: FinishedCandidate
+    candidates: tuple[Candidate, ...]
+    interrupted: bool
+    not_completed: tuple[str, ...]
