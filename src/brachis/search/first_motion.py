@@ -49,8 +49,6 @@ from brachis.search.verified import refine_and_verify
 
 LITTLE_TIME = 5.0
 """Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
-_FIRST_SHARE = 0.6
-"""Part of the time left in which it is looked for."""
 _NOT_COMPLETED = (
     "there was time for a first motion alone, which may be far from the fastest"
 )
@@ -82,11 +80,10 @@ def find_first_motion_of(
     guesses: Sequence[InitialGuess], deadline: Deadline, listener: Listener
 ) -> FinishedCandidate | None:
     """Find a verified motion near the joint path of one of the guesses; None where that takes too long."""
-    until = deadline.part(_FIRST_SHARE)
     for guess in sorted(guesses, key=lambda guess: guess.estimate):
-        if until.passed:
+        if deadline.passed:
             break
-        outcome = find_first_motion(guess, until)
+        outcome = find_first_motion(guess, deadline)
         listener(outcome.describe())
         if isinstance(outcome, FinishedCandidate) and outcome.is_settled:
             return outcome
@@ -147,6 +144,8 @@ def _improve(
         solver for solver in solvers_for(task.solver.name) if solver.is_interior
     ]
     for backend in backends[:1]:
+        if options.deadline.passed:
+            break
         program = first.refined.program
         session = SolverSession.for_task(
             backend,

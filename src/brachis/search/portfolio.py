@@ -60,8 +60,12 @@ _LEAST_COST = 0.5
 of the smallest cost so far. With 10 intervals they cost joint paths of a planar arm 17 to 20 % of the time."""
 _RANKING_SHARE = 0.6
 """Part of the time left after which no joint path is improved while nothing is verified."""
-_RESERVE = 0.1
-"""Part of the time that is kept for a first motion while nothing is verified; no more than `LITTLE_TIME`."""
+_RESERVE = 0.3
+"""Part of the time that is kept for a first motion while nothing is verified,"""
+_LONGEST_RESERVE = 10.0
+"""but no more, s: for a weld one takes 3 s, and three times as long on a busy machine."""
+_FIRST_SHARE = 0.6
+"""Part of the time left in which a first motion is looked for before all else."""
 _LATER = 0.2
 """Seconds after its end that the search goes on if there was no first motion."""
 _REFINED = 5e-3
@@ -114,7 +118,7 @@ class Search:
         self._waiting: list[int] = []
         self._finished: list[RankedCandidate] = []
         self._first_motion: FinishedCandidate | None = None
-        self._reserve = min(_RESERVE * deadline.left, LITTLE_TIME)
+        self._reserve = min(_RESERVE * deadline.left, _LONGEST_RESERVE)
         self._least_ratio = 0.0
         self._to_beat = Marks()
 
@@ -163,22 +167,22 @@ class Search:
         """
         guess_batches = self._find_guesses(motion, exact)
         for batch in itertools.islice(guess_batches, max_batches):
-            if self._deadline.left < LITTLE_TIME:
-                self._find_first_motion(batch.guesses)
+            if self._deadline.left < LITTLE_TIME and not self._ranked:
+                soon = self._deadline.part(_FIRST_SHARE)
+                self._find_first_motion(batch.guesses, soon)
             self._rank(batch)
             self._refine_and_verify(batch)
         self.interrupted |= self._latest.passed  # the last solves may be cut short
         if self.interrupted and self._reserve > 0.0:
-            self._find_first_motion(self.guesses)
+            self._find_first_motion(self.guesses, self._deadline)
 
-    def _find_first_motion(self, guesses: Sequence[InitialGuess]) -> None:
+    def _find_first_motion(
+        self, guesses: Sequence[InitialGuess], deadline: Deadline
+    ) -> None:
         """Find a motion near the joint path of a guess, unless one is known."""
-        if self._has_motion:
-            return
-        self._first_motion = find_first_motion_of(
-            guesses, self._deadline, self._listener
-        )
-        self._reserve = -_LATER
+        if not self._has_motion:
+            self._reserve = -_LATER
+            self._first_motion = find_first_motion_of(guesses, deadline, self._listener)
 
     def _find_guesses(
         self, motion: Trajectory | None, exact: FinishedCandidate | None
@@ -195,7 +199,7 @@ class Search:
             return
         is_first_fallback = True
         for batch in batches(
-            self._problem, self._decompositions, self._deadline, self._listener
+            self._problem, self._decompositions, self._latest, self._listener
         ):
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
