@@ -14,7 +14,7 @@ from brachis.path import build_path
 from brachis.problem.feasibility import branch_of
 from brachis.robot import Robot, task_map_of
 from brachis.robot.limits import MAGNITUDES
-from brachis.task import load_task
+from brachis.task import ToolLimits, load_task
 
 PLANAR: dict[str, Any] = {
     "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
@@ -180,6 +180,12 @@ def with_limits(trajectory, **limits):
     magnitudes = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
     changed = replace(robot.limits.with_magnitudes(**magnitudes), **limits)
     return replace(trajectory, robot=replace(robot, limits=changed))
+
+
+def with_tool_speed(trajectory, speed):
+    """The motion of a task with this limit on the tool's speed."""
+    limits = {"tool_limits": ToolLimits(speed=speed)}
+    return replace(trajectory, task=trajectory.task.model_copy(update=limits))
 
 
 def motion_between(motion, robot, q, **parts):

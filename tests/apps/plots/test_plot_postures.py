@@ -37,7 +37,7 @@ def test_the_tool_path_is_the_prescribed_line(line_trajectory):
     assert len(y) > 100
 
 
-def test_scales_are_equal_and_axes_have_labels(line_trajectory):
+def test_scales_are_equal(line_trajectory):
     figure = plot_postures(line_trajectory)
     figure.draw_without_rendering()
     ax = figure.axes[0]
@@ -46,14 +46,12 @@ def test_scales_are_equal_and_axes_have_labels(line_trajectory):
         box.height / np.ptp(ax.get_ylim()),
         rel=0.006,  # Matplotlib leaves half a per cent as it is
     )
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ (m)", "$y$ (m)")
 
 
 def test_a_spatial_chain_is_drawn_in_space_with_equal_scales(spatial_trajectory):
     figure = plot_postures(spatial_trajectory)
     ax = figure.axes[0]
     assert ax.name == "3d"
-    assert ax.get_zlabel() == "$z$ (m)"
     end = np.column_stack(drawn(figure, f"posture {POSTURES - 1}").get_data_3d())
     tool = spatial_trajectory.robot.tool_placement(spatial_trajectory.q[-1]).translation
     assert_allclose(end[-1], tool, atol=1e-12)
@@ -73,13 +71,11 @@ KINDS = {"turn": "revolute", "slide": "prismatic"}
     [
         ("turn z, turn z", (0, 1), (0, 1)),
         ("turn z, turn z", (1, 0), (0, 1)),
-        ("turn z, turn z", (0,), (0, 1)),
         ("turn y, slide x", (0, 2), (0, 2)),
         ("turn y, slide y", (0, 2), None),
         ("turn z, turn y", (0, 1), None),
         ("turn z, turn z", (0, 2), None),
         ("slide x, slide z", (0,), (0, 2)),
-        ("slide x, slide y, slide z", (0, 1), None),
         ("slide x, slide y", (0, 1, 2), (0, 1)),
     ],
 )
@@ -92,9 +88,3 @@ def test_drawing_plane(chain, joints, axes, plane):
         }
     )
     assert drawing_plane(robot, axes) == plane
-
-
-def test_later_postures_are_darker(line_trajectory):
-    figure = plot_postures(line_trajectory)
-    postures = [drawn(figure, f"posture {k}") for k in range(POSTURES)]
-    assert all(np.diff([sum(line.get_color()) for line in postures]) < -0.01)

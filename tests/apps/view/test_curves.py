@@ -1,13 +1,10 @@
-import dataclasses
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from brachis.apps.view.panel import shown_panels
 from brachis.robot import Robot
-from brachis.task import ToolLimits
-from support.motions import with_limits
+from support.motions import with_limits, with_tool_speed
 from support.shown import ROBOTS
 
 
@@ -71,11 +68,9 @@ def test_the_tools_speed_is_in_metres_per_second_beside_what_the_task_allows(
     free = curves_of(motion)["tool speed (m/s)"]
     assert_allclose(free.values[:, 0], motion.at(free.t).tool_speed)
     assert levels(free) == []
-    task = motion.task.model_copy(
-        update={"tool_limits": ToolLimits(speed=1.1 * free.values.max())}
-    )
-    capped = curves_of(dataclasses.replace(motion, task=task))["tool speed (m/s)"]
-    assert levels(capped) == [pytest.approx(1.1 * free.values.max())]
+    limit = 1.1 * free.values.max()
+    capped = curves_of(with_tool_speed(motion, limit))["tool speed (m/s)"]
+    assert levels(capped) == [pytest.approx(limit)]
     assert levels(capped)[0] < capped.view()[1]
 
 
