@@ -32,12 +32,10 @@ def with_limit(limits=None, **changes):
     [
         (FROM_URDF, [80.0, 70.0, 60.0]),
         (12.5, [12.5, 12.5, 12.5]),
-        ([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]),
         ((1.0, None, FROM_URDF), [1.0, INF, 60.0]),
         (np.array([1.0, 2.0, 3.0]), [1.0, 2.0, 3.0]),
         (np.float32(12.5), [12.5, 12.5, 12.5]),
         ({"j2": np.int64(5)}, [80.0, 5.0, 60.0]),
-        ({"j2": 5.0}, [80.0, 5.0, 60.0]),
         ({"j3": None, "j1": 7}, [7.0, 70.0, INF]),
         (None, [INF, INF, INF]),
     ],
@@ -55,7 +53,6 @@ def test_forms_of_a_limit(value, expected):
         ({"j1": [-1.0, 1.0], "j3": None}, [-1.0, -3.0, -INF], [1.0, 2.9, INF]),
         ([[-1.0, 1.0], None, FROM_URDF], [-1.0, -INF, -3.0], [1.0, INF, 2.9]),
         (np.array([[-1.0, 1.0]] * 3), [-1.0] * 3, [1.0] * 3),
-        ({"j2": np.array([-1.0, 1.0])}, [-3.0, -1.0, -3.0], [2.9, 1.0, 2.9]),
     ],
     ids=str,
 )
@@ -173,15 +170,15 @@ def test_wrong_length(kind):
     value = [[-1.0, 1.0]] * 2 if kind == "position" else [1.0, 2.0]
     with pytest.raises(InputError) as caught:
         limits_of(**{kind: value})
-    assert (
-        f"robot.limits.{kind}: the list has the wrong number of values; found 2; allowed: 3"
-        in str(caught.value)
-    )
+    message = f"robot.limits.{kind}: the list has the wrong number of values"
+    assert str(caught.value).startswith(f"{message}; found 2; allowed: 3")
 
 
-def test_empty_range():
+def test_an_empty_range_of_the_urdf_or_the_task_is_an_error():
     with pytest.raises(LimitError, match="position range is empty"):
         with_limit(lower=1.0, upper=0.5)
+    with pytest.raises(LimitError, match="position range is empty"):
+        limits_of(position={"j1": [0.5, 0.5 + 1e-12]})
 
 
 def test_coulomb_friction_that_no_torque_overcomes_is_an_error():
@@ -189,9 +186,8 @@ def test_coulomb_friction_that_no_torque_overcomes_is_an_error():
     with pytest.raises(InputError, match="Coulomb friction of joint 'j2' is not below"):
         planar_robot("RR", friction=friction)
     strong = LimitSpec(torque={"j2": 100.0})
-    assert (
-        planar_robot("RR", friction=friction, limits=strong).friction.coulomb[1] == 90.0
-    )
+    robot = planar_robot("RR", friction=friction, limits=strong)
+    assert robot.friction.coulomb[1] == 90.0
 
 
 @pytest.mark.parametrize("value", [1e-308, 1e-7, 1e13, 1e300])
@@ -240,17 +236,11 @@ def test_ranges_that_a_task_cannot_state_are_errors(pair):
         limits_of(position={"j1": pair})
 
 
-def test_a_range_of_no_width_is_empty():
-    with pytest.raises(LimitError, match="position range is empty"):
-        limits_of(position={"j1": [0.5, 0.5 + 1e-12]})
-
-
 @pytest.mark.parametrize(
     ("friction", "where"),
     [
         ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
         ({"armature": 1e300}, "robot.friction.armature.j1"),
-        ({"viscous": float("inf")}, "robot: friction.viscous"),
     ],
 )
 def test_friction_that_no_drive_has_is_an_error(friction, where):
@@ -273,11 +263,6 @@ def test_positions_and_gravity_that_no_robot_has_are_errors():
     [
         ({"j2": [-5.0, 7.0]}, [-80.0, -5.0, -60.0], [80.0, 7.0, 60.0]),
         ([[-5.0, 7.0], 9.0, None], [-5.0, -9.0, -INF], [7.0, 9.0, INF]),
-        (
-            np.array([[-1.0, 2.0], [-3.0, 4.0], [-5.0, 6.0]]),
-            [-1.0, -3.0, -5.0],
-            [2.0, 4.0, 6.0],
-        ),
     ],
     ids=str,
 )

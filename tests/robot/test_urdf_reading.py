@@ -1,6 +1,7 @@
 """URDF to chain: what is read, what is locked, and what is refused in which words."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -51,12 +52,9 @@ def test_forward_kinematics_are_those_of_the_file():
     assert (model.nq, model.nv) == (4, 3)
     data, frame = model.createData(), model.getFrameId("tool")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3)):
-        pin.framesForwardKinematics(
-            model, data, np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
-        )
-        assert_allclose(
-            robot.tool_placement(q).homogeneous, data.oMf[frame].homogeneous, atol=1e-14
-        )
+        full = np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
+        pin.framesForwardKinematics(model, data, full)
+        assert robot.tool_placement(q).isApprox(data.oMf[frame], 1e-14)
 
 
 def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
@@ -97,11 +95,11 @@ def test_branching_urdf_needs_a_tool_frame():
 
 
 def test_a_loop_of_links_beside_the_tree_is_an_error():
-    loop = "<link name='a'/><link name='b'/>" + "".join(
-        f"<joint name='{parent}{child}' type='fixed'><parent link='{parent}'/><child link='{child}'/></joint>"
-        for parent, child in ("ab", "ba")
+    loop = (
+        "<link name='a'/><joint name='aa' type='fixed'><parent link='a'/>"
+        "<child link='a'/></joint>"
     )
-    with pytest.raises(UrdfError, match="a loop of links: a, b"):
+    with pytest.raises(UrdfError, match=r"not form one tree.*a loop of links: a"):
         load([TURN], more=loop)
 
 
@@ -121,19 +119,6 @@ def test_the_last_link_before_the_chains_part():
     )
 
 
-def test_a_locked_joint_is_followed_by_its_mimic():
-    robot = load(
-        [TURN], more=GRIPPER, tool_frame="tool", locked_joints={"finger": 0.03}
-    )
-    same = load(
-        [TURN],
-        more=GRIPPER,
-        tool_frame="tool",
-        locked_joints={"finger": 0.03, "follower": 0.03},
-    )
-    assert list(robot.model.inertias) == list(same.model.inertias)
-
-
 @pytest.mark.parametrize("order", ["abc", "cba"])
 def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
     mimics = {
@@ -148,15 +133,13 @@ def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
         f"{mimics[name]}</joint>"
         for name in order
     )
-    options = {"more": more, "tool_frame": "tool"}
-    followed = load([TURN], locked_joints={"c": 0.3}, **options)
-    free = more
-    for mimic in mimics.values():
-        free = free.replace(mimic, "") if mimic else free
+    follower = load([TURN], more=more, tool_frame="tool", locked_joints={"c": 0.3})
+    free = re.sub("<mimic .*?/>", "", more)
     locked = {"a": -0.5, "b": 0.25, "c": 0.3}
-    given = load([TURN], more=free, tool_frame="tool", locked_joints=locked)
-    for own, other in zip(followed.model.inertias, given.model.inertias, strict=True):
-        assert_allclose(own.lever, other.lever, atol=1e-14)
+    expected = load([TURN], more=free, tool_frame="tool", locked_joints=locked)
+    inertias = (robot.model.inertias for robot in (follower, expected))
+    for inertia, known in zip(*inertias, strict=True):
+        assert_allclose(inertia.lever, known.lever, atol=1e-14)
 
 
 def test_a_joint_that_mimics_itself_is_an_error():
@@ -181,7 +164,7 @@ def test_a_joint_beside_the_chain_that_follows_it_stands_still():
 
 
 def test_a_follower_on_the_chain_is_an_error_with_a_lock_too():
-    mimic = Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<mimic joint='j1'/>")
+    mimic = replace(TURN, extra="<mimic joint='j1'/>")
     with pytest.raises(UrdfError, match="joint 'j2' mimics 'j1'"):
         load([TURN, mimic, TURN], locked_joints={"j2": 0.0})
 
@@ -233,10 +216,8 @@ def test_a_missing_range_comes_from_the_task_or_is_an_error():
         ranged = load(
             [joint], limits=LimitSpec(torque=1.0, position={"j1": [-3.0, 2.0]})
         )
-        assert (ranged.limits.position_lower[0], ranged.limits.position_upper[0]) == (
-            -3.0,
-            2.0,
-        )
+        limits = ranged.limits
+        assert (limits.position_lower[0], limits.position_upper[0]) == (-3.0, 2.0)
     assert load([Joint("continuous", limit={"effort": 1.0, "velocity": 1.0})]).n == 1
 
 
@@ -261,10 +242,6 @@ def inertial(mass, moments):
     [
         ("", "found 0 kg in the links that are moved by j2 (tool, link2);"),
         (
-            inertial(0.0, (0.0, 0.0, 0.0)),
-            "the URDF has no masses, which are needed for robot.limits.torque",
-        ),
-        (
             inertial(0.0, (0.1, 0.1, 0.1)),
             "the URDF has no masses, which are needed for robot.limits.torque",
         ),
@@ -276,20 +253,16 @@ def inertial(mass, moments):
             inertial(1.0, (0.1, 0.1, 0.3)),
             "link 'link2' has a non-physical inertia; found principal moments 0.1, 0.1, 0.3",
         ),
-        (inertial(1.0, (-0.1, 0.1, 0.1)), "link 'link2' has a non-physical inertia"),
     ],
 )
 def test_bodies_that_cannot_be(text, words):
     with pytest.raises(UrdfError) as caught:
-        load([TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text)])
+        load([TURN, replace(TURN, inertial=text)])
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "text", [inertial(-1.0, (0.1, 0.1, 0.1)), inertial(1.0, (0.1, 0.1, 0.3))]
-)
-def test_a_lock_leaves_bodies_that_cannot_be_with_the_base(text):
-    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text), TURN]
+def test_a_lock_leaves_bodies_that_cannot_be_with_the_base():
+    joints = [replace(TURN, inertial=inertial(1.0, (0.1, 0.1, 0.3))), TURN]
     with pytest.raises(UrdfError, match=r"lock .*j1 with robot\.locked_joints"):
         load(joints)
     assert load(joints, locked_joints={"j1": 0.1}).joint_names == ("j2",)
@@ -298,9 +271,7 @@ def test_a_lock_leaves_bodies_that_cannot_be_with_the_base(text):
 def test_massless_link_is_fine_where_its_body_has_mass():
     heavy_tool = "<link name='load'>" + inertial(2.0, (0.1, 0.1, 0.1)) + "</link>"
     heavy_tool += "<joint name='grip' type='fixed'><parent link='tool'/><child link='load'/></joint>"
-    robot = load(
-        [TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial="")], more=heavy_tool
-    )
+    robot = load([TURN, replace(TURN, inertial="")], more=heavy_tool)
     assert robot.model.inertias[2].mass == 2.0
 
 
@@ -330,35 +301,24 @@ def test_base_frame_that_is_not_above_the_tool():
 
 
 def test_base_frame_in_the_middle_holds_what_lies_before_it():
-    whole, part = load([TURN, TURN, TURN]), load([TURN, TURN, TURN], base_frame="link1")
-    assert part.joint_names == ("j2", "j3")
+    robot = load([TURN, TURN, TURN])
+    upper = load([TURN, TURN, TURN], base_frame="link1")
+    assert upper.joint_names == ("j2", "j3")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
-        held = whole.tool_placement(np.array([0.0, *q]))
-        assert_allclose(
-            part.tool_placement(q).homogeneous, held.homogeneous, atol=1e-14
-        )
+        assert upper.tool_placement(q).isApprox(robot.tool_placement([0.0, *q]), 1e-14)
 
 
 def test_locked_joint_on_the_chain():
-    whole, part = (
-        load([TURN, TURN, TURN]),
-        load([TURN, TURN, TURN], locked_joints={"j2": 0.7}),
-    )
-    assert part.joint_names == ("j1", "j3")
-    zero = np.zeros(3)
-    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
-        full = np.array([q[0], 0.7, q[1]])
-        assert_allclose(
-            part.tool_placement(q).homogeneous,
-            whole.tool_placement(full).homogeneous,
-            atol=1e-14,
-        )
-        held = pin.rnea(whole.model, whole.model.createData(), full, zero, zero)[[0, 2]]
-        assert_allclose(
-            pin.rnea(part.model, part.model.createData(), q, zero[:2], zero[:2]),
-            held,
-            atol=1e-12,
-        )
+    robot = load([TURN, TURN, TURN])
+    locked = load([TURN, TURN, TURN], locked_joints={"j2": 0.7})
+    assert locked.joint_names == ("j1", "j3")
+    postures = np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2))
+    full = np.insert(postures, 1, 0.7, axis=1)
+    for q, q_full in zip(postures, full, strict=True):
+        assert locked.tool_placement(q).isApprox(robot.tool_placement(q_full), 1e-14)
+    expected = torque(robot, full, 0.0 * full, 0.0 * full)[:, [0, 2]]
+    still = 0.0 * postures
+    assert_allclose(torque(locked, postures, still, still), expected, atol=1e-12)
 
 
 def test_a_locked_joint_has_to_be_within_its_range():

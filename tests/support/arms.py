@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import sysconfig
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from brachis.robot import Robot, bind
 from support.chains import Joint, chain_urdf
+from support.published import published
 
 X, Y, Z = np.eye(3)
 SLIDE = {"lower": -5.0, "upper": 5.0, "velocity": 1.0, "effort": 50.0}
@@ -162,12 +160,6 @@ def generic(letters: str = "RRRRRR", first: int = 1) -> Arm:
 
 
 def example_robot(name: str) -> Robot:
-    """A UR arm of example-robot-data, where that is installed."""
-    share = (
-        Path(sysconfig.get_path("purelib"))
-        / "cmeel.prefix/share/example-robot-data/robots"
-    )
-    path = share / f"ur_description/urdf/{name}_robot.urdf"
-    if not path.exists():
-        pytest.skip("example-robot-data is not installed")
+    """A UR arm of example-robot-data."""
+    path = published(f"ur_description/urdf/{name}_robot.urdf")
     return Robot.from_urdf(path, tool_frame="tool0")

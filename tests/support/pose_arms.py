@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import sysconfig
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 from brachis.robot import Robot, bind
 from support.chains import Joint, chain_urdf
+from support.published import published
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 BACK, DOWN = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
@@ -133,12 +130,6 @@ def iiwa_by_angles(quarter):
 
 
 def panda():
-    """The Panda's own URDF, where example-robot-data is installed."""
-    share = (
-        Path(sysconfig.get_path("purelib"))
-        / "cmeel.prefix/share/example-robot-data/robots"
-    )
-    path = share / "panda_description/urdf/panda.urdf"
-    if not path.exists():
-        pytest.skip("example-robot-data is not installed")
+    """The Panda's own URDF."""
+    path = published("panda_description/urdf/panda.urdf")
     return Robot.from_urdf(path, tool_frame="panda_hand_tcp")

@@ -85,6 +85,12 @@ class Planned:
         return shutil.copytree(self.out, to)
 
 
+@pytest.fixture
+def result(planned):
+    """The file of that motion."""
+    return planned.out / "result.npz"
+
+
 @pytest.fixture(scope="session")
 def planned(tmp_path_factory):
     folder, printed = tmp_path_factory.mktemp("planned"), io.StringIO()

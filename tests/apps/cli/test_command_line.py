@@ -91,12 +91,8 @@ def test_help_of_plot_lists_every_figure(run):
 )
 def test_completion(words, expected):
     last = str(len(words.split()) - 1)
-    environment = {
-        **os.environ,
-        "_BRACHIS_COMPLETE": "complete_bash",
-        "COMP_WORDS": words,
-        "COMP_CWORD": last,
-    }
+    completion = {"COMP_WORDS": words, "COMP_CWORD": last}
+    environment = {**os.environ, "_BRACHIS_COMPLETE": "complete_bash", **completion}
     done = subprocess.run(
         COMMAND, env=environment, capture_output=True, text=True, check=True
     )
@@ -121,10 +117,7 @@ WRONG = [
     (f"verify {TASK}", "found a task file.*brachis plan "),
     (
         f"inspect {SCARA} --set robot.limits.torque=8",
-        (
-            r"--set: this option cannot be used with a URDF.*found \['robot.limits.torque=8'\]; allowed: this "
-            r"option with a task file"
-        ),
+        r"--set: this option cannot be used with a URDF.*allowed: this option with a",
     ),
     (f"plan {TASK} --set spline", "key=value.*'spline'"),
 ]
@@ -213,11 +206,8 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
 def test_new_and_robots(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     listed = json.loads(run("robots --json").out)["robots"]
-    assert {
-        "name": "gantry2",
-        "what": "two linear axes",
-        "joints": ["x_axis", "y_axis"],
-    }.items() <= listed[1].items()
+    gantry = {"name": "gantry2", "what": "two linear axes"}
+    assert listed[1] == {**listed[1], **gantry, "joints": ["x_axis", "y_axis"]}
     data = json.loads(run(f"new {listed[1]['urdf']} --json").out)
     assert data["verified"]
     assert data["file"] == "task.yaml"

@@ -2,14 +2,12 @@
 
 import json
 import math
-import re
 import subprocess
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 
 import brachis
 from brachis import __version__, planner
@@ -26,20 +24,12 @@ from .conftest import ROOT, SCARA
 
 def test_a_plan_prints_the_figures_that_it_writes(planned):
     data, out = planned.data, planned.out
-    required = {
-        "branch",
-        "status",
-        "solver",
-        "iterations",
-        "wall_time_s",
-        "path_error",
-        "worst_ratio",
-    }
-    assert required <= data.keys()
+    required = "branch status solver iterations wall_time_s path_error worst_ratio"
+    assert {*required.split()} <= data.keys()
     assert data["verified"] is True
     assert 2.0 < data["t_end"] <= 2.478
     assert data["redundant_joints"] == ["j3"]
-    assert names_in(out) == RESULT | {"overview.png", "candidates.png"}
+    assert names_in(out) == RESULT | FIGURES
     assert {*data["files"]} == {str(path) for path in out.iterdir()}
     assert json.loads((out / "result.json").read_text())["t_end"] == data["t_end"]
 
@@ -48,13 +38,7 @@ def test_plan_for_people(run, task, write):
     task["spline"]["intervals"] = 20
     outcome = run(f"plan {write(task)}")
     assert outcome.code == 0
-    for words in (
-        "end time",
-        "2.47",
-        "verification: passed",
-        "torque ratio",
-        "torque jump",
-    ):
+    for words in ("end time", "2.47", "verification: passed", "torque ratio"):
         assert words in outcome.out
     assert outcome.out.endswith("nothing was saved; --out FOLDER saves the motion\n")
     # No progress display in a pipe.
@@ -75,14 +59,15 @@ def test_an_unverified_motion_and_a_verified_one_do_not_mix_in_one_folder(
     assert json.loads(outcome.out)["verified"] is False
     for words in ("unverified", "verification (", "FAILED, allowed"):
         assert words in outcome.err
-    figures = {"unverified.png", "unverified_candidates.png"}
-    assert names_in(out) == {"unverified.npz", "unverified.json", "notes.txt", *figures}
+    suffixes = (".npz", ".json", ".png", "_candidates.png")
+    unverified = {f"unverified{suffix}" for suffix in suffixes}
+    assert names_in(out) == unverified | {"notes.txt"}
     request.getfixturevalue("monkeypatch").undo()
     assert run(f"plan {write(task)} --out {out}").code == 0
-    figures = {"overview.png", "candidates.png"}
-    assert names_in(out) == RESULT | {"notes.txt", *figures}
+    assert names_in(out) == RESULT | FIGURES | {"notes.txt"}
 
 
+FIGURES = {"overview.png", "candidates.png"}
 RESULT = {"result.npz", "result.json"}
 
 
@@ -229,23 +214,22 @@ CHOICES = {
 
 @pytest.mark.parametrize("case", CHOICES)
 def test_a_plan_lists_its_candidates(run, task, write, case):
-    more, choices, name = CHOICES[case]
-    outcome = run("plan", write({**task, "redundant_joints": "auto", **more}))
-    data = json.loads(
-        run("plan", write({**task, "redundant_joints": "auto", **more}), "--json").out
-    )
-    assert f"candidates ({len(data['candidates'])}" in outcome.out
-    found = {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]}
-    assert choices <= found <= choices | {tuple(data["redundant_joints"])}, (
+    settings, choices, name = CHOICES[case]
+    path = write({**task, "redundant_joints": "auto", **settings})
+    text = run(f"plan {path}").out
+    data = json.loads(run(f"plan {path} --json").out)
+    candidates = data["candidates"]
+    assert f"candidates ({len(candidates)}" in text
+    listed = {tuple(candidate["redundant_joints"]) for candidate in candidates}
+    assert choices <= listed <= choices | {tuple(data["redundant_joints"])}, (
         "the fastest one in its last coordinates"
     )
-    rows = outcome.out[outcome.out.index("candidates (") :]
+    rows = text[text.index("candidates (") :]
     assert f"│ {name} " in rows
     assert "none" not in rows
-    first = data["candidates"][0]
-    assert first["verified"]
-    assert first["t_end"] == data["t_end"]
-    assert f"{first['t_end']:.4f}" in outcome.out
+    assert candidates[0]["verified"]
+    assert candidates[0]["t_end"] == data["t_end"]
+    assert f"{data['t_end']:.4f}" in text
 
 
 def test_coordinates_are_described_without_the_name_of_a_chart_alone(planned):
@@ -257,17 +241,6 @@ def test_coordinates_are_described_without_the_name_of_a_chart_alone(planned):
     )
     only_s = replace(in_chart, control_points=trajectory.control_points[:1])
     assert describe_coordinates(only_s) == "none"
-
-
-def test_interrupt(run, task, write, tmp_path, monkeypatch):
-    def interrupt(*_arguments, **_options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(pipeline, "rank_candidate", interrupt)
-    outcome = run(f"plan {write(task)} --out {tmp_path / 'out'}")
-    assert outcome.code == 130
-    assert "interrupted" in outcome.err
-    assert not list((tmp_path / "out").iterdir())
 
 
 def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
@@ -300,16 +273,11 @@ def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
     assert (tmp_path / "out/unverified.npz").exists()
     data = json.loads(outcome.out)
     assert data["interrupted"]
-    assert (
-        data["undone"][-1] == "the search that search.effort requires was not completed"
-    )
-    assert (
-        "brachis: the search was ended early; this is the best motion so far\n"
-        in outcome.err
-    )
-    assert all(
-        f"brachis: not completed: {each}\n" in outcome.err for each in data["undone"]
-    )
+    reason = "the search that search.effort requires was not completed"
+    assert data["undone"][-1] == reason
+    assert "brachis: the search was ended early" in outcome.err
+    for step in data["undone"]:
+        assert f"brachis: not completed: {step}\n" in outcome.err
 
 
 def test_help_loads_neither_pinocchio_nor_numpy():
@@ -322,11 +290,11 @@ def test_help_loads_neither_pinocchio_nor_numpy():
 
 def test_verify_against_a_weaker_robot_fails(run, task, write, tmp_path):
     task["robot"]["limits"] = {"velocity": None}  # torque limits from the URDF
-    (tmp_path / "out").mkdir()
-    brachis.plan(write(task)).trajectory.save(tmp_path / "out/result.npz")
+    motion = tmp_path / "result.npz"
+    brachis.plan(write(task)).trajectory.save(motion)
     weaker = tmp_path / "weaker.urdf"
     weaker.write_text(SCARA.read_text().replace('effort="10"', 'effort="9"'))
-    outcome = run(f"verify {tmp_path / 'out/result.npz'} --urdf {weaker} --json")
+    outcome = run(f"verify {motion} --urdf {weaker} --json")
     assert outcome.code == 1
     assert json.loads(outcome.out)["worst_ratio"] == pytest.approx(10 / 9, rel=1e-3)
 
@@ -351,13 +319,14 @@ def test_inspect(run):
     assert outcome.out.count(" planar ") == 3
     data = json.loads(run(f"inspect {SCARA} --task-space x,y --json").out)
     assert data["degree_of_redundancy"] == 1
-    assert [row["redundant joints"] for row in data["decompositions"]] == [
-        "j1",
-        "j2",
-        "j3",
+    choices = [
+        (row["redundant joints"], row["branches"]) for row in data["decompositions"]
     ]
-    assert {row["branches"] for row in data["decompositions"]} == {2}
+    assert choices == [("j1", 2), ("j2", 2), ("j3", 2)]
     assert data["joints"][0]["torque"] == "10 Nm"
+    locked = run(f"inspect {SCARA} --task-space x,y --lock j3=0.5 --json").out
+    assert json.loads(locked)["degree_of_redundancy"] == 0
+    assert run(f"inspect {SCARA} --lock j3").code == 2
 
 
 def test_inspect_says_where_every_limit_holds(run, task, write):
@@ -372,18 +341,15 @@ def test_inspect_says_where_every_limit_holds(run, task, write):
     assert "rms torque limit: It holds as a mean over the whole motion." in text
 
 
-def test_inspect_of_a_task_shows_what_is_in_use(run, tmp_path):
-    task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
+def test_inspect_of_a_task_shows_what_is_in_use(run, task, write):
     task["robot"] |= {
-        "urdf": str(SCARA),
         "limits": {"torque": {"j1": [-5, 7]}, "acceleration": {"j2": 30}},
         "friction": {"viscous": {"j3": 0.25}, "rotor_inertia": 1e-4, "gear_ratio": 100},
         "payload": {"mass": 2.5},
         "mounting": "ceiling",
         "speed_override": "50 %",
     }
-    path = tmp_path / "task.yaml"
-    path.write_text(yaml.safe_dump(task))
+    path = write(task)
     data = json.loads(run(f"inspect {path} --json").out)
     keys = ("acceleration", "torque", "mass", "viscous", "coulomb", "armature")
     assert [[row[key] for key in keys] for row in data["joints"]] == [
@@ -413,10 +379,9 @@ def test_inspect_of_a_task_shows_gravity_postures_and_path(run):
     assert data["start_posture"][:2] == [0.0, 0.4]
     assert data["end_posture"] is None
     assert data["path"]["segments"] == ["line", "line"]
-    joints = json.loads(
-        run(f"inspect {ROOT / 'examples/11_from_toppra.yaml'} --json").out
-    )
-    assert joints["path"] == {"segments": ["spline"], "length": None}
+    joints = ROOT / "examples/11_from_toppra.yaml"
+    data = json.loads(run(f"inspect {joints} --json").out)
+    assert data["path"] == {"segments": ["spline"], "length": None}
 
 
 @pytest.mark.parametrize(
@@ -437,12 +402,6 @@ def test_inspect_refuses_postures_as_plan_does(run, change, words):
     assert refused == run(f"plan {WELD} --set '{change}'")
 
 
-def test_inspect_with_locked_joint(run):
-    data = json.loads(run(f"inspect {SCARA} --task-space x,y --lock j3=0.5 --json").out)
-    assert data["degree_of_redundancy"] == 0
-    assert run(f"inspect {SCARA} --lock j3").code == 2
-
-
 def test_schema(run, tmp_path):
     printed = json.loads(run("schema").out)
     assert "redundant_joints" in printed["properties"]
@@ -456,14 +415,10 @@ def test_every_command_shows_angles_in_degrees_and_json_stays_in_rad(run, task, 
     assert planned.code == 0, planned.err
     assert "j1 30.0000 deg, j2 -120.0000 deg" in planned.out
     result = file.parent / "result.npz"
-    verified, plain = run(f"verify {result} --degrees").out, run(f"verify {result}").out
-    assert (" deg/s " in verified, " rad/s " in verified) == (True, False)
-    assert (" deg/s " in plain, " rad/s " in plain) == (False, True)
-    found = re.findall(
-        r"\((.*?) deg/s\) saves", run(f"bottleneck {result} --degrees").out
-    )
-    assert found[0] == f"{np.rad2deg(0.05):.3g}"
-    assert (
-        run(f"verify {result} --degrees --json").out
-        == run(f"verify {result} --json").out
-    )
+    for options, shown, absent in (("--degrees", "deg", "rad"), ("", "rad", "deg")):
+        text = run(f"verify {result} {options}").out
+        assert f" {shown}/s " in text
+        assert f" {absent}/s " not in text
+    saving = f"({np.rad2deg(0.05):.3g} deg/s) saves"
+    assert saving in run(f"bottleneck {result} --degrees").out
+    assert run(f"verify {result} --degrees --json") == run(f"verify {result} --json")

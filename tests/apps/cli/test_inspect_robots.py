@@ -2,14 +2,15 @@
 
 import json
 import sys
-from pathlib import Path
 
 import pytest
 
 from brachis import ik
 from brachis.ik import registry
+from support.published import published
 
-ROOT = Path(__file__).parents[3]
+from .conftest import ROOT
+
 WITHOUT_CLOSED_FORM = {"gen3": 7, "arm8": 28, "gen3_rails": 84}
 OWN = sorted((ROOT / "robots").glob("*/*.urdf"))
 PUBLISHED = {
@@ -23,11 +24,7 @@ PUBLISHED = {
 
 
 def find_published(name):
-    for folder in map(Path, sys.path):
-        path = folder / "cmeel.prefix/share/example-robot-data/robots" / PUBLISHED[name]
-        if path.is_file():
-            return path
-    pytest.skip("example-robot-data is not installed")
+    return published(PUBLISHED[name])
 
 
 def inspected(run, urdf, *options):
@@ -58,13 +55,10 @@ def test_every_robot_of_the_repository(run, urdf):
     text = run(f"inspect {urdf}")
     assert text.code == 0
     assert (set(solvers.values()) == {"-"}) == (choices is not None)
-    assert (
-        (ik.NO_CLOSED_FORM in remarks)
-        == (ik.NO_CLOSED_FORM in text.out)
-        == (choices is not None)
-    )
+    is_said = [ik.NO_CLOSED_FORM in words for words in (remarks, text.out)]
+    assert is_said == [choices is not None] * 2
     if choices is not None:
-        assert (len(solvers), set(solvers.values())) == (choices, {"-"})
+        assert len(solvers) == choices
 
 
 def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
@@ -97,63 +91,45 @@ def test_redundant_joints_with_a_closed_form(run, robot, joints):
 
 
 def test_iiwa_has_none_for_its_elbow(run):
-    solvers = decompositions(run, ROOT / "robots/iiwa14/robot.urdf")
+    solvers = decompositions(run, "iiwa14")
     assert [joint for joint, solver in solvers.items() if solver == "-"] == ["joint_4"]
-    row = json.loads(run(f"inspect {ROOT / 'robots/iiwa14/robot.urdf'} --json").out)[
-        "decompositions"
-    ][3]
-    assert "J_nr is singular everywhere" in row["why not"]
+    data = json.loads(run("inspect iiwa14 --json").out)
+    assert "J_nr is singular everywhere" in data["decompositions"][3]["why not"]
 
 
 def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
     monkeypatch.setattr(registry, "_KNOWN", {})
-    panda = decompositions(run, find_published("Panda"))
-    assert [joint for joint, solver in panda.items() if solver != "-"] == [
-        "panda_joint4",
-        "panda_joint7",
-    ]
-    remarks = json.loads(run("inspect", find_published("Panda"), "--json").out)[
-        "remarks"
-    ]
-    assert remarks[-1].startswith(
-        "EAIK is not installed (pip install EAIK); it might add the redundant joints ["
-    )
-    assert (
-        "[panda_joint5], [panda_joint6]; installing it needs a C++ compiler, except on"
-        in remarks[-1]
-    )
-    assert remarks[-1] in run("inspect", find_published("Panda")).out.replace("\n", " ")
+    panda = find_published("Panda")
+    solvers, (*_, remark) = inspected(run, panda)
+    closed = [joint for joint, solver in solvers.items() if solver != "-"]
+    assert closed == ["panda_joint4", "panda_joint7"]
+    assert remark.startswith("EAIK is not installed (pip install EAIK); it might add")
+    assert "[panda_joint5], [panda_joint6]; installing it needs a C++ comp" in remark
+    assert remark in run("inspect", panda).out.replace("\n", " ")
 
 
 def test_inspect_names_its_choice_of_a_tool_frame(run):
-    out = run("inspect", find_published("Panda"), "--json").out
-    (tool, space) = json.loads(out)["remarks"]
-    assert tool.startswith(
-        "tool frame: panda_hand, the last link before the chains to panda_leftfinger"
-    )
+    panda = find_published("Panda")
+    _, (tool, space) = inspected(run, panda)
+    words = "tool frame: panda_hand, the last link before the chains to panda_leftf"
+    assert tool.startswith(words)
     assert space.startswith("task space: pose")
-    named = run(
-        "inspect", find_published("Panda"), "--tool-frame", "panda_link8", "--json"
-    ).out
-    assert json.loads(named)["remarks"] == [space]
-
-
-LIMB = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+    assert inspected(run, panda, "--tool-frame", "panda_link8")[1] == [space]
 
 
 def test_inspect_shows_the_first_of_several_arms(run):
-    data = json.loads(run("inspect", find_published("Baxter"), "--json").out)
-    assert [joint["joint"] for joint in data["joints"]] == [
-        f"left_{part}" for part in LIMB
+    baxter = find_published("Baxter")
+    data = json.loads(run("inspect", baxter, "--json").out)
+    names = [joint["joint"] for joint in data["joints"]]
+    assert names == [
+        f"left_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
     ]
     assert data["remarks"][0].endswith(
         "from which several limbs part; --base-frame names another one"
     )
     assert "--tool-frame names another one" in data["remarks"][1]
-    solvers = decompositions(
-        run, find_published("Baxter"), "--tool-frame", "left_gripper"
-    )
+    solvers = decompositions(run, baxter, "--tool-frame", "left_gripper")
     assert set(solvers.values()) == {"-"}  # offsets at the shoulder and the wrist
 
 
@@ -182,20 +158,6 @@ def test_where_the_tool_is(run):
 def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
     """Frames half way up the arm, which a rail moves as well, are no tools."""
     out = tmp_path / "ur5.urdf"
-    options = (
-        "--axis",
-        "0",
-        "1",
-        "0",
-        "--range",
-        "-2",
-        "2",
-        "--velocity",
-        "2",
-        "--force",
-        "2000",
-        "--mass",
-        "60",
-    )
-    assert run("compose", find_published("UR5"), *options, "--out", out).code == 0
+    options = "--axis 0 1 0 --range -2 2 --velocity 2 --force 2000 --mass 60"
+    assert run(f"compose {find_published('UR5')} {options} --out {out}").code == 0
     assert decompositions(run, out)["rail"] == "parallel_axes"

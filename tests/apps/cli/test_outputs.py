@@ -50,15 +50,14 @@ def contents(folder):
 OVER = [
     "export result.npz --out task.yaml",
     "export result.npz --out points.csv",
+    "export result.npz --out link.csv",
     "export result.npz --out result.npz",
     "export result.npz --out result.npz --format csv",
     "plot result.npz --out task.yaml",
     "plot result.npz --out notes.png",
-    "schema --out task.yaml",
     "schema --out data.json",
     "schema --out result.json",
     "compose robot.urdf --out robot.urdf --range -1 1 --velocity 1 --force 100 --mass 5",
-    "compose robot.urdf --out task.yaml --range -1 1 --velocity 1 --force 100 --mass 5",
     "plan result.json --out .",
     "bottleneck bottleneck.json --out .",
 ]
@@ -69,6 +68,8 @@ RAIL = ("--range", "-1", "1", "--velocity", "1", "--force", "100", "--mass", "5"
 def test_nothing_is_written_over_other_files(command, run, saved, monkeypatch):
     (saved / "notes.png").write_text("no figure")
     (saved / "data.json").write_text('{"a": 1}')
+    (saved / "link.csv").unlink(missing_ok=True)
+    (saved / "link.csv").symlink_to(saved / "points.csv")
     task = yaml.safe_load((saved / "task.yaml").read_text())
     for name in ("result.json", "bottleneck.json"):
         (saved / name).write_text(json.dumps(task))
@@ -94,7 +95,6 @@ def test_a_folder_with_the_name_of_an_output_is_refused_before_planning(
 
 REFUSED_AT_ONCE = [
     ("report MOTION --out x.png", "suffix"),
-    ("report MOTION --out x.htm", "suffix"),
     ("plot MOTION --out gone/x.png", "no folder gone"),
     ("report MOTION --out gone/x.html", "no folder gone"),
     ("bottleneck MOTION --out mine", "into a folder"),
@@ -128,18 +128,6 @@ def test_a_motion_is_verified_against_an_included_robot(run, saved):
     assert "Did you mean 'scara3'?" in outcome.err
 
 
-def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
-    (tmp_path / "new.csv").symlink_to(saved / "points.csv")
-    (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")
-    before = contents(saved)
-    assert run(f"export {saved / 'result.npz'} --out {tmp_path / 'new.csv'}").code == 2
-    assert (
-        run("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "new.urdf").code
-        == 2
-    )
-    assert contents(saved) == before
-
-
 def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
     (tmp_path / "empty.csv").touch()  # as mktemp makes it
     for _ in range(2):
@@ -147,7 +135,6 @@ def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
             (("export", saved / "result.npz", "--dt", 0.1), "motion.csv"),
             (("export", saved / "result.npz", "--dt", 0.1), "empty.csv"),
             (("plot", saved / "result.npz", "--kind", "torques"), "figure.svg"),
-            (("plot", saved / "result.npz", "--kind", "torques"), "figure.pdf"),
             (("schema",), "schema.json"),
             (("compose", saved / "robot.urdf", *RAIL), "cell.urdf"),
         ):
@@ -155,25 +142,20 @@ def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
             assert outcome.code == 0, outcome.err
 
 
+def run_writing_to(stream, *arguments):
+    command = [*COMMAND, *arguments]
+    return subprocess.run(
+        command, stdout=stream, stderr=subprocess.PIPE, text=True, check=False
+    )
+
+
 @pytest.mark.skipif(not FULL.exists(), reason="only Linux has /dev/full")
 @pytest.mark.parametrize(
-    "arguments",
-    [
-        ("schema",),
-        ("--help",),
-        ("inspect", SCARA, "--json"),
-        ("verify", "gone", "--json"),
-    ],
+    "arguments", [("schema",), ("--help",), ("verify", "gone", "--json")]
 )
 def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
     with FULL.open("w") as full:
-        done = subprocess.run(
-            [*COMMAND, *arguments],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        done = run_writing_to(full, *arguments)
     assert done.returncode == 1
     assert (
         "brachis: standard output cannot be written: No space left on device\n"
@@ -186,16 +168,9 @@ def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
 def test_a_closed_pipe_is_quiet():
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(
-        [*COMMAND, "schema"],
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
+    done = run_writing_to(writing, "schema")
     os.close(writing)
-    assert done.returncode == 1
-    assert done.stderr == ""
+    assert (done.returncode, done.stderr) == (1, "")
 
 
 def test_closed_standard_output_is_no_fault():
@@ -213,10 +188,8 @@ def test_the_last_row(end, run, saved, tmp_path):
     table = tmp_path / "motion.csv"
     trajectory = brachis.Trajectory.load(saved / "result.npz")
     dt = trajectory.t_end / 7.5
-    assert (
-        run(f"export {saved / 'result.npz'} --out {table} --dt {dt} --last {end}").code
-        == 0
-    )
+    command = f"export {saved / 'result.npz'} --out {table}"
+    assert run(f"{command} --dt {dt} --last {end}").code == 0
     with table.open() as stream:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]]
     assert len(rows) == 9
@@ -228,7 +201,7 @@ def test_the_last_row(end, run, saved, tmp_path):
         np.testing.assert_array_equal(
             rows[-1][4:], np.zeros(9)
         )  # no gravity: nothing holds the posture
-    outcome = run(f"export {saved / 'result.npz'} --out {table} --last held")
+    outcome = run(f"{command} --last held")
     assert outcome.code == 2
     assert "Did you mean 'hold'?" in outcome.err
 
@@ -269,10 +242,10 @@ def test_outputs_that_the_system_refuses(name, run, saved, tmp_path):
         ("schema",),
         ("plan", saved / "task.yaml"),
     ):
-        found = run(*command, "--out", out)
-        assert found.code == 2, command
-        assert "cannot be" in found.err or "no folder" in found.err, command
-        assert len(found.err.splitlines()) == 1, command
+        outcome = run(*command, "--out", out)
+        assert outcome.code == 2, command
+        assert "cannot be" in outcome.err or "no folder" in outcome.err, command
+        assert len(outcome.err.splitlines()) == 1, command
 
 
 @pytest.mark.parametrize(
@@ -281,21 +254,13 @@ def test_outputs_that_the_system_refuses(name, run, saved, tmp_path):
 def test_inputs_that_the_system_refuses(name, run, saved, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("circle").symlink_to("circle")
-    given = saved / name if name.startswith("result") else name
-    for command in (
-        "plan",
-        "inspect",
-        "verify",
-        "view",
-        "report",
-        "bottleneck",
-        "new",
-        "sweep",
-    ):
-        found = run(f"{command} {given}")
-        assert found.code == 2, command
-        assert name in found.err, command
-        assert "internal" not in found.err, command
+    path = saved / name if name.startswith("result") else name
+    commands = "plan inspect verify view report bottleneck new sweep"
+    for command in commands.split():
+        outcome = run(f"{command} {path}")
+        assert outcome.code == 2, command
+        assert name in outcome.err, command
+        assert "internal" not in outcome.err, command
 
 
 def test_progress_takes_names_with_brackets(monkeypatch, capfd):
@@ -326,7 +291,4 @@ def test_endless_inputs_are_errors(endless, run, saved, tmp_path):
         outcome = run(*command)
         assert outcome.code == 2, command
         assert str(endless) in outcome.err
-        assert any(
-            what in outcome.err
-            for what in ("a pipe", "a folder", "this folder", "a device", "MB")
-        )
+        assert re.search("a pipe|a folder|this folder|a device|MB", outcome.err)

@@ -10,10 +10,7 @@ from .conftest import quick_task
 @pytest.fixture
 def stopping():
     """A task that waits at a corner."""
-    path = [
-        {"line": {"by": [0.2, 0.0]}, "dwell": 0.3},
-        {"line": {"by": [0.0, 0.2]}},
-    ]
+    path = [{"line": {"by": [0.2, 0.0]}, "dwell": 0.3}, {"line": {"by": [0.0, 0.2]}}]
     return {**quick_task(), "path": path}
 
 

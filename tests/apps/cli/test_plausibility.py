@@ -61,8 +61,8 @@ def test_a_start_posture_in_degrees_is_refused_and_the_way_out_works(run, task, 
     assert meant.code == 0
     assert "degrees" not in meant.err
     assert "--no-strict" in " ".join(refused.err.split())
-    for words in (("--no-strict",), ("--set", "strict=false")):
-        outcome = run("plan", path, *words)
+    for option in ("--no-strict", "--set strict=false"):
+        outcome = run(f"plan {path} {option}")
         assert outcome.code == 0, outcome.err
         assert outcome.err.count("looks like degrees") == 1
     assert run(f"bottleneck {path}").code == 2

@@ -5,7 +5,6 @@ import re
 import pytest
 from rich.console import Console
 
-import brachis
 from brachis.apps.cli import output
 from brachis.apps.cli.output import print_table
 
@@ -40,9 +39,10 @@ ROWS = [
 
 def test_a_table_has_lines_where_they_fit_and_parts_where_nothing_else_does():
     assert "━" in print_to_text(200, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "━" not in print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "title (2 of " in print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS).count("first") >= 2
+    narrow = print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
+    assert "━" not in narrow
+    assert "title (2 of " in narrow
+    assert narrow.count("first") >= 2
 
 
 def test_long_words_of_text_are_broken_not_lost():
@@ -53,16 +53,6 @@ def test_long_words_of_text_are_broken_not_lost():
     )
     assert "shoulder_front_elbow_up_wrist_flipped" in re.sub(r"\s|│|branch", "", text)
     assert max(map(len, text.splitlines())) <= 30
-
-
-@pytest.fixture(scope="module")
-def result():
-    return brachis.plan(
-        ROOT / "examples/01_scara_line.yaml",
-        effort="single",
-        intervals=6,
-        least_motion=False,
-    )
 
 
 @pytest.fixture
@@ -90,11 +80,10 @@ SHOWING = {
 
 
 @pytest.mark.parametrize("case", SHOWING)
-def test_no_command_cuts_numbers(case, run, result, points, tmp_path, monkeypatch):
-    result.trajectory.save(tmp_path / "result.npz")
-    monkeypatch.setattr("brachis.planner.plan", lambda *_arguments, **_options: result)
-    given = {"RESULT": tmp_path / "result.npz", "POINTS": points}
-    arguments = [given.get(word, word) for word in SHOWING[case]]
+def test_no_command_cuts_numbers(case, run, line_result, result, points, monkeypatch):
+    monkeypatch.setattr("brachis.planner.plan", lambda *_, **__: line_result)
+    files = {"RESULT": result, "POINTS": points}
+    arguments = [files.get(word, word) for word in SHOWING[case]]
     texts = {width: run(*arguments, columns=width).out for width in (*WIDTHS, 200)}
     numbers = set(NUMBER.findall(texts[200]))
     assert len(numbers) > 5

@@ -4,6 +4,8 @@ from numpy.testing import assert_allclose
 
 from brachis.apps.plots import plot_postures
 from brachis.apps.plots.postures import drawing_plane
+from brachis.robot import Robot
+from support.chains import Joint, chain_urdf
 
 POSTURES = 7
 
@@ -62,7 +64,7 @@ def test_a_spatial_chain_is_drawn_in_space_with_equal_scales(spatial_trajectory)
     assert_allclose(ratios, ratios[0])
 
 
-AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 KINDS = {"turn": "revolute", "slide": "prismatic"}
 
 
@@ -79,12 +81,8 @@ KINDS = {"turn": "revolute", "slide": "prismatic"}
         ("slide x, slide y", (0, 1, 2), (0, 1)),
     ],
 )
-def test_drawing_plane(chain, joints, axes, plane):
+def test_drawing_plane(joints, axes, plane):
     words = [joint.split() for joint in joints.split(", ")]
-    robot = chain(
-        {
-            f"j{i}": (KINDS[kind], AXES[axis], "0.5 0 0.1")
-            for i, (kind, axis) in enumerate(words)
-        }
-    )
-    assert drawing_plane(robot, axes) == plane
+    chain = [Joint(KINDS[kind], AXES[axis], (0.5, 0.0, 0.1)) for kind, axis in words]
+    text = chain_urdf(chain, tool=(0.15, 0.0, 0.0))
+    assert drawing_plane(Robot.from_urdf("chain", urdf_text=text), axes) == plane

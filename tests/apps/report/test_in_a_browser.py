@@ -53,11 +53,10 @@ def test_the_slider_moves_the_robot_and_all_that_follows_it(planar_opened, plana
     expected = planar.trajectory.position(0.5 * planar.t_end)[0]
     assert float(row[1].split()[0]) == pytest.approx(expected, abs=0.02)
     assert page.locator("#values tbody td").all_inner_texts() != first
-    boxes = (
-        page.locator("#motion_figure .cursor").bounding_box(),
-        page.locator("#motion_figure").bounding_box(),
-    )
-    assert 0.3 < (boxes[0]["x"] - boxes[1]["x"]) / boxes[1]["width"] < 0.7
+    figure = page.locator("#motion_figure")
+    box = figure.bounding_box()
+    cursor = figure.locator(".cursor").bounding_box()["x"] - box["x"]
+    assert 0.3 < cursor / box["width"] < 0.7
     assert said == []
     assert asked == [page.url], "the page asked for nothing but itself"
 
@@ -78,12 +77,6 @@ def test_figures_are_there_in_dark_and_an_arm_in_space_turns(opened, weaker_page
     for name in ("motion_figure", "timeline_figure"):
         assert page.locator(f"#{name} .main-svg").count() > 0
     assert page.locator("#motion_figure .scatterlayer .trace").count() > 4 * 7
-    assert (
-        page.evaluate(
-            "getComputedStyle(document.querySelector('header')).backgroundColor"
-        )
-        == "rgb(195, 20, 47)"
-    )
     before = pixels(page)
     page.locator("#robot").scroll_into_view_if_needed()
     box = page.locator("#robot").bounding_box()
