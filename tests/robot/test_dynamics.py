@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from brachis.errors import InputError
 from brachis.robot import Robot, dynamics
@@ -67,21 +67,6 @@ class RodArm:
             for e in np.eye(3)
         ]
         return cls.mass_matrix(q) @ qddot + rate @ qdot - kinetic + np.array(pull)
-
-
-def test_scara_joint_names_and_forward_kinematics(scara_urdf):
-    robot = Robot.from_urdf(scara_urdf)
-    assert robot.joint_names == ("j1", "j2", "j3")
-    assert robot.tool_frame == "tool"
-    assert np.all(np.isinf(robot.limits.position_upper))
-    assert_array_equal(robot.limits.torque, [10.0] * 3)
-    for q in np.random.default_rng(0).uniform(-7.0, 7.0, (20, 3)):
-        theta = np.cumsum(q)
-        placement = robot.tool_placement(q)
-        expected = [np.cos(theta).sum(), np.sin(theta).sum(), 0.0]
-        assert_allclose(placement.translation, expected, atol=1e-14)
-        tool = placement.rotation[:, 0]
-        assert_allclose(tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14)
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])

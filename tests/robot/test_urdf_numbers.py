@@ -15,7 +15,7 @@ TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
 TEXT = chain_urdf(
     [TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), rpy=(0.1, 0.2, 0.3))],
     tool=(0.3, 0.0, 0.0),
-    more="<link name='aside'>" + INERTIAL.format(mass=1.5) + "</link>"
+    elements="<link name='aside'>" + INERTIAL.format(mass=1.5) + "</link>"
     "<joint name='flap' type='revolute'><parent link='link1'/><child link='aside'/><origin xyz='0.1 0.2 0.3'/>"
     "<axis xyz='0 1 1'/><limit lower='0.3' upper='0.9' effort='10' velocity='1'/></joint>",
 )
@@ -125,10 +125,10 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
         assert bodies[0].links == ("link1", "aside")
         assert bodies[0].mass == 3.5
         # The held flap counts where it is held: another position is another body.
-        other = read_dynamics(
+        moved = read_dynamics(
             read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool"
         ).bodies
-        assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
+        assert np.abs(moved[0].com - bodies[0].com).max() > 1e-3
 
 
 def test_long_chains_are_summed_up_without_recursion():

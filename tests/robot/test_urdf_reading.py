@@ -36,10 +36,10 @@ GRIPPER = """
 
 
 def load(joints, **options):
-    more = options.pop("more", "")
+    elements = options.pop("elements", "")
     return Robot.from_urdf(
         "file.urdf",
-        urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0), more=more),
+        urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0), elements=elements),
         **options,
     )
 
@@ -69,7 +69,7 @@ def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
 def test_the_chain_carries_the_mass_of_a_gripper_beside_it():
     bare, loaded = (
         load([TURN, TURN]),
-        load([TURN, TURN], tool_frame="palm", more=GRIPPER),
+        load([TURN, TURN], tool_frame="palm", elements=GRIPPER),
     )
     assert loaded.joint_names == ("j1", "j2")
     carried = [
@@ -81,7 +81,9 @@ def test_the_chain_carries_the_mass_of_a_gripper_beside_it():
     single = GRIPPER.replace("<mimic joint='finger'/>", "")
     for held in (0.02, 0.05):
         locked = None if held == 0.02 else {"finger": held}
-        robot = load([TURN, TURN], tool_frame="palm", more=single, locked_joints=locked)
+        robot = load(
+            [TURN, TURN], tool_frame="palm", elements=single, locked_joints=locked
+        )
         levers[held] = robot.model.inertias[2].mass * robot.model.inertias[2].lever
     assert_allclose(levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14)
 
@@ -90,7 +92,7 @@ def test_branching_urdf_needs_a_tool_frame():
     with pytest.raises(
         UrdfError, match="2 links without children: finger1, finger2"
     ) as caught:
-        load([TURN, TURN], more=GRIPPER)
+        load([TURN, TURN], elements=GRIPPER)
     assert "robot.tool_frame" in str(caught.value)
 
 
@@ -100,7 +102,7 @@ def test_a_loop_of_links_beside_the_tree_is_an_error():
         "<child link='a'/></joint>"
     )
     with pytest.raises(UrdfError, match=r"not form one tree.*a loop of links: a"):
-        load([TURN], more=loop)
+        load([TURN], elements=loop)
 
 
 def test_a_joint_without_an_axis_is_an_error():
@@ -126,38 +128,40 @@ def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
         "b": "<mimic joint='c' multiplier='0.5' offset='0.1'/>",
         "c": "",
     }
-    more = "".join(
+    elements = "".join(
         f"<link name='finger_{name}'>{INERTIAL.format(mass=0.5)}</link>"
         f"<joint name='{name}' type='prismatic'><parent link='tool'/><child link='finger_{name}'/>"
         "<axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
         f"{mimics[name]}</joint>"
         for name in order
     )
-    follower = load([TURN], more=more, tool_frame="tool", locked_joints={"c": 0.3})
-    free = re.sub("<mimic .*?/>", "", more)
+    follower = load(
+        [TURN], elements=elements, tool_frame="tool", locked_joints={"c": 0.3}
+    )
+    free = re.sub("<mimic .*?/>", "", elements)
     locked = {"a": -0.5, "b": 0.25, "c": 0.3}
-    expected = load([TURN], more=free, tool_frame="tool", locked_joints=locked)
+    expected = load([TURN], elements=free, tool_frame="tool", locked_joints=locked)
     inertias = (robot.model.inertias for robot in (follower, expected))
     for inertia, known in zip(*inertias, strict=True):
         assert_allclose(inertia.lever, known.lever, atol=1e-14)
 
 
 def test_a_joint_that_mimics_itself_is_an_error():
-    more = GRIPPER.replace("mimic joint='finger'", "mimic joint='follower'")
+    elements = GRIPPER.replace("mimic joint='finger'", "mimic joint='follower'")
     with pytest.raises(UrdfError, match="mimic each other in a loop; found follower"):
-        load([TURN], more=more, tool_frame="tool")
+        load([TURN], elements=elements, tool_frame="tool")
 
 
 def test_a_mimic_locked_elsewhere_is_an_error():
     message = r"'follower' mimics 'finger', which is locked at 0\.03 m; found 0\.01 m; allowed: 0\.03 m"
     locked = {"finger": 0.03, "follower": 0.01}
     with pytest.raises(UrdfError, match=message):
-        load([TURN], more=GRIPPER, tool_frame="tool", locked_joints=locked)
+        load([TURN], elements=GRIPPER, tool_frame="tool", locked_joints=locked)
 
 
 def test_a_joint_beside_the_chain_that_follows_it_stands_still():
-    more = GRIPPER.replace("joint='finger'", "joint='j1'")
-    robot = load([TURN, TURN], tool_frame="palm", more=more)
+    elements = GRIPPER.replace("joint='finger'", "joint='j1'")
+    robot = load([TURN, TURN], tool_frame="palm", elements=elements)
     assert robot.joint_names == ("j1", "j2")
     assert robot.model.inertias[2].mass == 3.0  # with both fingers
     assert of_robot(robot) == ()
@@ -172,7 +176,7 @@ def test_a_follower_on_the_chain_is_an_error_with_a_lock_too():
 def test_moments_without_mass_are_left_out_with_a_warning():
     ghost = f"<link name='ghost'>{inertial(0.0, (0.1, 0.1, 0.1))}</link>"
     ghost += "<joint name='fix' type='fixed'><parent link='tool'/><child link='ghost'/></joint>"
-    bare, haunted = (load([TURN, TURN], more=more) for more in ("", ghost))
+    bare, haunted = (load([TURN, TURN], elements=elements) for elements in ("", ghost))
     q = np.array([[0.3, -0.7]])
     args = q, 2.0 * q, 30.0 * q
     assert_array_equal(torque(haunted, *args), torque(bare, *args))
@@ -184,7 +188,7 @@ def test_moments_without_mass_are_left_out_with_a_warning():
 
 def test_undeclared_prefixes_are_a_part_of_the_name():
     text = chain_urdf(
-        [TURN], more="<sensor:camera name='x'><a:b c:d='1'/></sensor:camera>"
+        [TURN], elements="<sensor:camera name='x'><a:b c:d='1'/></sensor:camera>"
     )
     assert Robot.from_urdf("memory", urdf_text=text).n == 1
     with pytest.raises(
@@ -271,7 +275,7 @@ def test_a_lock_leaves_bodies_that_cannot_be_with_the_base():
 def test_massless_link_is_fine_where_its_body_has_mass():
     heavy_tool = "<link name='load'>" + inertial(2.0, (0.1, 0.1, 0.1)) + "</link>"
     heavy_tool += "<joint name='grip' type='fixed'><parent link='tool'/><child link='load'/></joint>"
-    robot = load([TURN, replace(TURN, inertial="")], more=heavy_tool)
+    robot = load([TURN, replace(TURN, inertial="")], elements=heavy_tool)
     assert robot.model.inertias[2].mass == 2.0
 
 
@@ -372,7 +376,7 @@ def test_missing_file_and_binary_file(tmp_path):
 def test_meshes_are_not_read():
     mesh = "<link name='shell'><visual><geometry><mesh filename='package://nowhere/none.stl'/></geometry></visual></link>"
     mesh += "<joint name='cover' type='fixed'><parent link='tool'/><child link='shell'/></joint>"
-    assert load([TURN], more=mesh).tool_frame == "shell"
+    assert load([TURN], elements=mesh).tool_frame == "shell"
 
 
 @pytest.mark.parametrize(

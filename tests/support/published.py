@@ -10,7 +10,7 @@ import pytest
 FOLDER = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/share/example-robot-data"
 
 
-def published(name: str) -> Path:
+def published_urdf(name: str) -> Path:
     """The file of a robot below the folder ``robots``."""
     path = FOLDER / "robots" / name
     if not path.is_file():

@@ -31,8 +31,8 @@ def test_planar_line(scara, joint):
 
 def test_arm_on_a_rail():
     example = brachis.examples.tx90l_rail_line
-    found = holds(brachis.plan(example, redundant_joints=["rail"], **QUICK), 3)
-    kinds = {entry.sensitivity.label.kind for entry in found.entries[:3]}
+    check = holds(brachis.plan(example, redundant_joints=["rail"], **QUICK), 3)
+    kinds = {entry.sensitivity.label.kind for entry in check.entries[:3]}
     assert kinds == {"torque", "force", "velocity"}
 
 

@@ -24,30 +24,30 @@ CARRIED = 2.0 * MASS
 def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     # t = 2 sqrt(m L / F) times a factor of the spline alone: d t / d ln F = -t / 2 exactly.
     result = slide(rest=rest, degree=degree)
-    force, *others = result.sensitivities.limits
+    force, *idle = result.sensitivities.limits
     assert str(force.label) == "j1 force"
     change = pytest.approx(-0.5 * result.solver_report.objective, rel=1e-5)
     assert force.change(1.0) == change
     assert force.derivative * FORCE == change
-    assert [entry.change(1.0) for entry in others] == [0.0] * 7
+    assert [entry.change(1.0) for entry in idle] == [0.0] * 7
     assert result.sensitivities.reliable
 
 
 def test_trapezoid(slide):
     limit = 2.0
     result = slide(intervals=40, robot={"limits": {"velocity": limit}})
-    found = result.sensitivities
+    costs = result.sensitivities
     ramp = (
         limit * CARRIED / FORCE
     )  # t = L / v + v m / F, but for the corners that a spline rounds
-    force, speed = (found.of("j1", kind).change(1.0) for kind in ("force", "velocity"))
+    force, speed = (costs.of("j1", kind).change(1.0) for kind in ("force", "velocity"))
     assert force == pytest.approx(-ramp, rel=0.1)
     assert speed == pytest.approx(ramp - LENGTH / limit, rel=0.1)
     # The same motion k times as fast needs k times the velocity and k^2 times the force.
     assert 2.0 * force + speed == pytest.approx(
         -result.solver_report.objective, rel=1e-4
     )
-    assert found.of("j1", "velocity").label.unit == "m/s"
+    assert costs.of("j1", "velocity").label.unit == "m/s"
 
 
 def test_lifting_against_gravity(slide):
@@ -190,8 +190,8 @@ def test_branch_boundary_is_told_apart(scara):
     tight = program.with_margin(0.2)
     answer = solvers_for("uno")[0].solve(tight, report.x, SolverOptions(), None)
     assert answer.objective > report.objective + 1e-4
-    found = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
-    (boundary,) = found.boundaries
+    costs = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
+    (boundary,) = costs.boundaries
     wider = solvers_for("uno")[0].solve(
         program.with_margin(0.198), answer.x, SolverOptions(), None
     )
@@ -199,7 +199,7 @@ def test_branch_boundary_is_told_apart(scara):
         answer.objective - wider.objective, rel=0.1
     )
     kinds = {"torque", "velocity", "acceleration", "position"}
-    assert {entry.label.kind for entry in found.limits} <= kinds
+    assert {entry.label.kind for entry in costs.limits} <= kinds
 
 
 @pytest.mark.parametrize("weights", [[1.0, 1e-4], [1.0, 3e-5, 7e-5]])

@@ -24,9 +24,13 @@ SCARA = ROOT / "robots/scara3/robot.urdf"
 
 @dataclass(frozen=True)
 class Outcome:
-    code: int
     out: str
     err: str
+
+    @property
+    def data(self):
+        """What was printed as JSON."""
+        return json.loads(self.out)
 
 
 @pytest.fixture(autouse=True)
@@ -37,12 +41,13 @@ def own_interrupts(rough_figures):  # noqa: ARG001
 
 @pytest.fixture
 def run(capfd):
-    def run(*words, columns=200):
-        """Run a command as it is typed, or word by word."""
+    def run(*words, code=0, columns=200):
+        """Run a command as it is typed, or word by word; it ends with this exit code."""
         command = words if len(words) != 1 else shlex.split(words[0])
-        code = code_of(*command, columns=columns)
+        exit_code = code_of(*command, columns=columns)
         streams = capfd.readouterr()
-        return Outcome(code, streams.out, streams.err)
+        assert exit_code == code, streams.err
+        return Outcome(streams.out, streams.err)
 
     return run
 

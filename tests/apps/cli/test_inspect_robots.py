@@ -4,10 +4,10 @@ import json
 import sys
 
 import pytest
+from support.published_urdf import published_urdf
 
 from brachis import ik
 from brachis.ik import registry
-from support.published import published
 
 from .conftest import ROOT
 
@@ -23,15 +23,14 @@ PUBLISHED = {
 }
 
 
-def find_published(name):
-    return published(PUBLISHED[name])
+def published_robot(name):
+    return published_urdf(PUBLISHED[name])
 
 
-def inspected(run, urdf, *options):
+def inspect_robot(run, urdf, *options):
     """Solver of every choice of redundant joints, and remarks, after a check of the rest."""
     outcome = run("inspect", urdf, *options, "--json")
-    assert outcome.code == 0, outcome.err
-    data = json.loads(outcome.out)
+    data = outcome.data
     assert len(data["joints"]) >= 2
     for row in data["decompositions"]:
         assert (row["solver"] == "-") == bool(row["why not"]), row
@@ -43,7 +42,7 @@ def inspected(run, urdf, *options):
 
 
 def decompositions(run, urdf, *options):
-    return inspected(run, urdf, *options)[0]
+    return inspect_robot(run, urdf, *options)[0]
 
 
 @pytest.mark.parametrize(
@@ -51,9 +50,8 @@ def decompositions(run, urdf, *options):
 )
 def test_every_robot_of_the_repository(run, urdf):
     choices = WITHOUT_CLOSED_FORM.get(urdf.parent.name)
-    solvers, remarks = inspected(run, urdf)
+    solvers, remarks = inspect_robot(run, urdf)
     text = run(f"inspect {urdf}")
-    assert text.code == 0
     assert (set(solvers.values()) == {"-"}) == (choices is not None)
     is_said = [ik.NO_CLOSED_FORM in words for words in (remarks, text.out)]
     assert is_said == [choices is not None] * 2
@@ -85,7 +83,7 @@ def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
 def test_redundant_joints_with_a_closed_form(run, robot, joints):
     pytest.importorskip("eaik.pybindings.EAIK")  # which comes along where it has wheels
     known = ROOT / "robots" / robot / "robot.urdf"
-    solvers = decompositions(run, known if known.exists() else find_published(robot))
+    solvers = decompositions(run, known if known.exists() else published_robot(robot))
     closed = [joint for joint, solver in solvers.items() if solver != "-"]
     assert closed == (closed if joints is None else joints)
 
@@ -93,34 +91,34 @@ def test_redundant_joints_with_a_closed_form(run, robot, joints):
 def test_iiwa_has_none_for_its_elbow(run):
     solvers = decompositions(run, "iiwa14")
     assert [joint for joint, solver in solvers.items() if solver == "-"] == ["joint_4"]
-    data = json.loads(run("inspect iiwa14 --json").out)
+    data = run("inspect iiwa14 --json").data
     assert "J_nr is singular everywhere" in data["decompositions"][3]["why not"]
 
 
 def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
     monkeypatch.setattr(registry, "_KNOWN", {})
-    panda = find_published("Panda")
-    solvers, (*_, remark) = inspected(run, panda)
+    panda = published_robot("Panda")
+    solvers, (*_, remark) = inspect_robot(run, panda)
     closed = [joint for joint, solver in solvers.items() if solver != "-"]
     assert closed == ["panda_joint4", "panda_joint7"]
     assert remark.startswith("EAIK is not installed (pip install EAIK); it might add")
     assert "[panda_joint5], [panda_joint6]; installing it needs a C++ comp" in remark
-    assert remark in run("inspect", panda).out.replace("\n", " ")
+    assert remark in run(f"inspect {panda}").out.replace("\n", " ")
 
 
 def test_inspect_names_its_choice_of_a_tool_frame(run):
-    panda = find_published("Panda")
-    _, (tool, space) = inspected(run, panda)
+    panda = published_robot("Panda")
+    _, (tool, space) = inspect_robot(run, panda)
     words = "tool frame: panda_hand, the last link before the chains to panda_leftf"
     assert tool.startswith(words)
     assert space.startswith("task space: pose")
-    assert inspected(run, panda, "--tool-frame", "panda_link8")[1] == [space]
+    assert inspect_robot(run, panda, "--tool-frame", "panda_link8")[1] == [space]
 
 
 def test_inspect_shows_the_first_of_several_arms(run):
-    baxter = find_published("Baxter")
-    data = json.loads(run("inspect", baxter, "--json").out)
+    baxter = published_robot("Baxter")
+    data = run(f"inspect {baxter} --json").data
     names = [joint["joint"] for joint in data["joints"]]
     assert names == [
         f"left_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
@@ -151,13 +149,13 @@ def test_where_the_tool_is(run):
     degrees = run("inspect scara3 --posture '90 0.1 0.1'").out
     assert "90 degrees are 1.5708 rad" in degrees
     assert "!degrees" not in degrees, "this is for task files alone"
-    assert run(f"inspect {urdf} --posture '0 0'").code == 2
-    assert "--posture" in run(f"inspect {urdf} --posture a").err
+    run(f"inspect {urdf} --posture '0 0'", code=2)
+    assert "--posture" in run(f"inspect {urdf} --posture a", code=2).err
 
 
 def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
     """Frames half way up the arm, which a rail moves as well, are no tools."""
     out = tmp_path / "ur5.urdf"
     options = "--axis 0 1 0 --range -2 2 --velocity 2 --force 2000 --mass 60"
-    assert run(f"compose {find_published('UR5')} {options} --out {out}").code == 0
+    run(f"compose {published_robot('UR5')} {options} --out {out}")
     assert decompositions(run, out)["rail"] == "parallel_axes"

@@ -14,14 +14,11 @@ def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(
         "<!doctype html>\n<!-- brachis report -->\nan older one", encoding="utf-8"
     )
     outcome = run(f"report {result} --title 'the first line'")
-    assert outcome.code == 0, outcome.err
     assert str(page) in outcome.out
     assert "MB" in outcome.out
     assert "the first line" in page.read_text(encoding="utf-8")
     page.write_text("<!doctype html><p>somebody else's", encoding="utf-8")
-    refused = run(f"report {result}")
-    assert refused.code == 2
-    assert "of another kind than the new one" in refused.err
+    assert "of another kind than the new one" in run(f"report {result}", code=2).err
     assert page.read_text(encoding="utf-8") == "<!doctype html><p>somebody else's"
 
 
@@ -34,7 +31,10 @@ def test_an_unverified_motion_is_reported_with_its_exit_code(run, result, tmp_pa
     task = trajectory.task.model_copy(update={"robot": robot})
     weak = dataclasses.replace(trajectory, task=task)
     weak.save(tmp_path / "motion.npz")
-    outcome = run(f"report {tmp_path / 'motion.npz'} --out {tmp_path / 'bad.html'}")
-    assert outcome.code == 1
-    assert "did not pass" in outcome.err
+    assert (
+        "did not pass"
+        in run(
+            f"report {tmp_path / 'motion.npz'} --out {tmp_path / 'bad.html'}", code=1
+        ).err
+    )
     assert "NOT VERIFIED" in (tmp_path / "bad.html").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
 """``brachis sweep``, with plans that cost nothing."""
 
-import json
-
 import pytest
 import yaml
 
@@ -39,7 +37,6 @@ def sweep_file(tmp_path, write, task, monkeypatch):
 def test_a_sweep_shows_its_results(run, sweep_file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = run(f"sweep {sweep_file} --verbose")
-    assert done.code == 0
     lines = done.out.splitlines()
     rows = [" ".join(line.split()) for line in lines if line.startswith("│")]
     assert rows == [
@@ -62,7 +59,7 @@ def test_a_sweep_shows_its_results(run, sweep_file, tmp_path, monkeypatch):
 
 def test_a_sweep_as_json(run, sweep_file, tmp_path):
     outcome = run(f"sweep {sweep_file} --out {tmp_path / 'out'} --json")
-    data = json.loads(outcome.out)
+    data = outcome.data
     assert (data["plans"], data["verified"], data["failed"]) == (4, 3, 1)
     assert data["best"] == {"plan": 0, "path.0.line.length": 1.0, "t_end_s": 0.5}
     assert data["failures"] == {"PathError": {"plans": 1, "message": "out of reach"}}
@@ -73,21 +70,21 @@ def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
     content = yaml.safe_load(sweep_file.read_text())
     content["grid"]["path.0.line.length"] = [4.0, 5.0]
     sweep_file.write_text(yaml.safe_dump(content))
-    done = run(f"sweep {sweep_file} --out {tmp_path / 'out'}")
-    assert done.code == 1
-    assert "2 failed with PathError" in done.out
+    assert (
+        "2 failed with PathError"
+        in run(f"sweep {sweep_file} --out {tmp_path / 'out'}", code=1).out
+    )
     assert not (tmp_path / "out/sweep.png").exists()
 
 
 def test_parts_of_a_sweep_give_one_table_by_merge(run, sweep_file, tmp_path):
     out = tmp_path / "out"
-    first = run(f"sweep {sweep_file} --part 1/2 --out {out}")
-    assert first.code == 0
-    assert "│ plans       │ 2 " in first.out
-    missing = run(f"sweep {sweep_file} --merge --out {out}")
-    assert missing.code == 2
-    assert "found no result of 2 plans: 1, 3" in missing.err
-    assert run(f"sweep {sweep_file} --part 2/2 --out {out}").code == 0
+    assert "│ plans       │ 2 " in run(f"sweep {sweep_file} --part 1/2 --out {out}").out
+    assert (
+        "found no result of 2 plans: 1, 3"
+        in run(f"sweep {sweep_file} --merge --out {out}", code=2).err
+    )
+    run(f"sweep {sweep_file} --part 2/2 --out {out}")
     assert not (out / "sweep.png").exists()
-    assert run(f"sweep {sweep_file} --merge --out {out}").code == 0
+    run(f"sweep {sweep_file} --merge --out {out}")
     assert (out / "sweep.png").exists()

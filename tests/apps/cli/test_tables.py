@@ -14,35 +14,15 @@ WIDTHS = (60, 80, 120)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
-def print_to_text(width, columns, rows, **options):
+def print_to_text(width, columns, rows):
     console = Console(width=width, highlight=False, markup=False)
     with (
         pytest.MonkeyPatch.context() as patch,
         console.capture() as capture,
     ):
         patch.setattr(output, "result_console", lambda: console)
-        print_table("title", columns, rows, **options)
+        print_table("title", columns, rows)
     return capture.get()
-
-
-NUMBERS = [f"value {i} [s]" for i in range(6)]
-COLUMNS = ("what", *NUMBERS, "remark")
-ROWS = [
-    (
-        "first thing",
-        *(f"{-1.23456 * 10**i:.5f}" for i in range(6)),
-        "a remark of many words that has to be wrapped",
-    ),
-    ("second thing", *("1.2e-13" for _ in range(6)), ""),
-]
-
-
-def test_a_table_has_lines_where_they_fit_and_parts_where_nothing_else_does():
-    assert "━" in print_to_text(200, COLUMNS, ROWS, numbers=NUMBERS)
-    narrow = print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "━" not in narrow
-    assert "title (2 of " in narrow
-    assert narrow.count("first") >= 2
 
 
 def test_long_words_of_text_are_broken_not_lost():

@@ -1,6 +1,5 @@
 """Wrong input: exit code 2, one clear message on standard error, nothing written."""
 
-import json
 import math
 import re
 from pathlib import Path
@@ -49,8 +48,7 @@ def test_a_wrong_task_is_an_error_and_nothing_is_written(
         set_key(task, key, value)
     out = tmp_path / "out"
     path = write(task)
-    outcome = run(f"plan {path} --out {out}")
-    assert outcome.code == 2, outcome.err
+    outcome = run(f"plan {path} --out {out}", code=2)
     assert outcome.out == ""
     assert outcome.err.startswith(f"brachis: {path}: ")
     assert re.search(message, outcome.err), outcome.err
@@ -71,9 +69,7 @@ def test_the_task_file_is_not_blamed_for_other_inputs(run, task, write, tmp_path
         (f"bottleneck {path} {changes}", changed),
         (f"inspect {path} --set robot.urdf={broken}", broken),
     ):
-        outcome = run(command)
-        assert outcome.code == 2
-        assert outcome.err.startswith(f"brachis: {where}: ")
+        assert run(command, code=2).err.startswith(f"brachis: {where}: ")
 
 
 def test_torque_cannot_hold_the_arm_further_along(run, task, write):
@@ -82,9 +78,10 @@ def test_torque_cannot_hold_the_arm_further_along(run, task, write):
     task["robot"]["limits"]["torque"] = [120, 60, 20]
     task["start"] = {"joints": [-math.pi / 2 - 0.2, 0.2, 0.2]}
     task["path"] = [{"line": {"to": [2.4, -1.0]}}]
-    outcome = run(f"plan {write(task)}")
-    assert outcome.code == 2, outcome.err
-    assert "cannot hold the arm against gravity from s = " in outcome.err
+    assert (
+        "cannot hold the arm against gravity from s = "
+        in run(f"plan {write(task)}", code=2).err
+    )
 
 
 def test_no_closed_form(run, task, write, tmp_path):
@@ -95,8 +92,7 @@ def test_no_closed_form(run, task, write, tmp_path):
     urdf.write_text(text.replace(f'{origin}"0 0 1"/>', f'{origin}"0 1 0"/>', 1))
     task["robot"]["urdf"] = str(urdf)
     task["start"] = {"joints": [0.1, 0.4, 0.3]}
-    outcome = run(f"plan {write(task)}")
-    assert outcome.code == 2
+    outcome = run(f"plan {write(task)}", code=2)
     assert "no closed form for redundant joints [j3]" in outcome.err
     assert (
         "planar: not planar: j2 moves out of the plane in which j1 turns" in outcome.err
@@ -110,8 +106,7 @@ def test_no_closed_form(run, task, write, tmp_path):
 @pytest.mark.parametrize("name", ["file", "motion.npz"])
 def test_a_file_cannot_be_the_output_folder(name, run, task, write, tmp_path):
     (tmp_path / "file").write_text("mine")
-    outcome = run(f"plan {write(task)} --out {tmp_path / name}")
-    assert outcome.code == 2
+    outcome = run(f"plan {write(task)} --out {tmp_path / name}", code=2)
     assert "a folder, and this is the name of a file" in outcome.err
     if name == "motion.npz":
         assert f"Write --out {tmp_path / 'motion'}" in outcome.err
@@ -121,9 +116,8 @@ def test_a_file_cannot_be_the_output_folder(name, run, task, write, tmp_path):
 
 def test_json_has_the_error_and_its_exit_code(run, task, write, tmp_path, monkeypatch):
     for arguments in (("verify", tmp_path / "gone.npz"), ("inspect", "gone.urdf")):
-        outcome = run(*arguments, "--json")
-        assert outcome.code == 2
-        data = json.loads(outcome.out)
+        outcome = run(*arguments, "--json", code=2)
+        data = outcome.data
         error = data.pop("error")
         assert outcome.err == f"brachis: {error}\n"
         expected = {"verified": False, "status": "error", "t_end": None, "exit_code": 2}
@@ -133,9 +127,8 @@ def test_json_has_the_error_and_its_exit_code(run, task, write, tmp_path, monkey
         raise PlanningError("no motion")
 
     monkeypatch.setattr("brachis.planner.plan", fail)
-    outcome = run(f"plan {write(task)} --json")
-    data = json.loads(outcome.out)
-    assert (outcome.code, data["exit_code"], data["error"]) == (1, 1, "no motion")
+    data = run(f"plan {write(task)} --json", code=1).data
+    assert (data["exit_code"], data["error"]) == (1, "no motion")
 
 
 @pytest.mark.parametrize(
@@ -171,9 +164,7 @@ def test_the_error_says_what_the_command_takes(
     (tmp_path / "README.md").write_text("`a` page\n\n```yaml\nbrachis: 1\n```\n")
     (tmp_path / "p.csv").write_text("t,j1\n0,1\n")
     monkeypatch.chdir(tmp_path)
-    outcome = run(command)
-    assert outcome.code == 2
-    assert message in outcome.err
+    assert message in run(command, code=2).err
 
 
 @pytest.mark.skipif(
@@ -184,6 +175,6 @@ def test_the_error_says_what_the_command_takes(
 def test_files_of_the_kernel_are_no_results(name, command, run, tmp_path):
     suffixes = {"export": "csv", "plot": "png"}
     out = f"--out {tmp_path / 'a'}.{suffixes[command]}" if command in suffixes else ""
-    outcome = run(f"{command} {name} {out}")
-    assert outcome.code == 2
-    assert "the file is not a brachis result" in outcome.err
+    assert (
+        "the file is not a brachis result" in run(f"{command} {name} {out}", code=2).err
+    )

@@ -47,7 +47,7 @@ def files(text):
 
 @pytest.fixture
 def arm_with_meshes(arm):
-    arm.write_text(arm_text(more=MESHES))
+    arm.write_text(arm_text(elements=MESHES))
     return arm
 
 
@@ -107,7 +107,7 @@ def test_a_composed_robot_may_have_no_meshes(arm_with_meshes):
 
 
 def test_the_rest_of_the_arm_is_kept_as_written(arm):
-    arm.write_text(arm_text(more=OTHER))
+    arm.write_text(arm_text(elements=OTHER))
     robot = parse(on_rail(arm, Rail(**RAIL)))
     before = parse(arm.read_text())
     assert robot.get("name") == "chain_rail"
@@ -121,7 +121,7 @@ def test_the_rest_of_the_arm_is_kept_as_written(arm):
         elements = (tree.find(place) for tree in (robot, before))
         texts = [etree.tostring(element, method="c14n") for element in elements]
         assert b"".join(texts[0].split()) == b"".join(texts[1].split())
-    assert [each.text for each in robot.iter(etree.Comment)] == [" a remark "]
+    assert [comment.text for comment in robot.iter(etree.Comment)] == [" a remark "]
     # The arm's own world has become the frame that stands on the carriage.
     references = [element.get("reference") for element in robot.findall("gazebo")]
     assert references == ["rail_base", "link1"]
@@ -134,7 +134,7 @@ def test_root_link_with_a_name_of_its_own_keeps_it(arm):
     arm.write_text(text.replace("'world'", "'stand'"))
     robot = parse(on_rail(arm, Rail(**RAIL)))
     assert robot.get("name") == "arm_rail", "that of its file"
-    links = {each.get("name") for each in robot.findall("link")}
+    links = {link_element.get("name") for link_element in robot.findall("link")}
     assert {"world", "rail_carriage", "stand"} <= links
     assert robot.find("joint[@name='rail_mount']/child").get("link") == "stand"
 

@@ -1,13 +1,10 @@
-import re
 import subprocess
 import sys
 
-import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
 
 from brachis.apps.plots import (
-    PLOTS,
     SUFFIXES,
     plot_motion,
     plot_torques,
@@ -49,53 +46,6 @@ def test_the_error_of_an_unknown_suffix_lists_the_known_ones(tmp_path, name):
         save_figure(Figure(), path)
     assert caught.value.where == str(path)
     assert not path.exists()
-
-
-@pytest.mark.parametrize(
-    ("fixture", "name"),
-    [
-        *(("spatial_trajectory", name) for name in sorted({*PLOTS} - {"fit"})),
-        ("line_trajectory", "overview"),  # with the picture of a planar arm
-    ],
-)
-def test_all_text_is_readable_and_inside_the_figure(fixture, name, request):
-    figure = PLOTS[name](request.getfixturevalue(fixture))
-    figure.draw_without_rendering()
-    texts = [
-        text
-        for text in figure.findobj(mpl.text.Text)
-        if text.get_visible() and text.get_text().strip()
-    ]
-    assert len(texts) > 5
-    assert min(text.get_fontsize() for text in texts) >= 6.0
-    page = figure.bbox.padded(2.0)
-    ticks = {
-        id(label)
-        for ax in figure.axes
-        for axis in ax._axis_map.values()
-        for label in axis.get_ticklabels(which="both")
-    }
-    for text in texts:
-        box = (
-            text.get_window_extent()
-        )  # tick labels beyond the view have a place but are not drawn
-        assert id(text) in ticks or (
-            page.contains(box.x0, box.y0) and page.contains(box.x1, box.y1)
-        ), text.get_text()
-
-
-def test_pdf_fonts_are_truetype_and_svg_text_is_text(saved):
-    content = saved["pdf"][0].read_bytes()
-    assert b"/CIDFontType2" in content
-    assert b"/Type3" not in content
-    content = saved["svg"][0].read_text(encoding="utf-8")
-    assert re.search(r"<text[^>]*>j1</text>", content)
-
-
-def test_joints_look_different_with_colours_and_without():
-    looks = [style.joint_style(joint) for joint in range(21)]
-    assert len({(look["color"], look["linestyle"]) for look in looks}) == 21
-    assert len({str(look["linestyle"]) for look in looks[:6]}) == 6
 
 
 def test_a_dollar_in_a_joint_name_is_no_mathematics(line_trajectory, monkeypatch):

@@ -18,9 +18,9 @@ ROBOT = brachis.robots.scara3
 def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
     t = np.linspace(0.0, 1.0, 1001)
     q = np.outer(smooth_step(t), [1.0, -1.0, 0.5])  # 3.5e-11 rad in the first ms
-    found = read_recording(write("t,j1,j2,j3", t, q), ROBOT, {})
-    assert found.t[-1] == 1.0
-    assert not any("stands still" in line for line in found.notes)
+    recording = read_recording(write("t,j1,j2,j3", t, q), ROBOT, {})
+    assert recording.t[-1] == 1.0
+    assert not any("stands still" in line for line in recording.notes)
 
 
 @pytest.mark.parametrize(

@@ -109,22 +109,22 @@ def test_bottlenecks_are_when_limits_are_active(imported):
 
 def test_few_digits_get_a_smoothing_spline(motion, table, write):
     path = write("t,j1,j2,j3", *table[:2], fmt="%.6f")
-    found = import_motion(path, task=motion.task)
+    again = import_motion(path, task=motion.task)
     assert any(
         "smoothing spline, 2.9e-07 rad (rms) off" in line
-        for line in found.recovered.told
+        for line in again.recovered.told
     )
-    assert 1e-6 < found.recovered.tolerance < 1e-5  # as the digits have it
-    assert found.t_end == pytest.approx(motion.t_end, abs=2.5 * DT)
+    assert 1e-6 < again.recovered.tolerance < 1e-5  # as the digits have it
+    assert again.t_end == pytest.approx(motion.t_end, abs=2.5 * DT)
     t = np.linspace(0.2, 2.0, 500)
 
     def error(delay):
-        return np.abs(found.position(t) - motion.position(t + delay)).max()
+        return np.abs(again.position(t) - motion.position(t + delay)).max()
 
     # The rows that were left out at the beginning are whole ones.
     delay = min((0.0, DT, 2.0 * DT), key=error)
     assert error(delay) < 2e-6
-    assert_allclose(found.acceleration(t), motion.acceleration(t + delay), atol=0.2)
+    assert_allclose(again.acceleration(t), motion.acceleration(t + delay), atol=0.2)
 
 
 @pytest.mark.parametrize("digits", [4, 5, 6, 8])
@@ -171,11 +171,11 @@ def test_rates_that_contradict_the_positions_are_left_out(motion, write):
     samples = motion.sample(DT)
     header = "t,j1,j2,j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3"
     path = write(header, samples.t, samples.q, samples.qdot, 2.0 * samples.qddot)
-    found = import_motion(path, task=motion.task)
+    again = import_motion(path, task=motion.task)
     assert any(
-        "the file's accelerations do not agree" in line for line in found.recovered.told
+        "the file's accelerations do not agree" in line for line in again.recovered.told
     )
-    assert_allclose(found.acceleration(samples.t), samples.qddot, atol=0.05)
+    assert_allclose(again.acceleration(samples.t), samples.qddot, atol=0.05)
 
 
 def test_positions_with_noise_get_a_smoothing_spline(motion, write):
@@ -216,12 +216,12 @@ def test_ends_in_motion(motion, table, write):
     middle = slice(60, -60)
     columns = (t[middle], q[middle], qdot[middle])
     path = write("t,j1,j2,j3,qd_j1,qd_j2,qd_j3", *columns)
-    found = import_motion(path, task=motion.task)
-    boundary = found.task.boundary
+    again = import_motion(path, task=motion.task)
+    boundary = again.task.boundary
     speeds = [boundary.start_speed, boundary.end_speed]
     ends = t[middle][[0, -1]]
     assert speeds == pytest.approx(motion.at(ends).tool_speed, rel=1e-6)
-    assert failures_of(found) <= {"torque ratio"}
+    assert failures_of(again) <= {"torque ratio"}
 
 
 def test_a_tool_that_stops_and_turns_off_is_an_error(motion, table, write):

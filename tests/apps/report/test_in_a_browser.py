@@ -44,7 +44,7 @@ def pixels(page):
 
 
 def test_the_slider_moves_the_robot_and_all_that_follows_it(planar_opened, planar):
-    page, said, asked = planar_opened
+    page, said, requests = planar_opened
     page.evaluate(MOVE, 0.0)
     before, first = pixels(page), page.locator("#values tbody td").all_inner_texts()
     page.evaluate(MOVE, 0.5)
@@ -58,7 +58,7 @@ def test_the_slider_moves_the_robot_and_all_that_follows_it(planar_opened, plana
     cursor = figure.locator(".cursor").bounding_box()["x"] - box["x"]
     assert 0.3 < cursor / box["width"] < 0.7
     assert said == []
-    assert asked == [page.url], "the page asked for nothing but itself"
+    assert requests == [page.url], "the page requests for nothing but itself"
 
 
 def test_it_plays_to_the_end_and_stops(planar_opened, planar):
@@ -73,7 +73,7 @@ def test_it_plays_to_the_end_and_stops(planar_opened, planar):
 
 
 def test_figures_are_there_in_dark_and_an_arm_in_space_turns(opened, weaker_page):
-    page, said, asked = opened(weaker_page, "dark")
+    page, said, requests = opened(weaker_page, "dark")
     for name in ("motion_figure", "timeline_figure"):
         assert page.locator(f"#{name} .main-svg").count() > 0
     assert page.locator("#motion_figure .scatterlayer .trace").count() > 4 * 7
@@ -86,4 +86,4 @@ def test_figures_are_there_in_dark_and_an_arm_in_space_turns(opened, weaker_page
     page.mouse.up()
     assert pixels(page) != before
     assert said == []
-    assert asked == [page.url]
+    assert requests == [page.url]

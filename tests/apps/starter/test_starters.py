@@ -13,7 +13,7 @@ from brachis.robot import bind
 from brachis.robot.limits import UrdfLimit
 from brachis.task import LimitSpec
 from support.chains import Joint, chain_urdf
-from support.published import published
+from support.published import published_urdf
 
 FOREIGN = {
     "panda_description/urdf/panda.urdf": ("panda_hand", 7),
@@ -83,7 +83,7 @@ def test_heights_are_above_the_base_wherever_it_is():
 
 @pytest.mark.parametrize("file", FOREIGN)
 def test_robots_of_others(file, tmp_path):
-    starter = starter_task(published(file), folder=tmp_path)
+    starter = starter_task(published_urdf(file), folder=tmp_path)
     check(starter, tmp_path)
     assert (starter.robot.tool_frame, starter.robot.n) == FOREIGN[file]
 

@@ -142,16 +142,16 @@ def test_retry_plans_failures_again(content, here, folder, same_as_undisturbed):
     assert [plan.task.path[0].line.length for plan in here.plans] == [9.0] * 2
 
 
-@pytest.mark.parametrize("damage", ["part", "motion", "cut"])
+@pytest.mark.parametrize("damage", ["row", "motion", "cut"])
 def test_what_is_not_stored_whole_is_planned_again(
     undisturbed, content, here, folder, damage, same_as_undisturbed
 ):
     motion = folder / undisturbed.rows()[0]["motion"]
-    part = motion.with_suffix(".parquet")
+    row = motion.with_suffix(".parquet")
     if damage == "cut":
-        part.write_bytes(part.read_bytes()[:-20])
+        row.write_bytes(row.read_bytes()[:-20])
     else:
-        (part if damage == "part" else motion).unlink()
+        (row if damage == "row" else motion).unlink()
     assert same_as_undisturbed(brachis.sweep(content, folder).table)
     assert [plan.digest for plan in here.plans] == [motion.stem]
     assert brachis.Trajectory.load(motion).t_end == pytest.approx(
@@ -252,11 +252,11 @@ def test_parts_of_a_sweep_give_one_table_by_merge(
 ):
     out = tmp_path / "out"
     lines = {}
-    for part in ("1/4", "2/4", "3/4"):
-        result = brachis.sweep(content, out, part=part)
-        lines[part] = result.table.column("plan").to_pylist()
+    for share in ("1/4", "2/4", "3/4"):
+        result = brachis.sweep(content, out, part=share)
+        lines[share] = result.table.column("plan").to_pylist()
         names = [path.name for path in result.files if path.exists()]
-        name = f"table-{part.replace('/', '-of-')}"
+        name = f"table-{share.replace('/', '-of-')}"
         assert names == [f"{name}.parquet", f"{name}.csv"]
     assert lines == {"1/4": [0, 4], "2/4": [1, 5], "3/4": [2]}
     assert len(here.plans) == 3
