@@ -111,8 +111,7 @@ def test_a_saved_motion_is_explained_without_solving_again(run, task, write, tmp
     assert {path.name for path in out.iterdir()} >= {"result.npz", "timeline.png"}
 
 
-def test_a_saved_motion_keeps_its_urdf(run, tmp_path):
-    assert (
-        "this option cannot be used with a saved motion"
-        in run(f"bottleneck {tmp_path / 'result.npz'} --urdf {SCARA}", code=2).err
+def test_a_saved_motion_keeps_its_urdf(error_of, tmp_path):
+    assert "this option cannot be used with a saved motion" in error_of(
+        f"bottleneck {tmp_path / 'result.npz'} --urdf {SCARA}"
     )

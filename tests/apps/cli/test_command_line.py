@@ -134,19 +134,19 @@ def test_a_wrong_command_line_is_one_error(
     assert not list(tmp_path.iterdir())
 
 
-def test_results_are_told_from_tasks(run, tmp_path):
+def test_results_are_told_from_tasks(error_of, tmp_path):
     for content, expected in (
         (b"PK\x03\x04", "found a result"),
         (b'{\n  "t_end": 1.0\n}', "the figures of a plan"),
     ):
         (tmp_path / "file").write_bytes(content)
-        assert expected in run(f"plan {tmp_path / 'file'}", code=2).err
+        assert expected in error_of(f"plan {tmp_path / 'file'}")
 
 
 SMALL = "--set spline.intervals=6 --set 'search={effort: single, least_motion: false}'"
 
 
-def test_set_changes_the_task(run, task, write, tmp_path):
+def test_set_changes_the_task(run, error_of, task, write, tmp_path):
     path = write(task)
     outcome = run(
         f"plan {path} {SMALL} --set path.0.line.length=0.3 --set robot.limits.torque=8 "
@@ -157,15 +157,12 @@ def test_set_changes_the_task(run, task, write, tmp_path):
     shown = run(f"inspect {path} --set robot.limits.torque=8 --json").data
     assert [joint["torque"] for joint in shown["joints"]] == ["8 Nm"] * 3
     assert "torque" in run(f"bottleneck {path} {SMALL}").out
-    assert (
-        "--set: this option cannot be used with a saved motion"
-        in run(
-            f"bottleneck {tmp_path / 'result.npz'} --set spline.intervals=6", code=2
-        ).err
+    assert "--set: this option cannot be used with a saved motion" in error_of(
+        f"bottleneck {tmp_path / 'result.npz'} --set spline.intervals=6"
     )
 
 
-def test_quiet_and_verbose_set_how_much_a_command_says(run, task, write):
+def test_quiet_and_verbose_set_how_much_a_command_says(run, error_of, task, write):
     path = write(task)
     assert run(f"plan {path} {SMALL} --quiet") == run(f"-q plan {path} {SMALL}")
     quiet = run(f"plan {path} {SMALL} --set robot.limits.velocity=1e9 -q")
@@ -182,7 +179,7 @@ def test_quiet_and_verbose_set_how_much_a_command_says(run, task, write):
         "what one command is told does not hold for the next one"
     )
     assert run(f"plan {path} {SMALL} --json --quiet").data["verified"]
-    assert "gone.yaml" in run("plan gone.yaml --quiet", code=2).err
+    assert "gone.yaml" in error_of("plan gone.yaml --quiet")
 
 
 def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
@@ -197,7 +194,7 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
     assert "Traceback" in run(f"plan {write(task)} --verbose", code=1).err
 
 
-def test_new_and_robots(run, tmp_path, monkeypatch):
+def test_new_and_robots(run, error_of, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     listed = run("robots --json").data["robots"]
     gantry = {"name": "gantry2", "what": "two linear axes"}
@@ -206,7 +203,7 @@ def test_new_and_robots(run, tmp_path, monkeypatch):
     assert data["verified"]
     assert data["file"] == "task.yaml"
     before = (tmp_path / "task.yaml").read_text()
-    assert "task.yaml: the file exists" in run("new scara3", code=2).err
+    assert "task.yaml: the file exists" in error_of("new scara3")
     assert (tmp_path / "task.yaml").read_text() == before
     run(f"plan task.yaml {SMALL}")
 

@@ -131,7 +131,7 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(
 
 
 def test_a_failure_while_writing_the_result_leaves_the_earlier_one(
-    run, task, write, planned, tmp_path, monkeypatch
+    error_of, task, write, planned, tmp_path, monkeypatch
 ):
     out = planned.copied(tmp_path / "out")
     before = contents(out)
@@ -140,15 +140,14 @@ def test_a_failure_while_writing_the_result_leaves_the_earlier_one(
         raise no_space(path)
 
     monkeypatch.setattr(folder, "write_text", fail)
-    assert (
-        f"{out / 'result.json'}: the file cannot be written; found"
-        in run(f"plan {write(task)} --out {out}", code=2).err
+    assert f"{out / 'result.json'}: the file cannot be written; found" in error_of(
+        f"plan {write(task)} --out {out}"
     )
     assert contents(out) == before
 
 
 def test_a_plan_without_a_motion_says_which_files_are_of_an_earlier_one(
-    run, task, write, planned, tmp_path
+    run, error_of, task, write, planned, tmp_path
 ):
     out = planned.copied(tmp_path / "out")
     (out / "notes.txt").write_text("mine")
@@ -163,9 +162,7 @@ def test_a_plan_without_a_motion_says_which_files_are_of_an_earlier_one(
     assert "out of reach" in error
     assert "earlier" not in outcome.out
     assert contents(out) == before
-    assert (
-        "earlier" not in run("plan", path, *far, "--out", tmp_path / "new", code=2).err
-    )
+    assert "earlier" not in error_of("plan", path, *far, "--out", tmp_path / "new")
 
 
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
@@ -336,7 +333,7 @@ def test_inspect_says_where_every_limit_holds(run, task, write):
     assert "rms torque limit: It holds as a mean over the whole motion." in text
 
 
-def test_inspect_of_a_task_shows_what_is_in_use(run, task, write):
+def test_inspect_of_a_task_shows_what_is_in_use(run, error_of, task, write):
     task["robot"] |= {
         "limits": {"torque": {"j1": [-5, 7]}, "acceleration": {"j2": 30}},
         "friction": {"viscous": {"j3": 0.25}, "rotor_inertia": 1e-4, "gear_ratio": 100},
@@ -355,7 +352,7 @@ def test_inspect_of_a_task_shows_what_is_in_use(run, task, write):
     assert data["in_use"]["speed override"] == "50 % of the joint velocity limits"
     mounting = "mounting: at [0, 0, 0] m, roll, pitch, yaw [180, 0, 0] deg"
     assert mounting in run(f"inspect {path}").out
-    assert "--lock" in run(f"inspect {path} --lock j3=0.5", code=2).err
+    assert "--lock" in error_of(f"inspect {path} --lock j3=0.5")
 
 
 WELD = ROOT / "examples/13_weld_seams.yaml"

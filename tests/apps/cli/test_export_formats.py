@@ -5,7 +5,9 @@ import json
 import brachis
 
 
-def test_the_suffix_says_the_format_unless_an_option_does(run, result, tmp_path):
+def test_the_suffix_says_the_format_unless_an_option_does(
+    run, error_of, result, tmp_path
+):
     for name, *options in (
         ("motion.parquet",),
         ("motion.yaml",),
@@ -17,13 +19,12 @@ def test_the_suffix_says_the_format_unless_an_option_does(run, result, tmp_path)
     assert (tmp_path / "motion.parquet").read_bytes().startswith(b"PAR1")
     texts = [(tmp_path / f"motion.{suffix}").read_bytes() for suffix in ("txt", "yaml")]
     assert texts[0] == texts[1]
-    assert (
-        "found suffix .dat; allowed: .csv, .parquet"
-        in run(f"export {result} --out {tmp_path / 'motion.dat'}", code=2).err
+    assert "found suffix .dat; allowed: .csv, .parquet" in error_of(
+        f"export {result} --out {tmp_path / 'motion.dat'}"
     )
 
 
-def test_some_joints(run, result, tmp_path):
+def test_some_joints(run, error_of, result, tmp_path):
     file = tmp_path / "motion.csv"
     for _ in range(2):  # over a file of its own, too
         assert (
@@ -33,13 +34,12 @@ def test_some_joints(run, result, tmp_path):
     remark, header = file.read_text().splitlines()[:2]
     assert header.startswith("t,q_j3,q_j1,qd_j3")
     assert remark.startswith("# brachis: joint j2 moves by ")
-    assert (
-        "servoj takes the angles of six joints"
-        in run(f"export {result} --out {tmp_path / 'motion.script'}", code=2).err
+    assert "servoj takes the angles of six joints" in error_of(
+        f"export {result} --out {tmp_path / 'motion.script'}"
     )
 
 
-def test_schemas_of_tasks_and_of_trajectories(run):
+def test_schemas_of_tasks_and_of_trajectories(run, error_of):
     schema = run("schema --of trajectory").data
     assert schema == json.loads(json.dumps(brachis.export.samples_schema()))
-    assert "Did you mean 'task'?" in run("schema --of tasks", code=2).err
+    assert "Did you mean 'task'?" in error_of("schema --of tasks")

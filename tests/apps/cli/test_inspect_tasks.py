@@ -67,14 +67,14 @@ def test_the_place_is_told_while_the_end_is_wrong(run, tmp_path, end):
     assert "the task cannot be planned: end.joints" in outcome.out.replace("\n", " ")
 
 
-def test_wrong_names_of_postures_and_frames(run, tmp_path):
+def test_wrong_names_of_postures_and_frames(run, error_of, tmp_path):
     file = written(tmp_path)
-    for options, said in (
-        (("--posture", "hom"), "no posture named 'hom'; allowed: home"),
-        (("--posture", "home", "--frame", "user"), "no frame named 'user'; allowed: user1"),
-        (("--frame", "user1"), "--frame: this option cannot be used with no posture"),
-    ):  # fmt: skip
-        assert said in run("inspect", file, *options, code=2).err
+    for options, message in (
+        ("--posture hom", "no posture named 'hom'; allowed: home"),
+        ("--posture home --frame user", "no frame named 'user'; allowed: user1"),
+        ("--frame user1", "--frame: this option cannot be used with no posture"),
+    ):
+        assert message in error_of(f"inspect {file} {options}")
     outcome = run("inspect iiwa14 --posture '0 0 0 0 0 0 0' --frame a", code=2)
     assert "--frame: this option cannot be used with a URDF" in outcome.err
 

@@ -83,13 +83,12 @@ def test_nothing_is_written_over_other_files(command, run, saved, monkeypatch):
 
 @pytest.mark.parametrize("name", ["overview.png", "result.npz", "result.json"])
 def test_a_folder_with_the_name_of_an_output_is_refused_before_planning(
-    name, run, saved, tmp_path, monkeypatch
+    name, error_of, saved, tmp_path, monkeypatch
 ):
     (tmp_path / name).mkdir()
     monkeypatch.setattr(brachis, "plan", lambda *_, **__: pytest.fail("it planned"))
-    assert (
-        f"{name}: the file cannot be written; found a folder"
-        in run(f"plan {saved / 'task.yaml'} --out {tmp_path}", code=2).err
+    assert f"{name}: the file cannot be written; found a folder" in error_of(
+        f"plan {saved / 'task.yaml'} --out {tmp_path}"
     )
 
 
@@ -106,23 +105,21 @@ REFUSED_AT_ONCE = [
 
 @pytest.mark.parametrize(("command", "message"), REFUSED_AT_ONCE)
 def test_a_wrong_output_is_an_error_before_any_work(
-    command, message, run, saved, tmp_path, monkeypatch
+    command, message, error_of, saved, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     Path("mine").write_text("a file")
     for heavy in (brachis.report, brachis.bottleneck):
         for name in {"make_report", "report"} & {*vars(heavy)}:
             monkeypatch.setattr(heavy, name, lambda *_, **__: pytest.fail("it worked"))
-    assert (
-        message in run(command.replace("MOTION", str(saved / "result.npz")), code=2).err
-    )
+    assert message in error_of(command.replace("MOTION", str(saved / "result.npz")))
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
-def test_a_motion_is_verified_against_an_included_robot(run, saved):
+def test_a_motion_is_verified_against_an_included_robot(run, error_of, saved):
     command = f"verify {saved / 'result.npz'} --urdf"
     run(f"{command} scara3")
-    assert "Did you mean 'scara3'?" in run(f"{command} scara4", code=2).err
+    assert "Did you mean 'scara3'?" in error_of(f"{command} scara4")
 
 
 def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
@@ -180,7 +177,7 @@ def test_closed_standard_output_is_no_fault():
 
 
 @pytest.mark.parametrize("end", ["exact", "hold"])
-def test_the_last_row(end, run, saved, tmp_path):
+def test_the_last_row(end, run, error_of, saved, tmp_path):
     table = tmp_path / "motion.csv"
     trajectory = brachis.Trajectory.load(saved / "result.npz")
     dt = trajectory.t_end / 7.5
@@ -197,7 +194,7 @@ def test_the_last_row(end, run, saved, tmp_path):
         np.testing.assert_array_equal(
             rows[-1][4:], np.zeros(9)
         )  # no gravity: nothing holds the posture
-    assert "Did you mean 'hold'?" in run(f"{command} --last held", code=2).err
+    assert "Did you mean 'hold'?" in error_of(f"{command} --last held")
 
 
 def test_a_period_longer_than_the_motion_is_warned_of(run, saved, tmp_path):

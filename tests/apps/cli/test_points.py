@@ -2,26 +2,6 @@
 
 import json
 
-import numpy as np
-import pytest
-
-from support.effort import QUICK
-
-
-@pytest.fixture
-def seam(task, write, tmp_path):
-    """A task along points that scatter by 0.02 mm, in mm with decimal commas."""
-    y = np.linspace(0.0, 600.0, 1_500)
-    x = 1732.0508 + 20.0 * np.sin(y / 100.0)
-    scatter = np.random.default_rng(5).normal(size=(2, 1_500)) * 0.02
-    rows = (
-        f"{a:.4f};{b:.4f}".replace(".", ",")
-        for a, b in zip(x + scatter[0], y + scatter[1], strict=True)
-    )
-    (tmp_path / "seam.csv").write_text("\n".join(["x_mm;y_mm", *rows]))
-    task["path"] = [{"csv": {"file": "seam.csv", "tolerance": {"position": "0.12 mm"}}}]
-    return write({**task, "start": "free", "redundant_joints": ["j1"], "search": QUICK})
-
 
 def test_inspect_reports_the_fit_of_points(run, seam):
     shown = run(f"inspect {seam}").out

@@ -76,12 +76,9 @@ def test_compare(run, recording, tmp_path):
     ],
 )
 def test_a_wrong_option_is_an_error_and_nothing_is_written(
-    run, recording, tmp_path, options, message
+    error_of, recording, tmp_path, options, message
 ):
     file, cell, _ = recording
     out = tmp_path / "today.npz"
-    assert (
-        message
-        in run("import", file, "--robot", cell, *options, "--out", out, code=2).err
-    )
+    assert message in error_of("import", file, "--robot", cell, *options, "--out", out)
     assert not out.exists()

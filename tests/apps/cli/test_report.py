@@ -6,7 +6,7 @@ import brachis
 
 
 def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(
-    run, planned, tmp_path
+    run, error_of, planned, tmp_path
 ):
     result = planned.copied(tmp_path / "out") / "result.npz"
     page = result.with_suffix(".html")
@@ -18,7 +18,7 @@ def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(
     assert "MB" in outcome.out
     assert "the first line" in page.read_text(encoding="utf-8")
     page.write_text("<!doctype html><p>somebody else's", encoding="utf-8")
-    assert "of another kind than the new one" in run(f"report {result}", code=2).err
+    assert "of another kind than the new one" in error_of(f"report {result}")
     assert page.read_text(encoding="utf-8") == "<!doctype html><p>somebody else's"
 
 

@@ -35,21 +35,6 @@ def test_long_words_of_text_are_broken_not_lost():
     assert max(map(len, text.splitlines())) <= 30
 
 
-@pytest.fixture
-def points(task, write, tmp_path):
-    """A task along points with a corner that is rounded."""
-    there = [(1.8, 0.004 * i) for i in range(100)]
-    back = [(1.8 - 0.004 * i, 0.396) for i in range(1, 100)]
-    (tmp_path / "points.csv").write_text(
-        "\n".join(["x;y", *(f"{x};{y}" for x, y in there + back)])
-    )
-    tolerance = {"position": "0.1 mm", "corner": "5 mm"}
-    task["path"] = [
-        {"csv": {"file": "points.csv", "tolerance": tolerance, "corner": "blend"}}
-    ]
-    return write({**task, "start": "free"})
-
-
 SHOWING = {
     "plan": ("plan", ROOT / "examples/01_scara_line.yaml"),
     "verify": ("verify", "RESULT"),
@@ -60,9 +45,9 @@ SHOWING = {
 
 
 @pytest.mark.parametrize("case", SHOWING)
-def test_no_command_cuts_numbers(case, run, line_result, result, points, monkeypatch):
+def test_no_command_cuts_numbers(case, run, line_result, result, seam, monkeypatch):
     monkeypatch.setattr("brachis.planner.plan", lambda *_, **__: line_result)
-    files = {"RESULT": result, "POINTS": points}
+    files = {"RESULT": result, "POINTS": seam}
     arguments = [files.get(word, word) for word in SHOWING[case]]
     texts = {width: run(*arguments, columns=width).out for width in (*WIDTHS, 200)}
     numbers = set(NUMBER.findall(texts[200]))

@@ -56,7 +56,7 @@ def test_a_wrong_task_is_an_error_and_nothing_is_written(
     assert not out.exists() or not list(out.iterdir())
 
 
-def test_the_task_file_is_not_blamed_for_other_inputs(run, task, write, tmp_path):
+def test_the_task_file_is_not_blamed_for_other_inputs(error_of, task, write, tmp_path):
     path = write(task)
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot name='x'><link")
@@ -69,18 +69,17 @@ def test_the_task_file_is_not_blamed_for_other_inputs(run, task, write, tmp_path
         (f"bottleneck {path} {changes}", changed),
         (f"inspect {path} --set robot.urdf={broken}", broken),
     ):
-        assert run(command, code=2).err.startswith(f"brachis: {where}: ")
+        assert error_of(command).startswith(f"brachis: {where}: ")
 
 
-def test_torque_cannot_hold_the_arm_further_along(run, task, write):
+def test_torque_cannot_hold_the_arm_further_along(error_of, task, write):
     # Hanging down costs no torque; the path leads to where no posture can be held.
     task["robot"]["gravity"] = [0.0, -9.81, 0.0]
     task["robot"]["limits"]["torque"] = [120, 60, 20]
     task["start"] = {"joints": [-math.pi / 2 - 0.2, 0.2, 0.2]}
     task["path"] = [{"line": {"to": [2.4, -1.0]}}]
-    assert (
-        "cannot hold the arm against gravity from s = "
-        in run(f"plan {write(task)}", code=2).err
+    assert "cannot hold the arm against gravity from s = " in error_of(
+        f"plan {write(task)}"
     )
 
 
@@ -157,14 +156,14 @@ def test_json_has_the_error_and_its_exit_code(run, task, write, tmp_path, monkey
     ],
 )
 def test_the_error_says_what_the_command_takes(
-    run, tmp_path, monkeypatch, command, message
+    error_of, tmp_path, monkeypatch, command, message
 ):
     (tmp_path / "task.yaml").write_text("brachis: 1\n")
     (tmp_path / "sweep.yaml").write_text("sweep: 1\ntask: task.yaml\n")
     (tmp_path / "README.md").write_text("`a` page\n\n```yaml\nbrachis: 1\n```\n")
     (tmp_path / "p.csv").write_text("t,j1\n0,1\n")
     monkeypatch.chdir(tmp_path)
-    assert message in run(command, code=2).err
+    assert message in error_of(command)
 
 
 @pytest.mark.skipif(
@@ -172,9 +171,7 @@ def test_the_error_says_what_the_command_takes(
 )
 @pytest.mark.parametrize("command", ["verify", "export", "plot", "report", "view"])
 @pytest.mark.parametrize("name", ["/proc/self/status", "/proc/self/mem", "/dev/zero"])
-def test_files_of_the_kernel_are_no_results(name, command, run, tmp_path):
+def test_files_of_the_kernel_are_no_results(name, command, error_of, tmp_path):
     suffixes = {"export": "csv", "plot": "png"}
     out = f"--out {tmp_path / 'a'}.{suffixes[command]}" if command in suffixes else ""
-    assert (
-        "the file is not a brachis result" in run(f"{command} {name} {out}", code=2).err
-    )
+    assert "the file is not a brachis result" in error_of(f"{command} {name} {out}")

@@ -1,7 +1,5 @@
 """What the rows of a recorded motion prove of its limits."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,9 +7,8 @@ import brachis
 from brachis.apps.comparison import bound_ratios
 from brachis.robot import dynamics
 from brachis.verify import verify_trajectory
+from support.scara import scara
 
-ROOT = Path(__file__).parents[3]
-SCARA = ROOT / "robots/scara3/robot.urdf"
 SHARES = np.array([1.0, -0.5, 0.02])
 """Of the largest velocity, acceleration and jerk, joint by joint."""
 
@@ -21,30 +18,18 @@ def import_rows(folder, digits, dt, kind, share):
     t = np.arange(0.0, 2.0 + 0.5 * dt, dt)
     if kind == "jerk":
         edges = np.array([0.0, 0.5, 1.5, 2.0])  # jerk 1, -1, 1
-        way = sum(
+        progress = sum(
             jump * np.clip(t - edge, 0.0, None) ** 3 / 6.0
             for jump, edge in zip((1, -2, 2, -1), edges, strict=True)
         )
     else:
-        way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)
+        progress = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)
     file = folder / "today.csv"
-    np.savetxt(
-        file,
-        np.column_stack([t, np.outer(way, SHARES)]),
-        delimiter=",",
-        header="t,j1,j2,j3",
-        fmt=f"%.{digits}f",
-    )
-    file.write_text(file.read_text().removeprefix("# "))
-    limits = {"torque": 1e3, "velocity": None, kind: 1.0 / share}
-    task = {
-        "brachis": 1,
-        "robot": {"urdf": str(SCARA), "gravity": [0, 0, 0], "limits": limits},
-        "start": {"joints": [0.0] * 3},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"by": [1.0, 0.0]}}],
-    }
-    return brachis.import_motion(file, task=task)
+    rows = np.column_stack([t, np.outer(progress, SHARES)])
+    header = {"header": "t,j1,j2,j3", "comments": ""}
+    np.savetxt(file, rows, delimiter=",", fmt=f"%.{digits}f", **header)
+    robot = scara({"torque": 1e3, kind: 1.0 / share})
+    return brachis.import_motion(file, robot, task_space=["x", "y"])
 
 
 def worst(trajectory, kind):

@@ -10,7 +10,7 @@ from support.chains import Joint, chain_urdf
 POSTURES = 7
 
 
-def drawn(figure, gid):
+def find_line(figure, gid):
     (line,) = [line for line in figure.axes[0].get_lines() if line.get_gid() == gid]
     return line
 
@@ -24,7 +24,7 @@ def planar_arm(q):
 def test_postures_are_the_arm_at_equidistant_times(line_trajectory):
     figure = plot_postures(line_trajectory)
     for k, t in enumerate(np.linspace(0.0, line_trajectory.t_end, POSTURES)):
-        bones = np.column_stack(drawn(figure, f"posture {k}").get_data())
+        bones = np.column_stack(find_line(figure, f"posture {k}").get_data())
         expected = np.vstack([[0.0, 0.0], planar_arm(line_trajectory.position(t))])
         corners = bones[
             np.append(True, np.linalg.norm(np.diff(bones, axis=0), axis=1) > 1e-9)
@@ -33,7 +33,7 @@ def test_postures_are_the_arm_at_equidistant_times(line_trajectory):
 
 
 def test_the_tool_path_is_the_prescribed_line(line_trajectory):
-    x, y = drawn(plot_postures(line_trajectory), "tool path").get_data()
+    x, y = find_line(plot_postures(line_trajectory), "tool path").get_data()
     assert_allclose(x, np.sqrt(3.0), atol=1e-9)
     assert_allclose([y[0], y[-1]], [0.0, 1.0], atol=1e-9)
     assert len(y) > 100
@@ -54,10 +54,10 @@ def test_a_spatial_chain_is_drawn_in_space_with_equal_scales(spatial_trajectory)
     figure = plot_postures(spatial_trajectory)
     ax = figure.axes[0]
     assert ax.name == "3d"
-    end = np.column_stack(drawn(figure, f"posture {POSTURES - 1}").get_data_3d())
+    end = np.column_stack(find_line(figure, f"posture {POSTURES - 1}").get_data_3d())
     tool = spatial_trajectory.robot.tool_placement(spatial_trajectory.q[-1]).translation
     assert_allclose(end[-1], tool, atol=1e-12)
-    path = np.column_stack(drawn(figure, "tool path").get_data_3d())
+    path = np.column_stack(find_line(figure, "tool path").get_data_3d())
     assert_allclose(path[-1], tool, atol=1e-12)
     spans = np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1)
     ratios = np.array(ax._box_aspect) / spans

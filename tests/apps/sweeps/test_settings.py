@@ -26,17 +26,16 @@ def drawn(count=1000, seed=0, **keys):
 
 
 def test_every_combination_of_grid_rows_and_draws():
-    found = changes(
+    plans = changes(
         grid={"a": [1, 2], "b": {"linear": [0.0, 1.0, 3]}},
         rows=[{"c": "x", "d": [1]}, {"c": "y"}],
         random={"count": 2, "keys": {"e": {"uniform": [0, 1]}}},
     )
-    assert len(found) == 2 * 3 * 2 * 2
-    assert list(found[0]) == ["a", "b", "c", "d", "e"]
-    assert [each["b"] for each in found[::4]] == [0.0, 0.5, 1.0] * 2
-    assert (
-        found[0]["e"] == found[2]["e"] != found[1]["e"]
-    )  # the same draws for all combinations
+    assert list(plans[0]) == ["a", "b", "c", "d", "e"]
+    assert [change["b"] for change in plans[::4]] == [0.0, 0.5, 1.0] * 2
+    draws = [change["e"] for change in plans]
+    assert draws == draws[:2] * 12, "the same draws for all combinations"
+    assert draws[0] != draws[1]
 
 
 def test_values_at_equal_ratios():
