@@ -289,9 +289,8 @@ def test_verify_against_a_weaker_robot_fails(run, task, write, tmp_path):
     brachis.plan(write(task)).trajectory.save(motion)
     weaker = tmp_path / "weaker.urdf"
     weaker.write_text(SCARA.read_text().replace('effort="10"', 'effort="9"'))
-    assert run(f"verify {motion} --urdf {weaker} --json", code=1).data[
-        "worst_ratio"
-    ] == pytest.approx(10 / 9, rel=1e-3)
+    data = run(f"verify {motion} --urdf {weaker} --json", code=1).data
+    assert data["worst_ratio"] == pytest.approx(10 / 9, rel=1e-3)
 
 
 def test_version(run):

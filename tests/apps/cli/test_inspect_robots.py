@@ -4,10 +4,10 @@ import json
 import sys
 
 import pytest
-from support.published import published_urdf
 
 from brachis import ik
 from brachis.ik import registry
+from support.published import published_urdf
 
 from .conftest import ROOT
 
