@@ -23,7 +23,10 @@ def numbers(path):
 
 
 def test_every_column_read_back_equals_the_trajectory_exactly(table, line_trajectory):
-    header, *_ = table.read_text().splitlines()
+    content = table.read_bytes()
+    assert b"\r" not in content
+    assert content.endswith(b"\n")
+    header, *_ = content.decode().splitlines()
     kinds = ("q", "qd", "qdd", "tau")
     names = [f"{kind}_{joint}" for kind in kinds for joint in ("j1", "j2", "j3")]
     assert header == ",".join(["t", *names])

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 
@@ -46,6 +47,17 @@ def test_the_error_of_an_unknown_suffix_lists_the_known_ones(tmp_path, name):
         save_figure(Figure(), path)
     assert caught.value.where == str(path)
     assert not path.exists()
+
+
+def test_pdf_fonts_are_truetype_and_svg_text_is_text(saved):
+    assert b"/CIDFontType2" in saved["pdf"][0].read_bytes()
+    text = saved["svg"][0].read_text(encoding="utf-8")
+    assert re.search(r"<text[^>]*>j1</text>", text)
+
+
+def test_joints_look_different():
+    looks = {str(style.joint_style(joint)) for joint in range(21)}
+    assert len(looks) == 21
 
 
 def test_a_dollar_in_a_joint_name_is_no_mathematics(line_trajectory, monkeypatch):

@@ -14,6 +14,10 @@ LINK = '<robot name="r"><link name="a"><visual><origin xyz="1 0 0"/><geometry>{}
 RED = '<material name="red"><color rgba="1 0 0 1"/></material>'
 
 
+def shapes_of(geometry, folder):
+    return link_shapes(LINK.format(geometry, ""), folder)
+
+
 @pytest.mark.parametrize("urdf", ROBOTS, ids=lambda path: path.parent.name)
 def test_every_shape_of_every_robot_is_read(urdf):
     text = urdf.read_text()
@@ -52,7 +56,7 @@ def test_mesh_files_of_every_form_of_name(name, tmp_path, monkeypatch):
     base = elsewhere if name.startswith("package") else folder
     assert mesh_file(name.format(folder), base).samefile(folder / "part.stl")
     mesh = f'<mesh filename="{name.format(folder)}" scale="2 2 2"/>'
-    shapes, unread = link_shapes(LINK.format(mesh, ""), folder)
+    shapes, unread = shapes_of(mesh, folder)
     assert unread == []
     np.testing.assert_allclose(np.ptp(shapes["a"][0].vertices, axis=0), [2.0, 4.0, 6.0])
 
@@ -109,13 +113,11 @@ def test_a_remark_names_a_broken_mesh(name, tmp_path):
     content, reason = BROKEN[name]
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    shapes, unread = link_shapes(
-        LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path
-    )
+    shapes, unread = shapes_of(f'<mesh filename="{name}"/>', tmp_path)
     assert shapes == {}
-    assert len(unread) == 1
-    assert reason in unread[0]
-    assert len(unread[0]) <= 500
+    (line,) = unread
+    assert reason in line
+    assert len(line) <= 500
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -127,11 +129,15 @@ def test_meshes_that_are_too_large_are_told_and_not_read(packed, tmp_path):
     else:
         with (tmp_path / name).open("wb") as stream:
             stream.truncate(4_000_000_000)  # takes no room
-    shapes, unread = link_shapes(
-        LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path
+    shapes, unread = shapes_of(f'<mesh filename="{name}"/>', tmp_path)
+    size = "200 MB" if packed else "4000 MB"
+    words = (
+        f"a: {name}: the mesh is too large to be shown; found {size}; allowed: 200 MB"
     )
-    found = "200 MB" if packed else "4000 MB"
     assert shapes == {}
-    assert unread == [
-        f"a: {name}: the mesh is too large to be shown; found {found}; allowed: 200 MB for all meshes of the robot"
-    ]
+    assert unread == [f"{words} for all meshes of the robot"]
+
+
+def test_a_remark_names_a_broken_shape(tmp_path):
+    _, (line,) = shapes_of('<box size="wide"/>', tmp_path)
+    assert line.startswith("a: ValueError")
