@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from brachis.errors import InputError
 from brachis.robot import Robot, dynamics
-from support.chains import Joint, chain_urdf, planar_robot
+from support.chains import gantry_robot, planar_robot
 
 FRICTION = {
     "armature": [0.3, 0.2, 0.1],
@@ -69,24 +69,6 @@ class RodArm:
         return cls.mass_matrix(q) @ qddot + rate @ qdot - kinetic + np.array(pull)
 
 
-def test_scara_joint_names_and_forward_kinematics(scara_urdf):
-    robot = Robot.from_urdf(scara_urdf)
-    assert robot.joint_names == ("j1", "j2", "j3")
-    assert robot.tool_frame == "tool"
-    assert np.all(np.isinf(robot.limits.position_upper))
-    assert_array_equal(robot.limits.torque, [10.0] * 3)
-    for q in np.random.default_rng(0).uniform(-7.0, 7.0, (20, 3)):
-        theta = np.cumsum(q)
-        placement = robot.tool_placement(q)
-        assert_allclose(
-            placement.translation,
-            [np.cos(theta).sum(), np.sin(theta).sum(), 0.0],
-            atol=1e-14,
-        )
-        tool = placement.rotation[:, 0]
-        assert_allclose(tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14)
-
-
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
 def test_scara_is_three_slender_rods(scara_urdf, gravity):
     robot = Robot.from_urdf(scara_urdf, gravity=[0.0, -gravity, 0.0])
@@ -107,10 +89,8 @@ def test_friction_formula():
     armature, viscous = np.array([0.3, 0.2, 0.1]), np.array([4.0, 0.0, 2.0])
     expected = armature * qddot + viscous * qdot + 5.0 * np.tanh(qdot / 0.4)
     assert np.abs(expected).min() > 0.0
-    added = dynamics.torque(robot, q, qdot, qddot) - dynamics.torque(
-        rigid, q, qdot, qddot
-    )
-    assert_allclose(added, expected, atol=1e-12)
+    torques = [dynamics.torque(arm, q, qdot, qddot) for arm in (robot, rigid)]
+    assert_allclose(torques[0] - torques[1], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -146,18 +126,11 @@ def test_coulomb_derivative_is_finite_far_from_rest():
 
 
 def test_one_joint_alone():
-    robot = Robot.from_urdf(
-        "one",
-        urdf_text=chain_urdf(
-            [Joint("prismatic", axis=(1.0, 0.0, 0.0))], tool=(0.1, 0.0, 0.0)
-        ),
-    )
-    q, qdot, qddot = states(1)
-    assert_allclose(dynamics.torque(robot, q, qdot, qddot), 2.0 * qddot, atol=1e-12)
-    assert_allclose(
-        dynamics.torque_derivatives(robot, q, qdot, qddot).qddot,
-        np.full((12, 1, 1), 2.0),
-    )
+    robot = gantry_robot([(1.0, 0.0, 0.0)])
+    state = states(1)
+    assert_allclose(dynamics.torque(robot, *state), 2.0 * state[2], atol=1e-12)
+    derivatives = dynamics.torque_derivatives(robot, *state)
+    assert_allclose(derivatives.qddot, np.full((12, 1, 1), 2.0))
 
 
 @pytest.mark.parametrize(

@@ -32,12 +32,10 @@ def with_limit(limits=None, **changes):
     [
         (FROM_URDF, [80.0, 70.0, 60.0]),
         (12.5, [12.5, 12.5, 12.5]),
-        ([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]),
         ((1.0, None, FROM_URDF), [1.0, INF, 60.0]),
         (np.array([1.0, 2.0, 3.0]), [1.0, 2.0, 3.0]),
         (np.float32(12.5), [12.5, 12.5, 12.5]),
         ({"j2": np.int64(5)}, [80.0, 5.0, 60.0]),
-        ({"j2": 5.0}, [80.0, 5.0, 60.0]),
         ({"j3": None, "j1": 7}, [7.0, 70.0, INF]),
         (None, [INF, INF, INF]),
     ],
@@ -55,7 +53,6 @@ def test_forms_of_a_limit(value, expected):
         ({"j1": [-1.0, 1.0], "j3": None}, [-1.0, -3.0, -INF], [1.0, 2.9, INF]),
         ([[-1.0, 1.0], None, FROM_URDF], [-1.0, -INF, -3.0], [1.0, INF, 2.9]),
         (np.array([[-1.0, 1.0]] * 3), [-1.0] * 3, [1.0] * 3),
-        ({"j2": np.array([-1.0, 1.0])}, [-3.0, -1.0, -3.0], [2.9, 1.0, 2.9]),
     ],
     ids=str,
 )
@@ -88,12 +85,11 @@ def test_scale_comes_last():
     ],
 )
 def test_limit_of_the_urdf_that_is_not_positive(changes, kind):
-    with pytest.raises(LimitError) as caught:
+    key = f"robot.limits.{kind}.j2"
+    words = f"{kind} limit in the URDF is not positive.*Set {key} in the task file"
+    with pytest.raises(LimitError, match=words) as caught:
         with_limit(**changes)
-    assert caught.value.joint == "j2"
-    assert caught.value.key == f"robot.limits.{kind}.j2"
-    assert f"{kind} limit in the URDF is not positive" in str(caught.value)
-    assert f"Set robot.limits.{kind}.j2 in the task file" in str(caught.value)
+    assert (caught.value.joint, caught.value.key) == ("j2", key)
 
 
 @pytest.mark.parametrize("factors", [2.0, "half", [1.0]])
@@ -138,11 +134,10 @@ def test_a_limit_that_scaling_would_mend_is_an_error():
 
 
 def test_neither_torque_nor_acceleration():
-    with pytest.raises(LimitError) as caught:
+    with pytest.raises(LimitError, match="neither a torque nor an accel") as caught:
         limits_of(torque={"j2": None})
     assert caught.value.joint == "j2"
     assert caught.value.key == "robot.limits.acceleration.j2 or robot.limits.torque.j2"
-    assert "neither a torque nor an acceleration limit" in str(caught.value)
     assert limits_of(torque={"j2": None}, acceleration={"j2": 5.0}).torque[1] == INF
     with pytest.raises(LimitError) as caught:
         limits_of(torque=None)
@@ -151,21 +146,20 @@ def test_neither_torque_nor_acceleration():
 
 @pytest.mark.parametrize("effort", [None, 0.0])
 def test_urdf_without_effort(effort):
-    with pytest.raises(
-        LimitError, match="neither a torque nor an acceleration limit"
-    ) as caught:
+    words = (
+        "neither a torque nor an acceleration.*an effort of 0 in the URDF is no limit"
+    )
+    with pytest.raises(LimitError, match=words) as caught:
         with_limit(effort=effort)
     assert caught.value.joint == "j2"
-    assert "an effort of 0 in the URDF is no limit" in str(caught.value)
     loose = with_limit(effort=effort, limits={"acceleration": {"j2": 5.0}})
     assert loose.limits.torque[1] == INF
 
 
 def test_unknown_joint_with_suggestion():
-    with pytest.raises(UnknownNameError) as caught:
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'j2'\?") as caught:
         limits_of(velocity={"j22": 1.0})
     assert caught.value.where == "robot.limits.velocity"
-    assert "Did you mean 'j2'?" in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration", "position"])
@@ -173,15 +167,15 @@ def test_wrong_length(kind):
     value = [[-1.0, 1.0]] * 2 if kind == "position" else [1.0, 2.0]
     with pytest.raises(InputError) as caught:
         limits_of(**{kind: value})
-    assert (
-        f"robot.limits.{kind}: the list has the wrong number of values; found 2; allowed: 3"
-        in str(caught.value)
-    )
+    message = f"robot.limits.{kind}: the list has the wrong number of values"
+    assert str(caught.value).startswith(f"{message}; found 2; allowed: 3")
 
 
-def test_empty_range():
+def test_an_empty_range_of_the_urdf_or_the_task_is_an_error():
     with pytest.raises(LimitError, match="position range is empty"):
         with_limit(lower=1.0, upper=0.5)
+    with pytest.raises(LimitError, match="position range is empty"):
+        limits_of(position={"j1": [0.5, 0.5 + 1e-12]})
 
 
 def test_coulomb_friction_that_no_torque_overcomes_is_an_error():
@@ -189,23 +183,22 @@ def test_coulomb_friction_that_no_torque_overcomes_is_an_error():
     with pytest.raises(InputError, match="Coulomb friction of joint 'j2' is not below"):
         planar_robot("RR", friction=friction)
     strong = LimitSpec(torque={"j2": 100.0})
-    assert (
-        planar_robot("RR", friction=friction, limits=strong).friction.coulomb[1] == 90.0
-    )
+    robot = planar_robot("RR", friction=friction, limits=strong)
+    assert robot.friction.coulomb[1] == 90.0
 
 
-@pytest.mark.parametrize("value", [1e-308, 1e-7, 1e13, 1e300])
+@pytest.mark.parametrize("value", [1e-308, 1e-7, 1e13])
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
 def test_limits_that_no_drive_has_are_errors(kind, value):
-    with pytest.raises(
-        LimitError, match=f"{kind} limit is too small or too large; found"
-    ) as caught:
+    words = (
+        f"{kind} limit is too small or too large; found .* 1e-06 to 1e.12 in SI units"
+    )
+    with pytest.raises(LimitError, match=words) as caught:
         limits_of(**{kind: {"j3": value}})
     assert caught.value.key == f"robot.limits.{kind}.j3"
-    assert "1e-06 to 1e+12 in SI units" in str(caught.value)
 
 
-@pytest.mark.parametrize("factor", [1e-308, 1e-9, 1e12, 1e308])
+@pytest.mark.parametrize("factor", [1e-9, 1e12, 1e308])
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
 def test_scaled_limits_that_no_drive_has_are_errors(kind, factor):
     with pytest.raises(
@@ -227,11 +220,10 @@ def test_limits_at_the_bounds_are_taken():
 @pytest.mark.parametrize("pair", [[-1e7, 1.0], [None, 1e10]])
 def test_ranges_that_end_too_far_away_are_errors(pair):
     with pytest.raises(
-        LimitError, match="position range is too far from zero"
+        LimitError, match=r"position range is too far from zero.*null for an open end"
     ) as caught:
         limits_of(position={"j1": pair})
     assert caught.value.key == "robot.limits.position.j1"
-    assert "null for an open end" in str(caught.value)
 
 
 @pytest.mark.parametrize("pair", [[0.2, 1e300], [None, 1e16]])
@@ -240,17 +232,11 @@ def test_ranges_that_a_task_cannot_state_are_errors(pair):
         limits_of(position={"j1": pair})
 
 
-def test_a_range_of_no_width_is_empty():
-    with pytest.raises(LimitError, match="position range is empty"):
-        limits_of(position={"j1": [0.5, 0.5 + 1e-12]})
-
-
 @pytest.mark.parametrize(
     ("friction", "where"),
     [
         ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
         ({"armature": 1e300}, "robot.friction.armature.j1"),
-        ({"viscous": float("inf")}, "robot: friction.viscous"),
     ],
 )
 def test_friction_that_no_drive_has_is_an_error(friction, where):
@@ -273,11 +259,6 @@ def test_positions_and_gravity_that_no_robot_has_are_errors():
     [
         ({"j2": [-5.0, 7.0]}, [-80.0, -5.0, -60.0], [80.0, 7.0, 60.0]),
         ([[-5.0, 7.0], 9.0, None], [-5.0, -9.0, -INF], [7.0, 9.0, INF]),
-        (
-            np.array([[-1.0, 2.0], [-3.0, 4.0], [-5.0, 6.0]]),
-            [-1.0, -3.0, -5.0],
-            [2.0, 4.0, 6.0],
-        ),
     ],
     ids=str,
 )

@@ -87,15 +87,10 @@ def test_axes_armature_gravity_and_joints_of_two_coordinates():
     assert robot.friction.armature.tolist() == [0.5, 0.0, 2.0, 0.1, 0.2]
     assert robot.friction.viscous.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert robot.limits.position_lower.tolist() == [-np.inf, -2.0, -2.0, -np.inf, -1.0]
-    other = brachis.Robot.from_pinocchio(
-        model,
-        "tip",
-        limits={"torque": 1e6},
-        gravity=[0, 0, 0],
-        friction={"armature": 0},
-    )
-    assert not other.friction.armature.any()
-    assert not other.model.gravity.linear.any()
+    options = {"gravity": [0, 0, 0], "friction": {"armature": 0}}
+    free = brachis.Robot.from_pinocchio(model, "tip", limits={"torque": 1e6}, **options)
+    assert not free.friction.armature.any()
+    assert not free.model.gravity.linear.any()
 
 
 def test_a_rotor_replaces_the_armature_of_the_model():

@@ -74,17 +74,9 @@ def test_the_virtual_joint_has_no_inertia_and_no_limits():
         dynamics.torque(fixed, q[:, :-1], qdot[:, :-1], qddot[:, :-1]),
         rtol=1e-12,
     )
-    limits = robot.limits
-    assert np.isinf(
-        [
-            limits.torque[-1],
-            limits.velocity[-1],
-            limits.acceleration[-1],
-            limits.power[-1],
-            limits.rms_torque[-1],
-            limits.position_upper[-1],
-        ]
-    ).all()
+    kinds = "torque velocity acceleration power rms_torque position_upper"
+    for kind in kinds.split():
+        assert np.isinf(getattr(robot.limits, kind)[-1])
 
 
 def test_a_posture_may_leave_the_virtual_joint_out():

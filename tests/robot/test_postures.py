@@ -22,13 +22,12 @@ SCARA = brachis.robots.scara3
     ids=lambda posture: type(posture).__name__,
 )
 def test_the_tool_of_a_posture(posture):
-    expected = np.cumsum([0.1, 0.2, 0.3])
+    theta = np.cumsum([0.1, 0.2, 0.3])
     placement = SCARA.tool_placement(posture)
-    np.testing.assert_allclose(
-        placement.translation[:2],
-        [np.cos(expected).sum(), np.sin(expected).sum()],
-        atol=1e-12,
-    )
+    expected = [np.cos(theta).sum(), np.sin(theta).sum(), 0.0]
+    np.testing.assert_allclose(placement.translation, expected, atol=1e-14)
+    tool = [np.cos(theta[2]), np.sin(theta[2]), 0.0]
+    np.testing.assert_allclose(placement.rotation[:, 0], tool, atol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -39,15 +38,11 @@ def test_the_tool_of_a_posture(posture):
         ({"j1": 0.0}, "no position for j2, j3"),
         ([0.0, 0.0, None], "no position for j3"),
         (["a", 0.0, 0.0], "a joint position is not a number"),
-        ([0.0, 0.0, 1j], "a joint position is not a number"),
         ("abc", "wrong type"),
-        (b"abc", "wrong type"),
         ({0.1}, "wrong type"),
-        (None, "wrong type; found None"),
         (1.0, "wrong type; found 1.0"),
         ([[0.0, 0.0, 0.0]], "found 1; allowed: 3"),
         ([0.0, 0.0, [0.0, 1.0]], "a joint position is not a number"),
-        (np.zeros((3, 3)), "wrong type"),
         (np.array(1.0), "wrong type"),
     ],
     ids=str,

@@ -11,7 +11,6 @@ from support.spatial import rail_arm
 CASES = [
     ("RPRC", "xy", ["x", "y", "yaw"]),
     ("RPRC", "xz", ["x", "z", "pitch"]),
-    ("RPRC", "xz", ["z", "x", "pitch"]),
     ("RPRC", "xz", ["z", "pitch"]),
     ("RRRC", "xy", ["z", "x", "y", "yaw"]),
     ("RRP", "tilted", ["x", "y", "z"]),
@@ -84,17 +83,8 @@ def check_derivatives(task_map, q, qdot, qddot):
     assert_allclose(
         exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7
     )
-    assert (
-        min(
-            np.abs(part).max()
-            for part in (
-                exact.velocity_q,
-                exact.acceleration_q,
-                exact.acceleration_qdot,
-            )
-        )
-        > 0.1
-    )
+    for derivative in (exact.velocity_q, exact.acceleration_q, exact.acceleration_qdot):
+        assert np.abs(derivative).max() > 0.1
 
 
 @pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)

@@ -15,17 +15,19 @@ TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
 TEXT = chain_urdf(
     [TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), rpy=(0.1, 0.2, 0.3))],
     tool=(0.3, 0.0, 0.0),
-    more="<link name='aside'>" + INERTIAL.format(mass=1.5) + "</link>"
+    elements="<link name='aside'>" + INERTIAL.format(mass=1.5) + "</link>"
     "<joint name='flap' type='revolute'><parent link='link1'/><child link='aside'/><origin xyz='0.1 0.2 0.3'/>"
     "<axis xyz='0 1 1'/><limit lower='0.3' upper='0.9' effort='10' velocity='1'/></joint>",
 )
 
 
+def read(text, **options):
+    return Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", **options)
+
+
 def message_of(text):
     with pytest.raises(UrdfError) as caught:
-        Robot.from_urdf(
-            "file.urdf", urdf_text=text, tool_frame="tool", limits=LimitSpec(torque=1.0)
-        )
+        read(text, limits=LimitSpec(torque=1.0))
     return str(caught.value)
 
 
@@ -65,11 +67,9 @@ def test_what_is_no_finite_number_is_refused_with_its_place(old, new, words, bad
     ("old", "new", "unit"),
     [
         ('value="2.0"', 'value="1,5"', "a finite number of at most 1e+12 in size, kg"),
-        ("effort='60.0'", "effort='10 Nm'", "a finite number, Nm or N"),
+        ('value="2.0"', 'value="1e13"', "at most 1e+12 in size, kg"),
         ("effort='60.0'", "effort='10Nm'", "a finite number, Nm or N"),
-        ("effort='60.0'", "effort='1e999'", "a finite number, Nm or N"),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", "3 finite numbers"),
-        ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0,0 0,0 1,0'/>", "a direction"),
         (
             "xyz='0.4 0.0 0.0'",
             "xyz='0.4m 0.0m 0.0m'",
@@ -98,16 +98,13 @@ def test_missing_and_repeated_figures():
     assert "3 finite numbers" in message_of(
         replace_once("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'")
     )
-    assert "at most 1e+12" in message_of(
-        replace_once('<mass value="2.0"/>', '<mass value="1e13"/>')
-    )
 
 
 def test_numbers_that_do_not_count_are_not_read():
     plugin = "<gazebo reference='base'><kp>a lot</kp></gazebo><transmission name='t'><joint name='j1'/></transmission>"
     shape = "<link name='base'><visual><origin xyz='1,5'/><geometry><box size='big'/></geometry></visual>"
     text = replace_once("<link name='base'/>", f"{plugin}{shape}</link>")
-    assert Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool").n == 2
+    assert read(text).n == 2
 
 
 @pytest.mark.parametrize(
@@ -115,9 +112,7 @@ def test_numbers_that_do_not_count_are_not_read():
     [TEXT, planar_urdf("RPC", "tilted")],
 )
 def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
-    robot = Robot.from_urdf(
-        "file.urdf", urdf_text=text, tool_frame="tool", locked_joints={}
-    )
+    robot = read(text)
     bodies = read_dynamics(
         read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool"
     ).bodies
@@ -130,10 +125,10 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
         assert bodies[0].links == ("link1", "aside")
         assert bodies[0].mass == 3.5
         # The held flap counts where it is held: another position is another body.
-        other = read_dynamics(
+        moved = read_dynamics(
             read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool"
         ).bodies
-        assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
+        assert np.abs(moved[0].com - bodies[0].com).max() > 1e-3
 
 
 def test_long_chains_are_summed_up_without_recursion():
@@ -150,10 +145,8 @@ def test_the_error_names_ghost_links():
     message = message_of(
         replace_once("<parent link='link1'/>", "<parent link='ghost'/>")
     )
-    assert (
-        "the parent of joint 'j2' is not a link of the robot; found ghost; allowed: world, base, "
-        in message
-    )
+    words = "the parent of joint 'j2' is not a link of the robot; found"
+    assert f"{words} ghost; allowed: world, base, " in message
     assert message.endswith("Add <link name='ghost'/>")
     assert "Did you mean 'link1'?" in message_of(
         replace_once("<parent link='link1'/>", "<parent link='lnik1'/>")
@@ -161,10 +154,8 @@ def test_the_error_names_ghost_links():
     assert "the child of joint 'j2' is not a link of the robot" in message_of(
         replace_once("<child link='link2'/>", "<child link='ghost'/>")
     )
-    assert (
-        "the parent of joint 'j2' is not a link of the robot; found no name"
-        in message_of(replace_once("<parent link='link1'/>", ""))
-    )
+    message = message_of(replace_once("<parent link='link1'/>", ""))
+    assert f"{words} no name" in message
 
 
 def test_the_error_names_xacro():
@@ -172,7 +163,7 @@ def test_the_error_names_xacro():
     declared = replace_once(
         "<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" '
     )
-    assert Robot.from_urdf("file.urdf", urdf_text=declared, tool_frame="tool").n == 2
+    assert read(declared).n == 2
     for text in (
         replace_once("</robot>", include + "</robot>", declared),
         replace_once("</robot>", include + "</robot>"),
@@ -214,33 +205,25 @@ def test_names_and_types(old, new, words):
     assert words in message_of(replace_once(old, new))
 
 
-def test_joints_may_have_the_names_of_links():
-    plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
-    for name in ("tool_mount", "mount", "flap", "j2"):
-        text = replace_once(f"name='{name}'", "name='aside'")
-        robot = Robot.from_urdf(
-            "file.urdf", urdf_text=text, tool_frame="tool", locked_joints={}
-        )
-        assert [inertia.mass for inertia in robot.model.inertias] == [
-            inertia.mass for inertia in plain.model.inertias
-        ]
+@pytest.mark.parametrize("name", ["tool_mount", "mount", "flap", "j2"])
+def test_joints_may_have_the_names_of_links_elsewhere(name):
+    robot = read(replace_once(f"name='{name}'", "name='aside'"))
+    expected = [inertia.mass for inertia in read(TEXT).model.inertias]
+    assert [inertia.mass for inertia in robot.model.inertias] == expected
 
 
 def test_a_joint_with_the_name_of_the_world_is_an_error():
-    text = replace_once("name='j1'", "name='universe'")
-    with pytest.raises(UrdfError, match=r"'universe'.*Rename the joint"):
-        Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool")
+    message = message_of(replace_once("name='j1'", "name='universe'"))
+    assert "'universe'" in message
+    assert "Rename the joint" in message
 
 
 @pytest.mark.parametrize("link", ["base", "link1", "tool"])
 def test_joints_and_links_may_share_their_names(link):
     text = TEXT.replace("name='j1'", f"name='{link}'")
-    own = {"urdf_text": text, "tool_frame": "tool"}
-    robot = Robot.from_urdf("file.urdf", **own)
-    plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
+    robot = read(text)
     q = np.array([0.3, -0.4])
-    placed = robot.tool_placement(q).homogeneous
-    assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
-    held = Robot.from_urdf("f.urdf", **own, locked_joints={robot.joint_names[0]: 0.3})
-    placed = held.tool_placement(q[1:]).homogeneous
-    assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
+    expected = read(TEXT).tool_placement(q)
+    assert robot.tool_placement(q).isApprox(expected, 1e-14)
+    locked = read(text, locked_joints={robot.joint_names[0]: 0.3})
+    assert locked.tool_placement(q[1:]).isApprox(expected, 1e-14)

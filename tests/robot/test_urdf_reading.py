@@ -1,6 +1,7 @@
 """URDF to chain: what is read, what is locked, and what is refused in which words."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -35,10 +36,10 @@ GRIPPER = """
 
 
 def load(joints, **options):
-    more = options.pop("more", "")
+    elements = options.pop("elements", "")
     return Robot.from_urdf(
         "file.urdf",
-        urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0), more=more),
+        urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0), elements=elements),
         **options,
     )
 
@@ -51,12 +52,9 @@ def test_forward_kinematics_are_those_of_the_file():
     assert (model.nq, model.nv) == (4, 3)
     data, frame = model.createData(), model.getFrameId("tool")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3)):
-        pin.framesForwardKinematics(
-            model, data, np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
-        )
-        assert_allclose(
-            robot.tool_placement(q).homogeneous, data.oMf[frame].homogeneous, atol=1e-14
-        )
+        full = np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
+        pin.framesForwardKinematics(model, data, full)
+        assert robot.tool_placement(q).isApprox(data.oMf[frame], 1e-14)
 
 
 def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
@@ -69,40 +67,37 @@ def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
 
 
 def test_the_chain_carries_the_mass_of_a_gripper_beside_it():
-    bare, loaded = (
-        load([TURN, TURN]),
-        load([TURN, TURN], tool_frame="palm", more=GRIPPER),
-    )
+    bare = load([TURN, TURN])
+    loaded = load([TURN, TURN], tool_frame="palm", elements=GRIPPER)
     assert loaded.joint_names == ("j1", "j2")
-    carried = [
-        sum(i.mass for i in list(robot.model.inertias)[1:]) for robot in (bare, loaded)
-    ]
-    assert carried == pytest.approx([4.0, 5.0])
+    masses = [sum(i.mass for i in robot.model.inertias) for robot in (bare, loaded)]
+    assert masses == pytest.approx([4.0, 5.0])
     # The finger is held at the end of its range nearest to zero, or where the user says.
-    levers = {}
-    single = GRIPPER.replace("<mimic joint='finger'/>", "")
-    for held in (0.02, 0.05):
-        locked = None if held == 0.02 else {"finger": held}
-        robot = load([TURN, TURN], tool_frame="palm", more=single, locked_joints=locked)
-        levers[held] = robot.model.inertias[2].mass * robot.model.inertias[2].lever
-    assert_allclose(levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14)
+    options = {"tool_frame": "palm", "elements": re.sub("<mimic .*?/>", "", GRIPPER)}
+    moments = []
+    for locked in (None, {"finger": 0.05}):
+        robot = load([TURN, TURN], locked_joints=locked, **options)
+        inertia = robot.model.inertias[2]
+        moments.append(inertia.mass * inertia.lever)
+    change = moments[1] - moments[0]
+    assert_allclose(change, [0.0, 0.5 * (0.05 - 0.02), 0.0], atol=1e-14)
 
 
 def test_branching_urdf_needs_a_tool_frame():
     with pytest.raises(
         UrdfError, match="2 links without children: finger1, finger2"
     ) as caught:
-        load([TURN, TURN], more=GRIPPER)
+        load([TURN, TURN], elements=GRIPPER)
     assert "robot.tool_frame" in str(caught.value)
 
 
 def test_a_loop_of_links_beside_the_tree_is_an_error():
-    loop = "<link name='a'/><link name='b'/>" + "".join(
-        f"<joint name='{parent}{child}' type='fixed'><parent link='{parent}'/><child link='{child}'/></joint>"
-        for parent, child in ("ab", "ba")
+    loop = (
+        "<link name='a'/><joint name='aa' type='fixed'><parent link='a'/>"
+        "<child link='a'/></joint>"
     )
-    with pytest.raises(UrdfError, match="a loop of links: a, b"):
-        load([TURN], more=loop)
+    with pytest.raises(UrdfError, match=r"not form one tree.*a loop of links: a"):
+        load([TURN], elements=loop)
 
 
 def test_a_joint_without_an_axis_is_an_error():
@@ -121,19 +116,6 @@ def test_the_last_link_before_the_chains_part():
     )
 
 
-def test_a_locked_joint_is_followed_by_its_mimic():
-    robot = load(
-        [TURN], more=GRIPPER, tool_frame="tool", locked_joints={"finger": 0.03}
-    )
-    same = load(
-        [TURN],
-        more=GRIPPER,
-        tool_frame="tool",
-        locked_joints={"finger": 0.03, "follower": 0.03},
-    )
-    assert list(robot.model.inertias) == list(same.model.inertias)
-
-
 @pytest.mark.parametrize("order", ["abc", "cba"])
 def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
     mimics = {
@@ -141,47 +123,47 @@ def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
         "b": "<mimic joint='c' multiplier='0.5' offset='0.1'/>",
         "c": "",
     }
-    more = "".join(
+    elements = "".join(
         f"<link name='finger_{name}'>{INERTIAL.format(mass=0.5)}</link>"
         f"<joint name='{name}' type='prismatic'><parent link='tool'/><child link='finger_{name}'/>"
         "<axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
         f"{mimics[name]}</joint>"
         for name in order
     )
-    options = {"more": more, "tool_frame": "tool"}
-    followed = load([TURN], locked_joints={"c": 0.3}, **options)
-    free = more
-    for mimic in mimics.values():
-        free = free.replace(mimic, "") if mimic else free
+    follower = load(
+        [TURN], elements=elements, tool_frame="tool", locked_joints={"c": 0.3}
+    )
+    free = re.sub("<mimic .*?/>", "", elements)
     locked = {"a": -0.5, "b": 0.25, "c": 0.3}
-    given = load([TURN], more=free, tool_frame="tool", locked_joints=locked)
-    for own, other in zip(followed.model.inertias, given.model.inertias, strict=True):
-        assert_allclose(own.lever, other.lever, atol=1e-14)
+    expected = load([TURN], elements=free, tool_frame="tool", locked_joints=locked)
+    inertias = (robot.model.inertias for robot in (follower, expected))
+    for inertia, known in zip(*inertias, strict=True):
+        assert_allclose(inertia.lever, known.lever, atol=1e-14)
 
 
 def test_a_joint_that_mimics_itself_is_an_error():
-    more = GRIPPER.replace("mimic joint='finger'", "mimic joint='follower'")
+    elements = GRIPPER.replace("mimic joint='finger'", "mimic joint='follower'")
     with pytest.raises(UrdfError, match="mimic each other in a loop; found follower"):
-        load([TURN], more=more, tool_frame="tool")
+        load([TURN], elements=elements, tool_frame="tool")
 
 
 def test_a_mimic_locked_elsewhere_is_an_error():
     message = r"'follower' mimics 'finger', which is locked at 0\.03 m; found 0\.01 m; allowed: 0\.03 m"
     locked = {"finger": 0.03, "follower": 0.01}
     with pytest.raises(UrdfError, match=message):
-        load([TURN], more=GRIPPER, tool_frame="tool", locked_joints=locked)
+        load([TURN], elements=GRIPPER, tool_frame="tool", locked_joints=locked)
 
 
 def test_a_joint_beside_the_chain_that_follows_it_stands_still():
-    more = GRIPPER.replace("joint='finger'", "joint='j1'")
-    robot = load([TURN, TURN], tool_frame="palm", more=more)
+    elements = GRIPPER.replace("joint='finger'", "joint='j1'")
+    robot = load([TURN, TURN], tool_frame="palm", elements=elements)
     assert robot.joint_names == ("j1", "j2")
     assert robot.model.inertias[2].mass == 3.0  # with both fingers
     assert of_robot(robot) == ()
 
 
 def test_a_follower_on_the_chain_is_an_error_with_a_lock_too():
-    mimic = Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<mimic joint='j1'/>")
+    mimic = replace(TURN, extra="<mimic joint='j1'/>")
     with pytest.raises(UrdfError, match="joint 'j2' mimics 'j1'"):
         load([TURN, mimic, TURN], locked_joints={"j2": 0.0})
 
@@ -189,7 +171,7 @@ def test_a_follower_on_the_chain_is_an_error_with_a_lock_too():
 def test_moments_without_mass_are_left_out_with_a_warning():
     ghost = f"<link name='ghost'>{inertial(0.0, (0.1, 0.1, 0.1))}</link>"
     ghost += "<joint name='fix' type='fixed'><parent link='tool'/><child link='ghost'/></joint>"
-    bare, haunted = (load([TURN, TURN], more=more) for more in ("", ghost))
+    bare, haunted = (load([TURN, TURN], elements=elements) for elements in ("", ghost))
     q = np.array([[0.3, -0.7]])
     args = q, 2.0 * q, 30.0 * q
     assert_array_equal(torque(haunted, *args), torque(bare, *args))
@@ -201,7 +183,7 @@ def test_moments_without_mass_are_left_out_with_a_warning():
 
 def test_undeclared_prefixes_are_a_part_of_the_name():
     text = chain_urdf(
-        [TURN], more="<sensor:camera name='x'><a:b c:d='1'/></sensor:camera>"
+        [TURN], elements="<sensor:camera name='x'><a:b c:d='1'/></sensor:camera>"
     )
     assert Robot.from_urdf("memory", urdf_text=text).n == 1
     with pytest.raises(
@@ -233,10 +215,8 @@ def test_a_missing_range_comes_from_the_task_or_is_an_error():
         ranged = load(
             [joint], limits=LimitSpec(torque=1.0, position={"j1": [-3.0, 2.0]})
         )
-        assert (ranged.limits.position_lower[0], ranged.limits.position_upper[0]) == (
-            -3.0,
-            2.0,
-        )
+        limits = ranged.limits
+        assert (limits.position_lower[0], limits.position_upper[0]) == (-3.0, 2.0)
     assert load([Joint("continuous", limit={"effort": 1.0, "velocity": 1.0})]).n == 1
 
 
@@ -261,10 +241,6 @@ def inertial(mass, moments):
     [
         ("", "found 0 kg in the links that are moved by j2 (tool, link2);"),
         (
-            inertial(0.0, (0.0, 0.0, 0.0)),
-            "the URDF has no masses, which are needed for robot.limits.torque",
-        ),
-        (
             inertial(0.0, (0.1, 0.1, 0.1)),
             "the URDF has no masses, which are needed for robot.limits.torque",
         ),
@@ -276,20 +252,16 @@ def inertial(mass, moments):
             inertial(1.0, (0.1, 0.1, 0.3)),
             "link 'link2' has a non-physical inertia; found principal moments 0.1, 0.1, 0.3",
         ),
-        (inertial(1.0, (-0.1, 0.1, 0.1)), "link 'link2' has a non-physical inertia"),
     ],
 )
 def test_bodies_that_cannot_be(text, words):
     with pytest.raises(UrdfError) as caught:
-        load([TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text)])
+        load([TURN, replace(TURN, inertial=text)])
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "text", [inertial(-1.0, (0.1, 0.1, 0.1)), inertial(1.0, (0.1, 0.1, 0.3))]
-)
-def test_a_lock_leaves_bodies_that_cannot_be_with_the_base(text):
-    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial=text), TURN]
+def test_a_lock_leaves_bodies_that_cannot_be_with_the_base():
+    joints = [replace(TURN, inertial=inertial(1.0, (0.1, 0.1, 0.3))), TURN]
     with pytest.raises(UrdfError, match=r"lock .*j1 with robot\.locked_joints"):
         load(joints)
     assert load(joints, locked_joints={"j1": 0.1}).joint_names == ("j2",)
@@ -298,9 +270,7 @@ def test_a_lock_leaves_bodies_that_cannot_be_with_the_base(text):
 def test_massless_link_is_fine_where_its_body_has_mass():
     heavy_tool = "<link name='load'>" + inertial(2.0, (0.1, 0.1, 0.1)) + "</link>"
     heavy_tool += "<joint name='grip' type='fixed'><parent link='tool'/><child link='load'/></joint>"
-    robot = load(
-        [TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial="")], more=heavy_tool
-    )
+    robot = load([TURN, replace(TURN, inertial="")], elements=heavy_tool)
     assert robot.model.inertias[2].mass == 2.0
 
 
@@ -330,35 +300,24 @@ def test_base_frame_that_is_not_above_the_tool():
 
 
 def test_base_frame_in_the_middle_holds_what_lies_before_it():
-    whole, part = load([TURN, TURN, TURN]), load([TURN, TURN, TURN], base_frame="link1")
-    assert part.joint_names == ("j2", "j3")
+    robot = load([TURN, TURN, TURN])
+    upper = load([TURN, TURN, TURN], base_frame="link1")
+    assert upper.joint_names == ("j2", "j3")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
-        held = whole.tool_placement(np.array([0.0, *q]))
-        assert_allclose(
-            part.tool_placement(q).homogeneous, held.homogeneous, atol=1e-14
-        )
+        assert upper.tool_placement(q).isApprox(robot.tool_placement([0.0, *q]), 1e-14)
 
 
 def test_locked_joint_on_the_chain():
-    whole, part = (
-        load([TURN, TURN, TURN]),
-        load([TURN, TURN, TURN], locked_joints={"j2": 0.7}),
-    )
-    assert part.joint_names == ("j1", "j3")
-    zero = np.zeros(3)
-    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
-        full = np.array([q[0], 0.7, q[1]])
-        assert_allclose(
-            part.tool_placement(q).homogeneous,
-            whole.tool_placement(full).homogeneous,
-            atol=1e-14,
-        )
-        held = pin.rnea(whole.model, whole.model.createData(), full, zero, zero)[[0, 2]]
-        assert_allclose(
-            pin.rnea(part.model, part.model.createData(), q, zero[:2], zero[:2]),
-            held,
-            atol=1e-12,
-        )
+    robot = load([TURN, TURN, TURN])
+    locked = load([TURN, TURN, TURN], locked_joints={"j2": 0.7})
+    assert locked.joint_names == ("j1", "j3")
+    postures = np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2))
+    full = np.insert(postures, 1, 0.7, axis=1)
+    for q, q_full in zip(postures, full, strict=True):
+        assert locked.tool_placement(q).isApprox(robot.tool_placement(q_full), 1e-14)
+    expected = torque(robot, full, 0.0 * full, 0.0 * full)[:, [0, 2]]
+    still = 0.0 * postures
+    assert_allclose(torque(locked, postures, still, still), expected, atol=1e-12)
 
 
 def test_a_locked_joint_has_to_be_within_its_range():
@@ -412,7 +371,7 @@ def test_missing_file_and_binary_file(tmp_path):
 def test_meshes_are_not_read():
     mesh = "<link name='shell'><visual><geometry><mesh filename='package://nowhere/none.stl'/></geometry></visual></link>"
     mesh += "<joint name='cover' type='fixed'><parent link='tool'/><child link='shell'/></joint>"
-    assert load([TURN], more=mesh).tool_frame == "shell"
+    assert load([TURN], elements=mesh).tool_frame == "shell"
 
 
 @pytest.mark.parametrize(

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import sysconfig
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from brachis.robot import Robot, bind
 from support.chains import Joint, chain_urdf
+from support.published import published_urdf
 
 X, Y, Z = np.eye(3)
 SLIDE = {"lower": -5.0, "upper": 5.0, "velocity": 1.0, "effort": 50.0}
@@ -51,10 +49,8 @@ class Arm:
     @property
     def mirrored(self) -> Arm:
         """The same arm held at its tool."""
-        steps = tuple(np.linalg.inv(step) for step in reversed(self.steps))
-        return Arm(
-            self.letters[::-1], tuple(-axis for axis in reversed(self.axes)), steps
-        )
+        steps = tuple(np.linalg.inv(self.steps[::-1]))
+        return Arm(self.letters[::-1], tuple(-np.array(self.axes[::-1])), steps)
 
     def with_slide(self, place: int, axis: Sequence[float]) -> Arm:
         """Put a slide before the joint at a place."""
@@ -73,19 +69,12 @@ class Arm:
         """Change the senses of the joints, and turn or move what follows a joint by an offset."""
         steps = list(self.steps)
         for i, offset in enumerate(offsets):
-            turned = self.letters[i] == "R"
-            turn = (
-                placement(rotation=Rotation.from_rotvec(offset * self.axes[i]))
-                if turned
-                else np.eye(4)
-            )
-            shift = np.eye(4) if turned else placement(offset * self.axes[i])
-            steps[i + 1] = turn @ shift @ steps[i + 1]
-        return Arm(
-            self.letters,
-            tuple(s * axis for s, axis in zip(signs, self.axes, strict=True)),
-            tuple(steps),
-        )
+            move = offset * self.axes[i]
+            turn = placement(rotation=Rotation.from_rotvec(move))
+            change = turn if self.letters[i] == "R" else placement(move)
+            steps[i + 1] = change @ steps[i + 1]
+        axes = (s * axis for s, axis in zip(signs, self.axes, strict=True))
+        return Arm(self.letters, tuple(axes), tuple(steps))
 
     def robot(self, mount: np.ndarray | None = None) -> Robot:
         """Robot with joints j1, j2, ..."""
@@ -93,13 +82,11 @@ class Arm:
         for letter, axis, step in zip(
             self.letters, self.axes, self.steps, strict=False
         ):
-            kind, limit = (
-                ("revolute", Joint("revolute").limit)
-                if letter == "R"
-                else ("prismatic", SLIDE)
-            )
+            direction = tuple(axis.tolist())
             joints.append(
-                Joint(kind, axis=tuple(axis.tolist()), limit=limit, **_origin(step))
+                Joint("revolute", direction, **_origin(step))
+                if letter == "R"
+                else Joint("prismatic", direction, limit=SLIDE, **_origin(step))
             )
         joints.append(Joint("fixed", limit=None, **_origin(self.steps[-1])))
         base = None if mount is None else Joint("fixed", limit=None, **_origin(mount))
@@ -139,9 +126,8 @@ def on_random_rail(arm: Arm, seed: int) -> Robot:
     rng = np.random.default_rng(seed)
     arm = arm.with_slide(0, rng.normal(size=3))
     mount = placement(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=seed))
-    return arm.with_senses_and_zeros(
-        rng.choice([-1, 1], 7), rng.uniform(-3.0, 3.0, 7)
-    ).robot(mount)
+    signs = rng.choice([-1, 1], 7)
+    return arm.with_senses_and_zeros(signs, rng.uniform(-3.0, 3.0, 7)).robot(mount)
 
 
 def rolling(arm: Arm) -> Robot:
@@ -162,12 +148,6 @@ def generic(letters: str = "RRRRRR", first: int = 1) -> Arm:
 
 
 def example_robot(name: str) -> Robot:
-    """A UR arm of example-robot-data, where that is installed."""
-    share = (
-        Path(sysconfig.get_path("purelib"))
-        / "cmeel.prefix/share/example-robot-data/robots"
-    )
-    path = share / f"ur_description/urdf/{name}_robot.urdf"
-    if not path.exists():
-        pytest.skip("example-robot-data is not installed")
+    """A UR arm of example-robot-data."""
+    path = published_urdf(f"ur_description/urdf/{name}_robot.urdf")
     return Robot.from_urdf(path, tool_frame="tool0")

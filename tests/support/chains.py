@@ -23,6 +23,8 @@ PLANES: dict[str, Vector] = {
 }
 """Roll, pitch and yaw by which the xy-plane becomes each plane."""
 
+KINDS = {"R": "revolute", "C": "continuous", "P": "prismatic"}
+LIMIT_KEYS = ("lower", "upper", "velocity", "effort")
 INERTIAL = """
     <inertial>
       <origin xyz="0.21 0.02 0.01" rpy="0.1 0.2 0.3"/>
@@ -56,33 +58,22 @@ def chain_urdf(
     *,
     tool: Vector = ZERO,
     mount: Joint | None = None,
-    more: str = "",
+    elements: str = "",
 ) -> str:
     """Joints j1, j2, ... that move link1, link2, ..., from the link ``base`` to the link ``tool``.
 
-    ``base`` hangs fixed below ``world`` as `mount` says; `more` is put in before the end of the URDF.
+    ``base`` hangs fixed below ``world`` as `mount` says; `elements` is put in before the end of the URDF.
     """
-    parts = [
-        "<robot name='chain'>",
-        "<link name='world'/>",
-        "<link name='base'/>",
-        "<link name='tool'/>",
-    ]
+    parts = ["<robot name='chain'>"]
+    parts += [f"<link name='{name}'/>" for name in ("world", "base", "tool")]
     parts.append(_joint("mount", mount or Joint("fixed", limit=None), "world", "base"))
     for i, joint in enumerate(joints, start=1):
         parts.append(f"<link name='link{i}'>{joint.inertial}</link>")
-        parts.append(
-            _joint(f"j{i}", joint, f"link{i - 1}" if i > 1 else "base", f"link{i}")
-        )
-    parts.append(
-        _joint(
-            "tool_mount",
-            Joint("fixed", xyz=tool, limit=None),
-            f"link{len(joints)}",
-            "tool",
-        )
-    )
-    return "\n".join([*parts, more, "</robot>"])
+        parent = f"link{i - 1}" if i > 1 else "base"
+        parts.append(_joint(f"j{i}", joint, parent, f"link{i}"))
+    tool_joint = Joint("fixed", xyz=tool, limit=None)
+    parts.append(_joint("tool_mount", tool_joint, f"link{len(joints)}", "tool"))
+    return "\n".join([*parts, elements, "</robot>"])
 
 
 def _joint(name: str, joint: Joint, parent: str, child: str) -> str:
@@ -91,11 +82,8 @@ def _joint(name: str, joint: Joint, parent: str, child: str) -> str:
     if joint.kind != "fixed":
         text += f"<axis xyz='{_numbers(joint.axis)}'/>"
     if joint.limit is not None:
-        text += (
-            "<limit "
-            + " ".join(f"{key}='{value!r}'" for key, value in joint.limit.items())
-            + "/>"
-        )
+        figures = " ".join(f"{key}='{value!r}'" for key, value in joint.limit.items())
+        text += f"<limit {figures}/>"
     return f"{text}{joint.extra}</joint>"
 
 
@@ -115,38 +103,15 @@ def planar_urdf(pattern: str, plane: str = "xy") -> str:
             "rpy": (0.0, 0.0, 0.15 * i),
             "inertial": INERTIAL.format(mass=3.0 - 0.4 * i),
         }
+        angle = 0.4 + 0.9 * i
         if letter == "P":
-            angle = 0.4 + 0.9 * i
-            limit = {
-                "lower": -1.1,
-                "upper": 1.3,
-                "velocity": 1.5 + 0.1 * i,
-                "effort": 150.0 - 10.0 * i,
-            }
-            joints.append(
-                Joint(
-                    "prismatic",
-                    axis=(np.cos(angle), np.sin(angle), 0.0),
-                    limit=limit,
-                    **common,
-                )
-            )
+            axis = (np.cos(angle), np.sin(angle), 0.0)
+            figures = (-1.1, 1.3, 1.5 + 0.1 * i, 150.0 - 10.0 * i)
         else:
-            kind = "revolute" if letter == "R" else "continuous"
-            limit = {
-                "lower": -3.0,
-                "upper": 2.9,
-                "velocity": 3.0 + 0.1 * i,
-                "effort": 80.0 - 10.0 * i,
-            }
-            joints.append(
-                Joint(
-                    kind,
-                    axis=(0.0, 0.0, -1.0 if i == 1 else 1.0),
-                    limit=limit,
-                    **common,
-                )
-            )
+            axis = (0.0, 0.0, -1.0 if i == 1 else 1.0)
+            figures = (-3.0, 2.9, 3.0 + 0.1 * i, 80.0 - 10.0 * i)
+        limit = dict(zip(LIMIT_KEYS, figures, strict=True))
+        joints.append(Joint(KINDS[letter], axis, limit=limit, **common))
     mount = Joint("fixed", xyz=(0.1, -0.2, 0.3), rpy=PLANES[plane], limit=None)
     return chain_urdf(joints, tool=(0.33, 0.04, 0.01), mount=mount)
 
@@ -161,10 +126,8 @@ def planar_robot(pattern: str, plane: str = "xy", **options: Any) -> Robot:
 def gantry_robot(axes: Sequence[Vector], **options: Any) -> Robot:
     """Prismatic joints along `axes`, which need not be perpendicular."""
     limit = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": 50.0}
-    text = chain_urdf(
-        [Joint("prismatic", axis=axis, limit=limit) for axis in axes],
-        tool=(0.1, 0.2, 0.3),
-    )
+    joints = [Joint("prismatic", axis, limit=limit) for axis in axes]
+    text = chain_urdf(joints, tool=(0.1, 0.2, 0.3))
     return Robot.from_urdf("gantry", urdf_text=text, **options)
 
 

@@ -45,7 +45,7 @@ class Bench:
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
         self.targets = self.space.values(self.q)
         self.jacobian = self.space.jacobian(self.space.twists(self.q))
-        self.turning = np.array([unit == "rad" for unit in robot.position_units])
+        self.turning = robot.revolute
         self.angles = np.array([unit == "rad" for unit in self.space.units])
 
     def decompositions(self) -> Iterator[tuple[tuple[int, ...], bool]]:
@@ -87,7 +87,8 @@ class Bench:
     ) -> TriedDecomposition:
         """Hold a closed form to its promises; `distinct_roots` is how many answers geometry allows."""
         candidate = self.find(redundant, families)
-        solver, rest, q = candidate.solver, self.rest(redundant), self.q
+        solver, q = candidate.solver, self.q
+        joints = self.rest(redundant)
         assert solver is not None
         answers = solver.solve(self.targets, q[:, list(redundant)])
         assert answers.shape == (len(q), len(solver.branches), 1, self.space.m)
@@ -103,7 +104,7 @@ class Bench:
         sample, branch = np.nonzero(finite)
         assert len(sample) >= len(q) - 1
         postures = q[sample].copy()
-        postures[:, rest] = answers[sample, branch]
+        postures[:, joints] = answers[sample, branch]
         # A slide that runs almost along the circle it has to meet goes far: positions are good to their own size.
         size = 1.0 + np.abs(np.where(self.turning, 0.0, postures)).max(axis=1)
         assert (self.miss(postures, self.targets[sample]) / size).max() < 1e-8
@@ -112,7 +113,7 @@ class Bench:
         margins = margins_of(solver, q)
         if margins.shape[2] == 0:  # the closed form is linear with a constant matrix
             assert np.ptp(determinant) < 1e-9 * scale
-            own = np.zeros(len(q), dtype=int)
+            label = np.zeros(len(q), dtype=int)
         else:
             assert margins.shape == (len(q), 2, 1)
             ratio = margins[:, 0, 0] / determinant
@@ -121,8 +122,10 @@ class Bench:
             assert 0.05 < np.abs(margins).max() < 20.0, (
                 "margins are of the order of one"
             )
-            own = np.argmax(margins[:, :, 0], axis=1)
-        back = wrap(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
+            label = np.argmax(margins[:, :, 0], axis=1)
+        back = wrap(
+            answers[np.arange(len(q)), label] - q[:, joints], self.turning[joints]
+        )
         slack = 1e-9 * scale / np.abs(determinant)
         assert np.all(np.abs(back).max(axis=1)[regular] < slack[regular]), (
             "the posture's own branch gives another posture"

@@ -25,9 +25,7 @@ class Bench:
         self.robot, self.redundant = robot, list(redundant)
         self.space = task_map_of(robot, rows)
         self.rest = [i for i in range(robot.n) if i not in redundant]
-        self.turning = np.array([unit == "rad" for unit in robot.position_units])[
-            self.rest
-        ]
+        self.turning = robot.revolute[self.rest]
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
         self.solver = family.build(
             ChainGeometry.of(robot), self.space, tuple(redundant)
@@ -67,10 +65,8 @@ class Bench:
         ways = np.where(self.turning, 0.0, postures[:, self.rest])
         size = 1.0 + np.abs(ways).max(axis=1)
         targets = self.targets(self.q)[sample]
-        miss = np.abs(self.space.difference(self.targets(postures), targets)).max(
-            axis=1
-        )
-        assert (miss / size).max() < 1e-8
+        miss = np.abs(self.space.difference(self.targets(postures), targets))
+        assert (miss.max(axis=1) / size).max() < 1e-8
         return sample, branch, postures
 
     def margins(self, q):
@@ -95,16 +91,14 @@ class Bench:
         )
         inside = (margins > 0.0).all(axis=2)
         assert np.all(inside.sum(axis=1) == 1), "a posture is in exactly one branch"
-        own = np.argmax(inside, axis=1)
-        assert set(own) == set(range(len(self.solver.branches)))
+        label = np.argmax(inside, axis=1)
+        assert set(label) == set(range(len(self.solver.branches)))
         product = np.abs(margins[:, 0]).prod(axis=1)
-        gap = self.distance(solved[np.arange(len(own)), own], self.q)
+        gap = self.distance(solved[np.arange(len(label)), label], self.q)
         assert (gap * product)[product > 1e-6].max() < 1e-10
         for b in range(len(self.solver.branches)):
-            assert (
-                self.solver.branch_margins(postures[branch == b], b).min(initial=np.inf)
-                > -1e-7
-            )
+            margin = self.solver.branch_margins(postures[branch == b], b)
+            assert margin.min(initial=np.inf) > -1e-7
 
         determinant = self.determinant(self.q)
         ratio = determinant[product > 1e-4] / margins[product > 1e-4, 0].prod(axis=1)
@@ -122,9 +116,8 @@ class Bench:
         rng, t = np.random.default_rng(11), np.linspace(0.0, 1.0, 2001)[:, None]
         n, changes, followed = self.robot.n, 0, 0
         for _ in range(4):
-            sway = rng.uniform(0.5, 2.0, n) * np.sin(
-                2.0 * np.pi * t * rng.uniform(0.3, 1.0, n)
-            )
+            amplitude = rng.uniform(0.5, 2.0, n)
+            sway = amplitude * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
             q = rng.uniform(-2.0, 2.0, n) + sway
             postures = self.answers(q)
             for branch in range(postures.shape[1]):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.testing import assert_allclose
 
 from brachis.ik import find
 from brachis.kinematics import ChartMap, ClosedFormMap, JointDerivatives
@@ -14,7 +15,7 @@ from brachis.path import build_path
 from brachis.problem.feasibility import branch_of
 from brachis.robot import Robot, task_map_of
 from brachis.robot.limits import MAGNITUDES
-from brachis.task import load_task
+from brachis.task import ToolLimits, load_task
 
 PLANAR: dict[str, Any] = {
     "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
@@ -41,10 +42,7 @@ def arc_path(
     tool = robot.tool_placement(np.array(start, dtype=float)).translation[
         ["xyz".index(row) for row in rows[:2]]
     ]
-    arc = {
-        "center": (tool + np.array([0.12, -0.1])).tolist(),
-        "angle_deg": angle_deg,
-    }
+    arc = {"center": np.add(tool, [0.12, -0.1]).tolist(), "angle_deg": angle_deg}
     return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
 
 
@@ -58,21 +56,14 @@ def joint_map(
     """Decomposition on the branch of the start posture; the path's segments as a task file writes them."""
     start = np.array(start, dtype=float)
     space = task_map_of(robot, rows)
-    asked = rows if isinstance(rows, str) else list(rows)
+    content = {"brachis": 1, "start": {"joints": [0]}, "path": list(path)}
     task = load_task(
-        {
-            "brachis": 1,
-            "start": {"joints": [0]},
-            "task_space": asked,
-            "path": list(path),
-        }
+        {**content, "task_space": rows if isinstance(rows, str) else list(rows)}
     )
     curve = build_path(task.path, space.value(start), space.rows)
     candidate = find(robot, space, redundant)
     branch = branch_of(space, candidate, start, "start.joints")
-    indices = tuple(
-        robot.joint_names.index(name) for name in candidate.redundant_joints
-    )
+    indices = tuple(map(robot.joint_names.index, candidate.redundant_joints))
     assert candidate.solver is not None
     return ClosedFormMap(space, curve, candidate.solver, indices, branch, start)
 
@@ -88,18 +79,13 @@ class Sway:
         """Return y and three derivatives at times t in [0, 1], each (K, 1 + r)."""
 
         def swing(rate: float, phase: float) -> np.ndarray:
-            return np.array(
-                [
-                    rate**order * np.sin(rate * t + phase + order * np.pi / 2.0)
-                    for order in range(4)
-                ]
-            )
+            order = np.arange(4.0)[:, None]
+            return rate**order * np.sin(rate * t + phase + order * np.pi / 2.0)
 
         value = np.array([1.0, 0.0, 0.0, 0.0])[:, None]
         columns = [0.5 * value + 0.5 * swing(np.pi, -np.pi / 2.0)]
-        for place, q in enumerate(
-            self.joint_map.coordinates(0.0, self.joint_map.start)[1:]
-        ):
+        start = self.joint_map.coordinates(0.0, self.joint_map.start)
+        for place, q in enumerate(start[1:]):
             columns.append(q * value + self.amplitude * swing(2.0 + place, 0.0))
         return tuple(np.stack(columns, axis=2))
 
@@ -111,18 +97,18 @@ def check_time_derivatives(motion: Any, t: np.ndarray, exact: float) -> None:
     before, here, after = (
         joint_map.postures(motion(t + step)[0]) for step in (-h, 0.0, h)
     )
-    np.testing.assert_allclose(state.q, here, atol=exact)
+    assert_allclose(state.q, here, atol=exact)
     speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
     assert np.abs(speed).max() > 0.1
     assert np.abs(bend).max() > 0.1
-    np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
-    np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+    assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
+    assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
     before, after = (
         joint_map.state(*motion(t + step), near=here).qddot for step in (-h, h)
     )
     jerk = (after - before) / (2.0 * h)
     assert np.abs(jerk).max() > 0.1
-    np.testing.assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
+    assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
 
 
 def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
@@ -134,7 +120,7 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
     def difference(place: int, column: int) -> list[np.ndarray]:
         sides = []
         for sign in (1.0, -1.0):
-            moved = [part.copy() for part in parts]
+            moved = [curve.copy() for curve in parts]
             moved[place][:, column] += sign * h
             sides.append(joint_map.state(*moved))
         names = ("q", "qdot", "qddot", "qdddot")
@@ -163,14 +149,12 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             (3.0 * exact.qdot_y[:, :, column], by_yddot[3]),
             (3.0 * exact.qddot_y[:, :, column], by_ydot[3]),
         ):
-            np.testing.assert_allclose(
+            assert_allclose(
                 value, expected, atol=2e-7 * max(1.0, np.abs(expected).max())
             )
         # A difference of differences, where the highest derivatives of a chart's splines have corners at its knots.
-        value, expected = state.qdddot_y[:, :, column], by_y[3]
-        np.testing.assert_allclose(
-            value, expected, atol=2e-6 * max(1.0, np.abs(expected).max())
-        )
+        atol = 2e-6 * max(1.0, np.abs(by_y[3]).max())
+        assert_allclose(state.qdddot_y[:, :, column], by_y[3], atol=atol)
     return exact
 
 
@@ -180,6 +164,12 @@ def with_limits(trajectory, **limits):
     magnitudes = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
     changed = replace(robot.limits.with_magnitudes(**magnitudes), **limits)
     return replace(trajectory, robot=replace(robot, limits=changed))
+
+
+def with_tool_speed(trajectory, speed):
+    """The motion of a task with this limit on the tool's speed."""
+    limits = {"tool_limits": ToolLimits(speed=speed)}
+    return replace(trajectory, task=trajectory.task.model_copy(update=limits))
 
 
 def motion_between(motion, robot, q, **parts):

@@ -51,24 +51,10 @@ def phase_of(
     )
     robot = planar_robot(pattern, "xz", friction=friction, limits=limits)
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
-    path = [
-        {
-            "spline": {
-                "through": [point[: len(rows)] for point in through],
-                "relative": True,
-            }
-        }
-    ]
-    (phase,) = program_of(
-        robot,
-        rows,
-        path,
-        start,
-        redundant,
-        end=end,
-        tool_limits=TOOL_LIMITS,
-        **settings,
-    ).phases
+    points = [point[: len(rows)] for point in through]
+    path = [{"spline": {"through": points, "relative": True}}]
+    settings |= {"end": end, "tool_limits": TOOL_LIMITS}
+    (phase,) = program_of(robot, rows, path, start, redundant, **settings).phases
     return phase
 
 

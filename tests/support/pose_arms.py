@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import sysconfig
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 from brachis.robot import Robot, bind
 from support.chains import Joint, chain_urdf
+from support.published import published_urdf
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 BACK, DOWN = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
@@ -25,19 +22,15 @@ IIWA_TOOL = (0.0, 0.0, 1.306)
 
 def chain(joints, tool):
     """Robot whose joints have these axes and positions at the zero posture; a slide says so in a third entry."""
-    parts, before = [], np.zeros(3)
-    for axis, position, *slide in joints:
-        step = tuple((np.array(position) - before).tolist())
-        parts.append(
-            Joint("prismatic", axis=axis, xyz=step, limit=SLIDE)
-            if slide
-            else Joint("revolute", axis, step)
-        )
-        before = np.array(position)
-    return Robot.from_urdf(
-        "chain",
-        urdf_text=chain_urdf(parts, tool=tuple((np.array(tool) - before).tolist())),
-    )
+    points = np.array([(0.0, 0.0, 0.0), *(joint[1] for joint in joints), tool])
+    *steps, last = (tuple(step) for step in np.diff(points, axis=0).tolist())
+    chain_joints = [
+        Joint("prismatic", axis, step, limit=SLIDE)
+        if slide
+        else Joint("revolute", axis, step)
+        for (axis, _, *slide), step in zip(joints, steps, strict=True)
+    ]
+    return Robot.from_urdf("chain", urdf_text=chain_urdf(chain_joints, tool=last))
 
 
 def iiwa():
@@ -74,14 +67,14 @@ def panda_lengths():
 
 def rail_arm():
     """Spherical wrist on an ortho-parallel base, on a rail."""
-    points = [
-        (0.0, 0.0, 0.4),
-        (0.05, 0.0, 0.4),
-        (0.07, 0.05, 0.9),
-        (0.09, 0.05, 1.0),
-        (0.09, 0.05, 1.4),
+    arm = [
+        (Z, (0.0, 0.0, 0.4)),
+        (Y, (0.05, 0.0, 0.4)),
+        (Y, (0.07, 0.05, 0.9)),
+        (Z, (0.09, 0.05, 1.0)),
+        (Y, (0.09, 0.05, 1.4)),
+        (Z, (0.09, 0.05, 1.4)),
     ]
-    arm = list(zip((Z, Y, Y, Z, Y, Z), [*points, points[-1]], strict=True))
     return chain([(Y, (0.0, 0.0, 0.0), "slide"), *arm], (0.14, 0.03, 1.5))
 
 
@@ -114,31 +107,17 @@ def gen3():
 def iiwa_by_angles(quarter):
     """The iiwa with every axis along its frame's z, as URDF exporters write it: turned by quarters to and fro."""
     turns = (0.0, -quarter, quarter, quarter, -quarter, -quarter, quarter)
-    steps = [
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.36),
-        (0.0, -0.21, 0.0),
-        (0.0, 0.0, 0.21),
-        (0.0, 0.2, 0.0),
-        (0.0, 0.0, 0.2),
-    ]
-    steps.append((0.0, -0.05, 0.0))
+    along_y = (0.0, 0.0, -0.21, 0.0, 0.2, 0.0, -0.05)
+    along_z = (0.0, 0.36, 0.0, 0.21, 0.0, 0.2, 0.0)
     joints = [
-        Joint("revolute", xyz=xyz, rpy=(turn, 0.0, 0.0))
-        for turn, xyz in zip(turns, steps, strict=True)
+        Joint("revolute", xyz=(0.0, y, z), rpy=(turn, 0.0, 0.0))
+        for turn, y, z in zip(turns, along_y, along_z, strict=True)
     ]
-    return Robot.from_urdf(
-        "by angles", urdf_text=chain_urdf(joints, tool=(0.0, 0.0, 0.076))
-    )
+    text = chain_urdf(joints, tool=(0.0, 0.0, 0.076))
+    return Robot.from_urdf("by angles", urdf_text=text)
 
 
 def panda():
-    """The Panda's own URDF, where example-robot-data is installed."""
-    share = (
-        Path(sysconfig.get_path("purelib"))
-        / "cmeel.prefix/share/example-robot-data/robots"
-    )
-    path = share / "panda_description/urdf/panda.urdf"
-    if not path.exists():
-        pytest.skip("example-robot-data is not installed")
+    """The Panda's own URDF."""
+    path = published_urdf("panda_description/urdf/panda.urdf")
     return Robot.from_urdf(path, tool_frame="panda_hand_tcp")

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.robot import Robot
+from support.arms import SLIDE
 from support.chains import Joint, chain_urdf
 
 X, Y, Z = np.eye(3)
-SLIDE = {"lower": -5.0, "upper": 5.0, "velocity": 1.0, "effort": 50.0}
 
 
 @dataclass(frozen=True)
@@ -35,25 +35,17 @@ def screw_robot(
     tilted: bool = True,
 ) -> Robot:
     """Robot with joints j1, j2, ...; its base is tilted and displaced unless this is switched off."""
-    joints, before = [], np.zeros(3)
-    for axis in axes:
-        kind, more = (
-            ("revolute", {}) if axis.letter == "R" else ("prismatic", {"limit": SLIDE})
-        )
-        step = tuple((axis.point - before).tolist())
-        joints.append(
-            Joint(kind, axis=tuple(axis.direction.tolist()), xyz=step, **more)
-        )
-        before = axis.point
-    mount = (
-        Joint("fixed", xyz=(0.3, -0.2, 0.5), rpy=(0.4, -0.7, 1.1), limit=None)
-        if tilted
-        else None
-    )
-    last = tuple((np.asarray(tool) - before).tolist())
-    return Robot.from_urdf(
-        "screws", urdf_text=chain_urdf(joints, tool=last, mount=mount)
-    )
+    mount = Joint("fixed", xyz=(0.3, -0.2, 0.5), rpy=(0.4, -0.7, 1.1), limit=None)
+    points = np.array([np.zeros(3), *(axis.point for axis in axes), tool])
+    *steps, last = (tuple(step) for step in np.diff(points, axis=0).tolist())
+    joints = [
+        Joint("revolute", tuple(axis.direction.tolist()), step)
+        if axis.letter == "R"
+        else Joint("prismatic", tuple(axis.direction.tolist()), step, limit=SLIDE)
+        for axis, step in zip(axes, steps, strict=True)
+    ]
+    text = chain_urdf(joints, tool=last, mount=mount if tilted else None)
+    return Robot.from_urdf("screws", urdf_text=text)
 
 
 def bases():
@@ -69,42 +61,40 @@ def bases():
     def across(normal):
         return unit(np.cross(normal, rng.normal(size=3)))
 
-    def pair(letters, normal):
-        """Two joints that move positions in planes with this normal."""
+    def single(letter):
+        return Axis(letter, direction(), anywhere())
+
+    def pair(letters):
+        """Two joints that move positions in the planes with one normal."""
+        normal = direction()
         return [
             Axis(
-                k,
-                normal * rng.choice([-1.0, 1.0]) if k == "R" else across(normal),
+                letter,
+                normal * rng.choice([-1.0, 1.0]) if letter == "R" else across(normal),
                 anywhere(),
             )
-            for k in letters
+            for letter in letters
         ]
 
-    made = {}
-    for letters, other in itertools.product(("RR", "RP", "PR", "PP"), "RP"):
-        made[f"{other}|{letters}"] = [
-            Axis(other, direction(), anywhere()),
-            *pair(letters, direction()),
-        ]
-        made[f"{letters}|{other}"] = [
-            *pair(letters, direction()),
-            Axis(other, direction(), anywhere()),
-        ]
-    for other in "RP":
+    arms = {}
+    for letters, letter in itertools.product(("RR", "RP", "PR", "PP"), "RP"):
+        arms[f"{letter}|{letters}"] = [single(letter), *pair(letters)]
+        arms[f"{letters}|{letter}"] = [*pair(letters), single(letter)]
+    for letter in "RP":
         point, axes = anywhere(), [direction(), direction()]
         # The axes' own points lie off the point where they meet.
         crossing = [
             Axis("R", axis, point + axis * rng.uniform(-0.3, 0.3)) for axis in axes
         ]
-        made[f"RxR {other}"] = [*crossing, Axis(other, direction(), anywhere())]
-        made[f"{other} RxR"] = [Axis(other, direction(), anywhere()), *crossing]
+        arms[f"RxR {letter}"] = [*crossing, single(letter)]
+        arms[f"{letter} RxR"] = [single(letter), *crossing]
     normal = direction()
-    made["cylinder"] = [
+    arms["cylinder"] = [
         Axis("P", normal, anywhere()),
         Axis("R", -normal, anywhere()),
         Axis("R", across(normal), anywhere()),
     ]
-    return made
+    return arms
 
 
 BASES = bases()
@@ -130,26 +120,20 @@ def seven_joints(rail=None):
         Axis("R", axis, np.array([0.0, 0.0, height]))
         for axis, height in zip((Z, Y, Z, -Y, Z, Y, Z), heights, strict=True)
     ]
-    return screw_robot(
-        [Axis("P", rail, np.zeros(3)), *axes] if rail is not None else axes,
-        tool=(0.03, 0.02, 1.4),
-    )
+    if rail is not None:
+        axes.insert(0, Axis("P", rail, np.zeros(3)))
+    return screw_robot(axes, tool=(0.03, 0.02, 1.4))
 
 
 def panda():
     """The Franka Panda from its table of Denavit-Hartenberg parameters (Craig): no spherical wrist, but a shoulder."""
     quarter = np.pi / 2
-    rows = [
-        (0.0, 0.333, 0.0),
-        (0.0, 0.0, -quarter),
-        (0.0, 0.316, quarter),
-        (0.0825, 0.0, quarter),
-    ]
-    rows += [(-0.0825, 0.384, -quarter), (0.0, 0.0, quarter), (0.088, 0.0, quarter)]
+    lengths = (0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088)
+    offsets = (0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0)
+    twists = (0.0, -quarter, quarter, quarter, -quarter, quarter, quarter)
     joints = []
-    for a, d, alpha in rows:
+    for a, d, alpha in zip(lengths, offsets, twists, strict=True):
         offset = (a, -d * np.sin(alpha), d * np.cos(alpha))
         joints.append(Joint("revolute", xyz=offset, rpy=(alpha, 0.0, 0.0)))
-    return Robot.from_urdf(
-        "panda", urdf_text=chain_urdf(joints, tool=(0.01, 0.02, 0.2))
-    )
+    text = chain_urdf(joints, tool=(0.01, 0.02, 0.2))
+    return Robot.from_urdf("panda", urdf_text=text)

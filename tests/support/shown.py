@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+
+from support.published import FOLDER
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = sorted((ROOT / "robots").glob("*/robot.urdf"))
-PANDA = next(
-    (
-        found
-        for folder in map(Path, sys.path)
-        if (
-            found := folder
-            / "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
-        ).is_file()
-    ),
-    None,
-)
-"""The Panda of the package example-robot-data, whose links are meshes; None where it is not installed."""
+PANDA = FOLDER / "robots/panda_description/urdf/panda.urdf"
+"""Its links are meshes; the file exists where example-robot-data is installed."""
 _INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 NO_VISUALS = f"""<robot name="bare"><link name="world"/><link name="tool"/>
 <link name="slide">{_INERTIAL}</link><link name="arm">{_INERTIAL}</link>

@@ -14,9 +14,13 @@ Z: Vector = (0.0, 0.0, 1.0)
 
 
 def slides(
-    axes: Sequence[Vector], forces: Sequence[float], mass: float = 2.0, extra: str = ""
+    axes: Sequence[Vector],
+    forces: Sequence[float],
+    mass: float = 2.0,
+    extra: str = "",
+    **options: Any,
 ) -> brachis.Robot:
-    """Slides j1, j2, ... that carry each other, with a mass and a largest force each."""
+    """Slides j1, j2, ... that carry each other, with a mass and a largest force each; options of `Robot.from_urdf`."""
     joints = []
     for axis, force in zip(axes, forces, strict=True):
         limit = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force}
@@ -25,7 +29,9 @@ def slides(
             Joint("prismatic", axis, limit=limit, extra=extra, inertial=inertial)
         )
     text = chain_urdf(joints, tool=(0.1, 0.2, 0.3))
-    return brachis.Robot.from_urdf("slides", urdf_text=text, tool_frame="tool")
+    return brachis.Robot.from_urdf(
+        "slides", urdf_text=text, tool_frame="tool", **options
+    )
 
 
 def plan_slides(

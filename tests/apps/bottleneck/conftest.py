@@ -6,11 +6,10 @@ from pathlib import Path
 import pytest
 
 import brachis
-from support.chains import INERTIAL, Joint, chain_urdf
 from support.effort import QUICK
+from support.slides import X, Y, slides
 
 ROOT = Path(__file__).parents[3]
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 
 
@@ -21,15 +20,8 @@ def slide():
     def plan(
         axes=(X, Y), rows=("x", "y"), by=(LENGTH, 0.0), *, redundant=(), **keywords
     ):
-        limit = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": FORCE}
-        inertial = INERTIAL.format(mass=MASS)
-        joints = [
-            Joint("prismatic", axis=axis, limit=limit, inertial=inertial)
-            for axis in axes
-        ]
         settings = {"gravity": [0, 0, 0], **keywords.pop("robot", {})}
-        text = chain_urdf(joints, tool=(0.1, 0.2, 0.3))
-        robot = brachis.Robot.from_urdf("slides", urdf_text=text, **settings)
+        robot = slides(axes, [FORCE] * len(axes), MASS, **settings)
         spline = {"degree": 3, "intervals": 20, "rest": "velocity"}
         return brachis.plan(
             robot,

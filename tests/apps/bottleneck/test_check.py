@@ -1,7 +1,6 @@
 """Predictions within 5 % of what solving again gives: the project's own requirement."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from brachis.apps.bottleneck import check, check_sensitivities
 from brachis.optimise.backends import solvers_for
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[3]
 LARGE = 1e-4
 
 
@@ -32,15 +30,10 @@ def test_planar_line(scara, joint):
 
 
 def test_arm_on_a_rail():
-    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    found = holds(
-        brachis.plan({**task, "redundant_joints": ["rail"], "search": QUICK}), 3
-    )
-    assert {entry.sensitivity.label.kind for entry in found.entries[:3]} == {
-        "torque",
-        "force",
-        "velocity",
-    }
+    example = brachis.examples.tx90l_rail_line
+    check = holds(brachis.plan(example, redundant_joints=["rail"], **QUICK), 3)
+    kinds = {entry.sensitivity.label.kind for entry in check.entries[:3]}
+    assert kinds == {"torque", "force", "velocity"}
 
 
 def test_range_of_a_joint(slide):
@@ -125,17 +118,12 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
 
     monkeypatch.setattr(check, "solvers_for", lambda _name, **_order: (Broken,))
     answers = check_sensitivities(refined, scara("j3").sensitivities)
-    found = [entry for entry in answers.entries if entry.predicted]
-    assert found
-    for entry in found:
+    entries = [entry for entry in answers.entries if entry.predicted]
+    assert entries
+    for entry in entries:
         assert not entry.optimal
         assert entry.re_solved == pytest.approx(0.0, abs=1e-6)
-    large = [entry for entry in found if entry.predicted < -LARGE]
+    large = [entry for entry in entries if entry.predicted < -LARGE]
     assert answers.larger(LARGE) == tuple(large)
-    told = str(
-        dataclasses.replace(brachis.bottleneck.report(scara("j3")), check=answers)
-    )
-    assert (
-        "no solver brought the changes that are larger than 0.1 ms to an optimum"
-        in told
-    )
+    report = dataclasses.replace(brachis.bottleneck.report(scara("j3")), check=answers)
+    assert "no solver brought the changes that are larger than 0.1 ms" in str(report)

@@ -2,48 +2,39 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-import yaml
 
 import brachis
 from brachis.apps.bottleneck import limit_ratios, limits_by_phase, saturations
 from support.effort import QUICK
 from support.gantry import gantry_motion
 
-ROOT = Path(__file__).parents[3]
-
 
 @pytest.fixture(scope="module")
 def stopping():
     """A planned motion that waits at a corner."""
-    task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
-    task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
-    task["path"] = [
-        {"line": {"by": [0.2, 0.0]}, "dwell": 0.3},
-        {"line": {"by": [0.0, 0.2]}},
-    ]
-    task["redundant_joints"] = ["j1"]
-    result = brachis.plan(task, **QUICK)
+    path = [{"line": {"by": [0.2, 0.0]}, "dwell": 0.3}, {"line": {"by": [0.0, 0.2]}}]
+    example = brachis.examples.scara_line
+    result = brachis.plan(example, path=path, redundant_joints=["j1"], **QUICK)
     assert result.verified
     return result
 
 
 def test_limits_of_phases_add_up_to_those_of_the_motion(stopping):
     trajectory = stopping.trajectory
-    found = saturations(trajectory)
-    phases = limits_by_phase(trajectory, found)
-    assert [each.phase.kind for each in phases] == ["move", "dwell", "move"]
+    entries = saturations(trajectory)
+    phases = limits_by_phase(trajectory, entries)
+    assert [limits.phase.kind for limits in phases] == ["move", "dwell", "move"]
     assert phases[1].shares == ()
-    for entry in found:
+    for entry in entries:
         times = [
-            dict(each.shares).get(entry.label, 0.0) * each.phase.duration
-            for each in phases
+            dict(limits.shares).get(entry.label, 0.0) * limits.phase.duration
+            for limits in phases
         ]
         expected = entry.share * trajectory.t_end
         assert sum(times) == pytest.approx(expected, abs=1e-3 * trajectory.t_end)
-    assert sum(len(each.shares) for each in phases) > 1
+    assert sum(len(limits.shares) for limits in phases) > 1
 
 
 def test_costs_are_those_of_all_phases(stopping):

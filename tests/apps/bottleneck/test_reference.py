@@ -9,12 +9,13 @@ from brachis.apps.bottleneck import find_reference
 
 from .conftest import FORCE, LENGTH, MASS
 
+BEST = 2.0 * np.sqrt(2.0 * MASS * LENGTH / FORCE)
+
 
 def test_the_slide_comes_to_bang_bang_itself(slide):
     result = slide(intervals=10, rest="full")
-    best = 2.0 * np.sqrt(2.0 * MASS * LENGTH / FORCE)
     reference = find_reference(result.candidate)
-    assert reference.t_end == pytest.approx(best, rel=2e-4)
+    assert reference.t_end == pytest.approx(BEST, rel=2e-4)
     assert reference.distance == pytest.approx(result.t_end / reference.t_end - 1.0)
     assert reference.distance > 0.1
 
@@ -41,8 +42,7 @@ def test_limits_on_jerk_are_left_out(slide):
     free = slide(intervals=20, degree=4, rest="full")
     assert result.t_end > 1.01 * free.t_end
     reference = find_reference(result.candidate)
-    best = 2.0 * np.sqrt(2.0 * MASS * LENGTH / FORCE)
-    assert reference.t_end == pytest.approx(best, rel=2e-4)
+    assert reference.t_end == pytest.approx(BEST, rel=2e-4)
 
 
 def test_an_optimal_motion_has_no_faster_reference(slide):

@@ -18,9 +18,7 @@ def motion_with(slide):
     base = slide(degree=2, intervals=4).trajectory
 
     def make(times, after, before):
-        times, after, before = (
-            np.array(part, dtype=float) for part in (times, after, before)
-        )
+        times, after, before = np.array([times, after, before], dtype=float)
         h = np.diff(times)
         first, last = after[:-1], before[1:]
         qdot = np.concatenate([[0.0], np.cumsum(h * 0.5 * (first + last))])
@@ -40,32 +38,25 @@ def motion_with(slide):
 LIMIT = FORCE / (2.0 * MASS)
 
 
-def of(found, joint, kind):
-    (entry,) = [entry for entry in found if str(entry.label) == f"{joint} {kind}"]
+def force_of(trajectory):
+    (entry,) = [e for e in saturations(trajectory) if str(e.label) == "j1 force"]
     return entry
 
 
 def test_full_force_for_a_part_of_the_time(motion_with):
     trajectory = motion_with([0.0, 0.3 * T, T], [LIMIT, 0.0, 0.0], [LIMIT, LIMIT, 0.0])
-    entry = of(saturations(trajectory), "j1", "force")
+    entry = force_of(trajectory)
     assert entry.share == pytest.approx(0.3, abs=1e-12)
-    (stretch,) = entry.active
-    assert (stretch.begin, stretch.end, stretch.side) == (
-        0.0,
-        pytest.approx(0.3 * T),
-        "upper",
-    )
+    (interval,) = entry.active
+    assert (interval.begin, interval.side) == (0.0, "upper")
+    assert interval.end == pytest.approx(0.3 * T)
     assert entry.peak == pytest.approx(1.0)
 
 
 def test_both_directions_count(motion_with):
     turn = [0.0, 0.25 * T, 0.75 * T, T]
-    entry = of(
-        saturations(
-            motion_with(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])
-        ),
-        "j1",
-        "force",
+    entry = force_of(
+        motion_with(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])
     )
     assert entry.share == pytest.approx(0.75, abs=1e-12)
     assert [stretch.side for stretch in entry.active] == ["upper", "lower"]
@@ -74,20 +65,18 @@ def test_both_directions_count(motion_with):
 
 def test_the_threshold_is_met_between_grid_points(motion_with):
     ramp = motion_with([0.0, T], [0.0, LIMIT], [0.0, LIMIT])
-    assert of(saturations(ramp), "j1", "force").share == pytest.approx(1e-2, rel=1e-6)
+    assert force_of(ramp).share == pytest.approx(1e-2, rel=1e-6)
     steep = motion_with([0.0, T], [0.0, 1.7 * LIMIT], [0.0, 1.7 * LIMIT])
-    entry = of(saturations(steep), "j1", "force")
+    entry = force_of(steep)
     assert entry.share == pytest.approx(1.0 - 0.99 / 1.7, rel=1e-9)
     assert entry.active[0].begin == pytest.approx(0.99 / 1.7 * T)
 
 
 def rippling(motion_with, lowest):
     """A force at its limit with one dip in the middle of the motion."""
-    times, forces = (
-        [0.0, 0.4 * T, 0.5 * T, 0.6 * T, T],
-        np.array([1.0, 1.0, lowest, 1.0, 1.0]) * LIMIT,
-    )
-    return of(saturations(motion_with(times, forces, forces)), "j1", "force")
+    times = [0.0, 0.4 * T, 0.5 * T, 0.6 * T, T]
+    forces = np.array([1.0, 1.0, lowest, 1.0, 1.0]) * LIMIT
+    return force_of(motion_with(times, forces, forces))
 
 
 def test_ripple_interrupts_no_stretch(motion_with):
@@ -107,9 +96,7 @@ def test_a_deeper_dip_does(motion_with):
 
 def test_a_motion_near_its_limit_that_never_reaches_it_does_not_count(motion_with):
     times, forces = [0.0, 0.5 * T, T], np.array([0.96, 0.985, 0.96]) * LIMIT
-    assert (
-        of(saturations(motion_with(times, forces, forces)), "j1", "force").active == ()
-    )
+    assert force_of(motion_with(times, forces, forces)).active == ()
 
 
 def test_positions_are_measured_by_their_place_in_the_range(motion_with):

@@ -10,6 +10,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -24,9 +25,13 @@ SCARA = ROOT / "robots/scara3/robot.urdf"
 
 @dataclass(frozen=True)
 class Outcome:
-    code: int
     out: str
     err: str
+
+    @property
+    def data(self):
+        """What was printed as JSON."""
+        return json.loads(self.out)
 
 
 @pytest.fixture(autouse=True)
@@ -37,14 +42,21 @@ def own_interrupts(rough_figures):  # noqa: ARG001
 
 @pytest.fixture
 def run(capfd):
-    def run(*words, columns=200):
-        """Run a command as it is typed, or word by word."""
+    def run(*words, code=0, columns=200):
+        """Run a command as it is typed, or word by word; it ends with this exit code."""
         command = words if len(words) != 1 else shlex.split(words[0])
-        code = code_of(*command, columns=columns)
+        exit_code = code_of(*command, columns=columns)
         streams = capfd.readouterr()
-        return Outcome(code, streams.out, streams.err)
+        assert exit_code == code, streams.err
+        return Outcome(streams.out, streams.err)
 
     return run
+
+
+@pytest.fixture
+def error_of(run):
+    """What a command with wrong input says."""
+    return lambda *words: run(*words, code=2).err
 
 
 @pytest.fixture
@@ -85,15 +97,19 @@ class Planned:
         return shutil.copytree(self.out, to)
 
 
+@pytest.fixture
+def result(planned):
+    """The file of that motion."""
+    return planned.out / "result.npz"
+
+
 @pytest.fixture(scope="session")
 def planned(tmp_path_factory):
     folder, printed = tmp_path_factory.mktemp("planned"), io.StringIO()
     (folder / "task.yaml").write_text(yaml.safe_dump(quick_task()))
     with interrupts_kept(), contextlib.redirect_stdout(printed):
-        assert (
-            code_of("plan", folder / "task.yaml", "--out", folder / "out", "--json")
-            == 0
-        )
+        command = ("plan", folder / "task.yaml", "--out", folder / "out", "--json")
+        assert code_of(*command) == 0
     return Planned(json.loads(printed.getvalue()), folder / "out")
 
 
@@ -105,3 +121,18 @@ def write(tmp_path):
         return path
 
     return write
+
+
+@pytest.fixture
+def seam(task, write, tmp_path):
+    """A task along points that scatter by 0.02 mm, in mm with decimal commas."""
+    y = np.linspace(0.0, 600.0, 1_500)
+    x = 1732.0508 + 20.0 * np.sin(y / 100.0)
+    scatter = np.random.default_rng(5).normal(size=(2, 1_500)) * 0.02
+    rows = (
+        f"{a:.4f};{b:.4f}".replace(".", ",")
+        for a, b in zip(x + scatter[0], y + scatter[1], strict=True)
+    )
+    (tmp_path / "seam.csv").write_text("\n".join(["x_mm;y_mm", *rows]))
+    task["path"] = [{"csv": {"file": "seam.csv", "tolerance": {"position": "0.12 mm"}}}]
+    return write({**task, "start": "free", "redundant_joints": ["j1"], "search": QUICK})

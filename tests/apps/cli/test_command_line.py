@@ -1,6 +1,5 @@
 """What all commands have in common: help with examples that work, completion, how much is said, changes of a task."""
 
-import json
 import os
 import re
 import shlex
@@ -29,7 +28,6 @@ EXAMPLES = {
 @pytest.mark.parametrize("option", ["-h", "--help"])
 def test_help_of_every_command_has_an_example(command, option, run):
     outcome = run(f"{command} {option}", columns=60)
-    assert outcome.code == 0
     assert f"Usage: brachis {command} " in outcome.out
     examples = outcome.out.split("Examples:\n")[1].splitlines()
     assert [line.strip() for line in examples if line] == EXAMPLES[command]
@@ -56,8 +54,7 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     assert {*general} <= {*EXAMPLES["new"], *EXAMPLES["plan"]}
     for command, lines in EXAMPLES.items():
         for line in lines:
-            outcome = run(*shlex.split(line, comments=True)[1:])
-            assert outcome.code == 0, f"{line}: {outcome.err}"
+            run(*shlex.split(line, comments=True)[1:])
         if (
             command == "new"
         ):  # what follows is about commands: with a plan that takes less time
@@ -72,12 +69,11 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
 
 def test_help_of_the_program(run):
     outcome = run("-h", columns=80)
-    assert outcome.code == 0
     assert all(f"\n  {command} " in outcome.out for command in COMMANDS)
     assert "..." not in outcome.out.split("Commands:")[1]
     assert "130  interrupted" in outcome.out
-    nothing = run(columns=80)
-    assert (nothing.code, nothing.out, nothing.err) == (2, "", outcome.out)
+    nothing = run(code=2, columns=80)
+    assert (nothing.out, nothing.err) == ("", outcome.out)
 
 
 def test_help_of_plot_lists_every_figure(run):
@@ -91,12 +87,8 @@ def test_help_of_plot_lists_every_figure(run):
 )
 def test_completion(words, expected):
     last = str(len(words.split()) - 1)
-    environment = {
-        **os.environ,
-        "_BRACHIS_COMPLETE": "complete_bash",
-        "COMP_WORDS": words,
-        "COMP_CWORD": last,
-    }
+    completion = {"COMP_WORDS": words, "COMP_CWORD": last}
+    environment = {**os.environ, "_BRACHIS_COMPLETE": "complete_bash", **completion}
     done = subprocess.run(
         COMMAND, env=environment, capture_output=True, text=True, check=True
     )
@@ -121,10 +113,7 @@ WRONG = [
     (f"verify {TASK}", "found a task file.*brachis plan "),
     (
         f"inspect {SCARA} --set robot.limits.torque=8",
-        (
-            r"--set: this option cannot be used with a URDF.*found \['robot.limits.torque=8'\]; allowed: this "
-            r"option with a task file"
-        ),
+        r"--set: this option cannot be used with a URDF.*allowed: this option with a",
     ),
     (f"plan {TASK} --set spline", "key=value.*'spline'"),
 ]
@@ -136,52 +125,48 @@ def test_a_wrong_command_line_is_one_error(
     command, message, option, run, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    outcome = run(command + option)
-    assert outcome.code == 2
+    outcome = run(command + option, code=2)
     assert outcome.err.startswith("brachis: ")
     assert outcome.err.count("\n") == 1
     assert re.search(message, outcome.err), outcome.err
     if option:
-        assert f"brachis: {json.loads(outcome.out)['error']}\n" == outcome.err
+        assert f"brachis: {outcome.data['error']}\n" == outcome.err
     assert not list(tmp_path.iterdir())
 
 
-def test_results_are_told_from_tasks(run, tmp_path):
+def test_results_are_told_from_tasks(error_of, tmp_path):
     for content, expected in (
         (b"PK\x03\x04", "found a result"),
         (b'{\n  "t_end": 1.0\n}', "the figures of a plan"),
     ):
         (tmp_path / "file").write_bytes(content)
-        outcome = run(f"plan {tmp_path / 'file'}")
-        assert outcome.code == 2
-        assert expected in outcome.err
+        assert expected in error_of(f"plan {tmp_path / 'file'}")
 
 
 SMALL = "--set spline.intervals=6 --set 'search={effort: single, least_motion: false}'"
 
 
-def test_set_changes_the_task(run, task, write, tmp_path):
+def test_set_changes_the_task(run, error_of, task, write, tmp_path):
     path = write(task)
     outcome = run(
         f"plan {path} {SMALL} --set path.0.line.length=0.3 --set robot.limits.torque=8 "
         "--json",
     )
-    assert outcome.code == 0, outcome.err
-    data = json.loads(outcome.out)
+    data = outcome.data
     assert 1.0 < data["t_end"] < 2.4
-    shown = json.loads(run(f"inspect {path} --set robot.limits.torque=8 --json").out)
+    shown = run(f"inspect {path} --set robot.limits.torque=8 --json").data
     assert [joint["torque"] for joint in shown["joints"]] == ["8 Nm"] * 3
     assert "torque" in run(f"bottleneck {path} {SMALL}").out
-    outcome = run(f"bottleneck {tmp_path / 'result.npz'} --set spline.intervals=6")
-    assert outcome.code == 2
-    assert "--set: this option cannot be used with a saved motion" in outcome.err
+    assert "--set: this option cannot be used with a saved motion" in error_of(
+        f"bottleneck {tmp_path / 'result.npz'} --set spline.intervals=6"
+    )
 
 
-def test_quiet_and_verbose_set_how_much_a_command_says(run, task, write):
+def test_quiet_and_verbose_set_how_much_a_command_says(run, error_of, task, write):
     path = write(task)
     assert run(f"plan {path} {SMALL} --quiet") == run(f"-q plan {path} {SMALL}")
     quiet = run(f"plan {path} {SMALL} --set robot.limits.velocity=1e9 -q")
-    assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
+    assert (quiet.out, quiet.err) == ("", "")
     verbose = run(f"plan {path} {SMALL} -v")
     assert "verification: passed" in verbose.out
     steps = verbose.err.splitlines()
@@ -193,8 +178,8 @@ def test_quiet_and_verbose_set_how_much_a_command_says(run, task, write):
     assert run(f"plan {path} {SMALL}").err == f"{slow[0]}\n", (
         "what one command is told does not hold for the next one"
     )
-    assert json.loads(run(f"plan {path} {SMALL} --json --quiet").out)["verified"]
-    assert "gone.yaml" in run("plan gone.yaml --quiet").err
+    assert run(f"plan {path} {SMALL} --json --quiet").data["verified"]
+    assert "gone.yaml" in error_of("plan gone.yaml --quiet")
 
 
 def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
@@ -202,31 +187,25 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
         raise ZeroDivisionError
 
     monkeypatch.setattr(planner, "plan", broken)
-    outcome = run(f"plan {write(task)}")
-    assert outcome.code == 1
+    outcome = run(f"plan {write(task)}", code=1)
     assert "Traceback" not in outcome.err
     assert "internal error: ZeroDivisionError" in outcome.err
     assert "bug in brachis; run again with --verbose" in outcome.err
-    assert "Traceback" in run(f"plan {write(task)} --verbose").err
+    assert "Traceback" in run(f"plan {write(task)} --verbose", code=1).err
 
 
-def test_new_and_robots(run, tmp_path, monkeypatch):
+def test_new_and_robots(run, error_of, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    listed = json.loads(run("robots --json").out)["robots"]
-    assert {
-        "name": "gantry2",
-        "what": "two linear axes",
-        "joints": ["x_axis", "y_axis"],
-    }.items() <= listed[1].items()
-    data = json.loads(run(f"new {listed[1]['urdf']} --json").out)
+    listed = run("robots --json").data["robots"]
+    gantry = {"name": "gantry2", "what": "two linear axes"}
+    assert listed[1] == {**listed[1], **gantry, "joints": ["x_axis", "y_axis"]}
+    data = run(f"new {listed[1]['urdf']} --json").data
     assert data["verified"]
     assert data["file"] == "task.yaml"
     before = (tmp_path / "task.yaml").read_text()
-    outcome = run("new scara3")
-    assert outcome.code == 2
-    assert "task.yaml: the file exists" in outcome.err
+    assert "task.yaml: the file exists" in error_of("new scara3")
     assert (tmp_path / "task.yaml").read_text() == before
-    assert run(f"plan task.yaml {SMALL}").code == 0
+    run(f"plan task.yaml {SMALL}")
 
 
 def test_new_tells_how_long_the_motion_lasts(run, tmp_path):

@@ -32,8 +32,7 @@ def written(tmp_path, **keys):
 
 def place_of(run, *arguments):
     outcome = run("inspect", *arguments, "--json")
-    assert outcome.code == 0, outcome.err
-    return json.loads(outcome.out)["tool"]
+    return outcome.data["tool"]
 
 
 @pytest.mark.parametrize(
@@ -61,25 +60,22 @@ def test_every_convention_says_the_same_place(run, tmp_path, options, frame):
 )
 def test_the_place_is_told_while_the_end_is_wrong(run, tmp_path, end):
     file = written(tmp_path, end=end)
-    assert run(f"inspect {file}").code == 2
+    run(f"inspect {file}", code=2)
     outcome = run(f"inspect {file} --posture home")
-    assert outcome.code == 0
     second, third = outcome.out.splitlines()[1:3]
     assert (second, third[:12]) == ("the tool in the world:", "  position: ")
     assert "the task cannot be planned: end.joints" in outcome.out.replace("\n", " ")
 
 
-def test_wrong_names_of_postures_and_frames(run, tmp_path):
+def test_wrong_names_of_postures_and_frames(run, error_of, tmp_path):
     file = written(tmp_path)
-    for options, said in (
-        (("--posture", "hom"), "no posture named 'hom'; allowed: home"),
-        (("--posture", "home", "--frame", "user"), "no frame named 'user'; allowed: user1"),
-        (("--frame", "user1"), "--frame: this option cannot be used with no posture"),
-    ):  # fmt: skip
-        outcome = run("inspect", file, *options)
-        assert outcome.code == 2
-        assert said in outcome.err
-    outcome = run("inspect iiwa14 --posture '0 0 0 0 0 0 0' --frame a")
+    for options, message in (
+        ("--posture hom", "no posture named 'hom'; allowed: home"),
+        ("--posture home --frame user", "no frame named 'user'; allowed: user1"),
+        ("--frame user1", "--frame: this option cannot be used with no posture"),
+    ):
+        assert message in error_of(f"inspect {file} {options}")
+    outcome = run("inspect iiwa14 --posture '0 0 0 0 0 0 0' --frame a", code=2)
     assert "--frame: this option cannot be used with a URDF" in outcome.err
 
 
@@ -88,18 +84,17 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
 ):
     """The start posture cannot keep clear of them, and the entries are enough to plan."""
     file = written(tmp_path, scene=[FLOOR])
-    assert run("inspect", written(tmp_path, scene=[FLOOR]), "--json").code == 0
+    run(f"inspect {written(tmp_path, scene=[FLOOR])} --json")
     outcome = run(f"inspect {file}")
     text = outcome.out.replace("\n", " ")
     assert "add [link_1 0, floor] to collisions.disable" in text
     assert "the task cannot be planned: postures.home" in text
-    pairs = json.loads(run(f"inspect {file} --json").out)["collisions"]["never_free"]
+    pairs = run(f"inspect {file} --json").data["collisions"]["never_free"]
     free = run("inspect", file, "--set", f"collisions.disable={json.dumps(pairs)}")
-    assert free.code == 0
     assert "never free" not in free.out
     assert "cannot be planned" not in free.out
     low = {**FLOOR, "half_space": {"normal": [0, 0, 1], "offset": -0.05}}
-    assert "never free" not in run("inspect", written(tmp_path, scene=[low])).out
+    assert "never free" not in run(f"inspect {written(tmp_path, scene=[low])}").out
 
 
 def test_it_fits_a_screen_and_has_the_reasons_with_verbose(run):
@@ -126,6 +121,4 @@ def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path):
         <geom size="0.1" pos="0 0 1"/></body></worldbody></mujoco>"""
     )
     for _ in range(2):
-        outcome = run(f"inspect {file}")
-        assert outcome.code == 0
-        assert outcome.err.count("left out: collision shapes (1)") == 1
+        assert run(f"inspect {file}").err.count("left out: collision shapes (1)") == 1

@@ -1,7 +1,6 @@
 """A robot with one joint through every command."""
 
 import csv
-import json
 
 import pytest
 import yaml
@@ -42,40 +41,28 @@ def files(request, tmp_path_factory):
 
 
 def test_plan(run, files, tmp_path):
-    outcome = run(f"plan {files / 'task.yaml'} --out {tmp_path}")
-    assert outcome.code == 0, outcome.err
+    run(f"plan {files / 'task.yaml'} --out {tmp_path}")
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"result.npz", "result.json", "overview.png", "candidates.png"}
 
 
 @pytest.mark.parametrize("kind", sorted({*PLOTS} - {"fit"}))
 def test_plot(kind, run, files, tmp_path):
-    outcome = run(
-        f"plot {files / 'result.npz'} --kind {kind} --out {tmp_path / 'figure.svg'}"
-    )
-    assert outcome.code == 0, outcome.err
+    run(f"plot {files / 'result.npz'} --kind {kind} --out {tmp_path / 'figure.svg'}")
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()
 
 
 def test_export_verify_inspect(run, files, tmp_path):
     table = tmp_path / "motion.csv"
-    for command in (
-        ("export", files / "result.npz", "--out", table, "--dt", 0.01),
-        ("export", files, "--out", table, "--dt", 0.01),  # the motion's folder
-    ):
-        outcome = run(*command)
-        assert outcome.code == 0, outcome.err
+    for motion in (files / "result.npz", files):
+        run(f"export {motion} --out {table} --dt 0.01")
     with table.open() as stream:
         assert {len(row) for row in csv.reader(stream)} == {5}
-    outcome = run(f"verify {files / 'result.npz'} --json")
-    assert outcome.code == 0, outcome.err
-    assert json.loads(outcome.out)["passed"] is True
+    assert run(f"verify {files / 'result.npz'} --json").data["passed"] is True
     outcome = run(f"inspect {files / 'robot.urdf'} --posture 0.2 --json")
-    assert outcome.code == 0, outcome.err
-    (choice,) = json.loads(outcome.out)["decompositions"]
+    (choice,) = outcome.data["decompositions"]
     assert choice["solver"] != "-"
-    outcome = run(f"verify {tmp_path}")
-    assert outcome.code == 2
+    outcome = run(f"verify {tmp_path}", code=2)
     message = "this folder contains no motion; allowed: result.npz or unverified.npz"
     assert message in outcome.err
 
@@ -83,8 +70,7 @@ def test_export_verify_inspect(run, files, tmp_path):
 @pytest.mark.parametrize("name", ["task.yaml", "result.npz"])
 def test_bottleneck(name, run, files, tmp_path):
     outcome = run(f"bottleneck {files / name} --check --out {tmp_path} --json")
-    assert outcome.code == 0, outcome.err
-    found = json.loads(outcome.out)["bottleneck"]["sensitivities"]
-    assert found["reliable"] is True
-    assert sum(entry["change_for_10_percent_s"] for entry in found["limits"]) < -1e-3
+    costs = outcome.data["bottleneck"]["sensitivities"]
+    assert costs["reliable"] is True
+    assert sum(entry["change_for_10_percent_s"] for entry in costs["limits"]) < -1e-3
     assert (tmp_path / "timeline.png").exists()

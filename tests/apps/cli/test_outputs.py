@@ -50,15 +50,14 @@ def contents(folder):
 OVER = [
     "export result.npz --out task.yaml",
     "export result.npz --out points.csv",
+    "export result.npz --out link.csv",
     "export result.npz --out result.npz",
     "export result.npz --out result.npz --format csv",
     "plot result.npz --out task.yaml",
     "plot result.npz --out notes.png",
-    "schema --out task.yaml",
     "schema --out data.json",
     "schema --out result.json",
     "compose robot.urdf --out robot.urdf --range -1 1 --velocity 1 --force 100 --mass 5",
-    "compose robot.urdf --out task.yaml --range -1 1 --velocity 1 --force 100 --mass 5",
     "plan result.json --out .",
     "bottleneck bottleneck.json --out .",
 ]
@@ -69,13 +68,14 @@ RAIL = ("--range", "-1", "1", "--velocity", "1", "--force", "100", "--mass", "5"
 def test_nothing_is_written_over_other_files(command, run, saved, monkeypatch):
     (saved / "notes.png").write_text("no figure")
     (saved / "data.json").write_text('{"a": 1}')
+    (saved / "link.csv").unlink(missing_ok=True)
+    (saved / "link.csv").symlink_to(saved / "points.csv")
     task = yaml.safe_load((saved / "task.yaml").read_text())
     for name in ("result.json", "bottleneck.json"):
         (saved / name).write_text(json.dumps(task))
     monkeypatch.chdir(saved)
     before = contents(saved)
-    outcome = run(command)
-    assert outcome.code == 2, outcome.err
+    outcome = run(command, code=2)
     reasons = "overwrite an input|of another kind|a known format"
     assert re.search(reasons, outcome.err)
     assert contents(saved) == before
@@ -83,18 +83,17 @@ def test_nothing_is_written_over_other_files(command, run, saved, monkeypatch):
 
 @pytest.mark.parametrize("name", ["overview.png", "result.npz", "result.json"])
 def test_a_folder_with_the_name_of_an_output_is_refused_before_planning(
-    name, run, saved, tmp_path, monkeypatch
+    name, error_of, saved, tmp_path, monkeypatch
 ):
     (tmp_path / name).mkdir()
     monkeypatch.setattr(brachis, "plan", lambda *_, **__: pytest.fail("it planned"))
-    outcome = run(f"plan {saved / 'task.yaml'} --out {tmp_path}")
-    assert outcome.code == 2
-    assert f"{name}: the file cannot be written; found a folder" in outcome.err
+    assert f"{name}: the file cannot be written; found a folder" in error_of(
+        f"plan {saved / 'task.yaml'} --out {tmp_path}"
+    )
 
 
 REFUSED_AT_ONCE = [
     ("report MOTION --out x.png", "suffix"),
-    ("report MOTION --out x.htm", "suffix"),
     ("plot MOTION --out gone/x.png", "no folder gone"),
     ("report MOTION --out gone/x.html", "no folder gone"),
     ("bottleneck MOTION --out mine", "into a folder"),
@@ -106,38 +105,21 @@ REFUSED_AT_ONCE = [
 
 @pytest.mark.parametrize(("command", "message"), REFUSED_AT_ONCE)
 def test_a_wrong_output_is_an_error_before_any_work(
-    command, message, run, saved, tmp_path, monkeypatch
+    command, message, error_of, saved, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     Path("mine").write_text("a file")
     for heavy in (brachis.report, brachis.bottleneck):
         for name in {"make_report", "report"} & {*vars(heavy)}:
             monkeypatch.setattr(heavy, name, lambda *_, **__: pytest.fail("it worked"))
-    outcome = run(command.replace("MOTION", str(saved / "result.npz")))
-    assert outcome.code == 2
-    assert message in outcome.err
+    assert message in error_of(command.replace("MOTION", str(saved / "result.npz")))
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
-def test_a_motion_is_verified_against_an_included_robot(run, saved):
-    outcome = run(f"verify {saved / 'result.npz'} --urdf scara3")
-    assert "does not exist" not in outcome.err
-    assert outcome.code in (0, 1)
-    outcome = run(f"verify {saved / 'result.npz'} --urdf scara4")
-    assert outcome.code == 2
-    assert "Did you mean 'scara3'?" in outcome.err
-
-
-def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
-    (tmp_path / "new.csv").symlink_to(saved / "points.csv")
-    (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")
-    before = contents(saved)
-    assert run(f"export {saved / 'result.npz'} --out {tmp_path / 'new.csv'}").code == 2
-    assert (
-        run("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "new.urdf").code
-        == 2
-    )
-    assert contents(saved) == before
+def test_a_motion_is_verified_against_an_included_robot(run, error_of, saved):
+    command = f"verify {saved / 'result.npz'} --urdf"
+    run(f"{command} scara3")
+    assert "Did you mean 'scara3'?" in error_of(f"{command} scara4")
 
 
 def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
@@ -147,33 +129,26 @@ def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
             (("export", saved / "result.npz", "--dt", 0.1), "motion.csv"),
             (("export", saved / "result.npz", "--dt", 0.1), "empty.csv"),
             (("plot", saved / "result.npz", "--kind", "torques"), "figure.svg"),
-            (("plot", saved / "result.npz", "--kind", "torques"), "figure.pdf"),
             (("schema",), "schema.json"),
             (("compose", saved / "robot.urdf", *RAIL), "cell.urdf"),
         ):
-            outcome = run(*words, "--out", tmp_path / name)
-            assert outcome.code == 0, outcome.err
+            run(*words, "--out", tmp_path / name)
+
+
+def run_writing_to(stream, *arguments):
+    command = [*COMMAND, *arguments]
+    return subprocess.run(
+        command, stdout=stream, stderr=subprocess.PIPE, text=True, check=False
+    )
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="only Linux has /dev/full")
 @pytest.mark.parametrize(
-    "arguments",
-    [
-        ("schema",),
-        ("--help",),
-        ("inspect", SCARA, "--json"),
-        ("verify", "gone", "--json"),
-    ],
+    "arguments", [("schema",), ("--help",), ("verify", "gone", "--json")]
 )
 def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
     with FULL.open("w") as full:
-        done = subprocess.run(
-            [*COMMAND, *arguments],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        done = run_writing_to(full, *arguments)
     assert done.returncode == 1
     assert (
         "brachis: standard output cannot be written: No space left on device\n"
@@ -186,16 +161,9 @@ def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
 def test_a_closed_pipe_is_quiet():
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(
-        [*COMMAND, "schema"],
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
+    done = run_writing_to(writing, "schema")
     os.close(writing)
-    assert done.returncode == 1
-    assert done.stderr == ""
+    assert (done.returncode, done.stderr) == (1, "")
 
 
 def test_closed_standard_output_is_no_fault():
@@ -209,14 +177,12 @@ def test_closed_standard_output_is_no_fault():
 
 
 @pytest.mark.parametrize("end", ["exact", "hold"])
-def test_the_last_row(end, run, saved, tmp_path):
+def test_the_last_row(end, run, error_of, saved, tmp_path):
     table = tmp_path / "motion.csv"
     trajectory = brachis.Trajectory.load(saved / "result.npz")
     dt = trajectory.t_end / 7.5
-    assert (
-        run(f"export {saved / 'result.npz'} --out {table} --dt {dt} --last {end}").code
-        == 0
-    )
+    command = f"export {saved / 'result.npz'} --out {table}"
+    run(f"{command} --dt {dt} --last {end}")
     with table.open() as stream:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]]
     assert len(rows) == 9
@@ -228,17 +194,16 @@ def test_the_last_row(end, run, saved, tmp_path):
         np.testing.assert_array_equal(
             rows[-1][4:], np.zeros(9)
         )  # no gravity: nothing holds the posture
-    outcome = run(f"export {saved / 'result.npz'} --out {table} --last held")
-    assert outcome.code == 2
-    assert "Did you mean 'hold'?" in outcome.err
+    assert "Did you mean 'hold'?" in error_of(f"{command} --last held")
 
 
 def test_a_period_longer_than_the_motion_is_warned_of(run, saved, tmp_path):
-    outcome = run(
-        f"export {saved / 'result.npz'} --out {tmp_path / 'motion.csv'} --dt 4"
+    assert (
+        "the period of 4 s is longer than the motion, which takes"
+        in run(
+            f"export {saved / 'result.npz'} --out {tmp_path / 'motion.csv'} --dt 4"
+        ).err
     )
-    assert outcome.code == 0
-    assert "the period of 4 s is longer than the motion, which takes" in outcome.err
     assert len((tmp_path / "motion.csv").read_text().splitlines()) == 3
 
 
@@ -269,10 +234,9 @@ def test_outputs_that_the_system_refuses(name, run, saved, tmp_path):
         ("schema",),
         ("plan", saved / "task.yaml"),
     ):
-        found = run(*command, "--out", out)
-        assert found.code == 2, command
-        assert "cannot be" in found.err or "no folder" in found.err, command
-        assert len(found.err.splitlines()) == 1, command
+        outcome = run(*command, "--out", out, code=2)
+        assert "cannot be" in outcome.err or "no folder" in outcome.err, command
+        assert len(outcome.err.splitlines()) == 1, command
 
 
 @pytest.mark.parametrize(
@@ -281,21 +245,12 @@ def test_outputs_that_the_system_refuses(name, run, saved, tmp_path):
 def test_inputs_that_the_system_refuses(name, run, saved, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("circle").symlink_to("circle")
-    given = saved / name if name.startswith("result") else name
-    for command in (
-        "plan",
-        "inspect",
-        "verify",
-        "view",
-        "report",
-        "bottleneck",
-        "new",
-        "sweep",
-    ):
-        found = run(f"{command} {given}")
-        assert found.code == 2, command
-        assert name in found.err, command
-        assert "internal" not in found.err, command
+    path = saved / name if name.startswith("result") else name
+    commands = "plan inspect verify view report bottleneck new sweep"
+    for command in commands.split():
+        outcome = run(f"{command} {path}", code=2)
+        assert name in outcome.err, command
+        assert "internal" not in outcome.err, command
 
 
 def test_progress_takes_names_with_brackets(monkeypatch, capfd):
@@ -323,10 +278,6 @@ def test_endless_inputs_are_errors(endless, run, saved, tmp_path):
         ("verify", endless),
         ("compose", endless, *RAIL, "--out", tmp_path / "new.urdf"),
     ):
-        outcome = run(*command)
-        assert outcome.code == 2, command
+        outcome = run(*command, code=2)
         assert str(endless) in outcome.err
-        assert any(
-            what in outcome.err
-            for what in ("a pipe", "a folder", "this folder", "a device", "MB")
-        )
+        assert re.search("a pipe|a folder|this folder|a device|MB", outcome.err)

@@ -5,7 +5,6 @@ import re
 import pytest
 from rich.console import Console
 
-import brachis
 from brachis.apps.cli import output
 from brachis.apps.cli.output import print_table
 
@@ -15,34 +14,15 @@ WIDTHS = (60, 80, 120)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
-def print_to_text(width, columns, rows, **options):
+def print_to_text(width, columns, rows):
     console = Console(width=width, highlight=False, markup=False)
     with (
         pytest.MonkeyPatch.context() as patch,
         console.capture() as capture,
     ):
         patch.setattr(output, "result_console", lambda: console)
-        print_table("title", columns, rows, **options)
+        print_table("title", columns, rows)
     return capture.get()
-
-
-NUMBERS = [f"value {i} [s]" for i in range(6)]
-COLUMNS = ("what", *NUMBERS, "remark")
-ROWS = [
-    (
-        "first thing",
-        *(f"{-1.23456 * 10**i:.5f}" for i in range(6)),
-        "a remark of many words that has to be wrapped",
-    ),
-    ("second thing", *("1.2e-13" for _ in range(6)), ""),
-]
-
-
-def test_a_table_has_lines_where_they_fit_and_parts_where_nothing_else_does():
-    assert "━" in print_to_text(200, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "━" not in print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert "title (2 of " in print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS)
-    assert print_to_text(60, COLUMNS, ROWS, numbers=NUMBERS).count("first") >= 2
 
 
 def test_long_words_of_text_are_broken_not_lost():
@@ -55,31 +35,6 @@ def test_long_words_of_text_are_broken_not_lost():
     assert max(map(len, text.splitlines())) <= 30
 
 
-@pytest.fixture(scope="module")
-def result():
-    return brachis.plan(
-        ROOT / "examples/01_scara_line.yaml",
-        effort="single",
-        intervals=6,
-        least_motion=False,
-    )
-
-
-@pytest.fixture
-def points(task, write, tmp_path):
-    """A task along points with a corner that is rounded."""
-    there = [(1.8, 0.004 * i) for i in range(100)]
-    back = [(1.8 - 0.004 * i, 0.396) for i in range(1, 100)]
-    (tmp_path / "points.csv").write_text(
-        "\n".join(["x;y", *(f"{x};{y}" for x, y in there + back)])
-    )
-    tolerance = {"position": "0.1 mm", "corner": "5 mm"}
-    task["path"] = [
-        {"csv": {"file": "points.csv", "tolerance": tolerance, "corner": "blend"}}
-    ]
-    return write({**task, "start": "free"})
-
-
 SHOWING = {
     "plan": ("plan", ROOT / "examples/01_scara_line.yaml"),
     "verify": ("verify", "RESULT"),
@@ -90,11 +45,10 @@ SHOWING = {
 
 
 @pytest.mark.parametrize("case", SHOWING)
-def test_no_command_cuts_numbers(case, run, result, points, tmp_path, monkeypatch):
-    result.trajectory.save(tmp_path / "result.npz")
-    monkeypatch.setattr("brachis.planner.plan", lambda *_arguments, **_options: result)
-    given = {"RESULT": tmp_path / "result.npz", "POINTS": points}
-    arguments = [given.get(word, word) for word in SHOWING[case]]
+def test_no_command_cuts_numbers(case, run, line_result, result, seam, monkeypatch):
+    monkeypatch.setattr("brachis.planner.plan", lambda *_, **__: line_result)
+    files = {"RESULT": result, "POINTS": seam}
+    arguments = [files.get(word, word) for word in SHOWING[case]]
     texts = {width: run(*arguments, columns=width).out for width in (*WIDTHS, 200)}
     numbers = set(NUMBER.findall(texts[200]))
     assert len(numbers) > 5

@@ -9,24 +9,9 @@ import pytest
 
 from brachis.apps.cli.motions import _read_candidates
 from brachis.apps.view import Viewer
-from brachis.planner import plan
-from brachis.task import load_task
 from brachis.trajectory import Trajectory
-from support.shown import ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")
-
-
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory):
-    """A motion and the figures of its plan, as brachis plan --out writes them."""
-    folder = tmp_path_factory.mktemp("out")
-    task = load_task(ROOT / "examples/01_scara_line.yaml")
-    quick = task.search.model_copy(update={"effort": "single"})
-    result = plan(None, task.model_copy(update={"search": quick}))
-    result.trajectory.save(folder / "result.npz")
-    (folder / "result.json").write_text(json.dumps(result.to_dict(), default=str))
-    return folder / "result.npz"
 
 
 @pytest.fixture
@@ -46,44 +31,43 @@ def looked_at(monkeypatch):
 def test_a_plan_opens_the_viewer(run, write, task, looked_at):
     task["search"] = {"effort": "single"}
     planned = run(f"plan {write(task)} --view")
-    assert planned.code == 0, planned.err
     assert f"look at {looked_at.pop()}" in planned.out
     assert "Ctrl-C stops the viewer" in planned.err
 
 
 @pytest.mark.parametrize("folder", [False, True])
 def test_a_saved_motion_is_shown_by_its_file_or_its_folder(
-    run, saved, looked_at, folder
+    run, result, looked_at, folder
 ):
-    shown = run("view", saved.parent if folder else saved, "--port", 0)
-    assert shown.code == 0, shown.err
-    assert f"look at {looked_at.pop()}" in shown.out
+    shown = run(f"view {result.parent if folder else result} --port 0").out
+    assert f"look at {looked_at.pop()}" in shown
 
 
-def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path):
-    trajectory = Trajectory.load(saved)
-    beside = saved.with_suffix(".json")
+def test_the_candidates_are_those_of_the_json_beside_the_motion(result, tmp_path):
+    trajectory = Trajectory.load(result)
+    beside = result.with_suffix(".json")
     data = json.loads(beside.read_text())
-    assert _read_candidates(saved, trajectory) == data["candidates"] != []
-    for other in (
+    assert _read_candidates(result, trajectory) == data["candidates"] != []
+    for text in (
         "nonsense",
         json.dumps({**data, "t_end": 9.0}),
         json.dumps({"t_end": trajectory.t_end}),
         "[1]",
     ):
-        (tmp_path / "result.json").write_text(other)
+        (tmp_path / "result.json").write_text(text)
         assert _read_candidates(tmp_path / "result.npz", trajectory) == []
 
 
-def test_other_machines_are_let_in_with_a_warning(run, saved, looked_at):
-    shown = run(f"view {saved} --port 0 --host 0.0.0.0")
-    assert shown.code == 0, shown.err
-    assert "warning: anyone who can reach 0.0.0.0 can watch" in shown.err
+def test_other_machines_are_let_in_with_a_warning(run, result, looked_at):
+    assert (
+        "warning: anyone who can reach 0.0.0.0 can watch"
+        in run(f"view {result} --port 0 --host 0.0.0.0").err
+    )
     assert looked_at.pop().startswith("http://127.0.0.1:")
 
 
-def test_ctrl_c_stops_the_viewer(saved):
-    command = [sys.executable, "-m", "brachis", "view", str(saved), "--port", "0"]
+def test_ctrl_c_stops_the_viewer(result):
+    command = [sys.executable, "-m", "brachis", "view", str(result), "--port", "0"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as viewer:

@@ -51,10 +51,10 @@ def file(today, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def task(today):
-    quick = {"spline": {"intervals": 12}, "search": QUICK}
     return {
         **today.content,
-        **quick,
+        "spline": {"intervals": 12},
+        "search": QUICK,
         "start": {"joints": [0.0]},
         "path": [{"line": {"by": [1.0]}}],
     }
@@ -69,32 +69,25 @@ def test_the_path_is_recovered_and_the_plan_is_faster(both_motions, today):
     assert today.miss(both_motions.recorded, DT) < 1e-6
     assert both_motions.result.verified
     assert 0.05 < both_motions.saved < 0.5
-    assert (
-        both_motions.saved
-        == 1.0 - both_motions.result.t_end / both_motions.recorded.t_end
-    )
+    ratio = both_motions.result.t_end / both_motions.recorded.t_end
+    assert both_motions.saved == 1.0 - ratio
     assert both_motions.verdict.startswith(f"{100 * both_motions.saved:.1f} % faster: ")
 
 
 def test_both_begin_in_one_posture_and_end_in_one_place(both_motions):
-    planned, given = both_motions.result.trajectory, both_motions.recorded
-    np.testing.assert_allclose(planned.q[0], given.q[0], atol=1e-9)
-    _, task_map = bind(given.robot, given.task.task_space)
-    off = task_map.difference(
-        task_map.value(planned.q[-1]), task_map.value(given.q[-1])
-    )
-    assert np.abs(off).max() < 1e-6
-    assert np.abs(planned.q[-1] - given.q[-1]).max() > 0.01
+    planned, recorded = both_motions.result.trajectory, both_motions.recorded
+    np.testing.assert_allclose(planned.q[0], recorded.q[0], atol=1e-9)
+    _, task_map = bind(recorded.robot, recorded.task.task_space)
+    ends = (task_map.value(motion.q[-1]) for motion in (planned, recorded))
+    assert np.abs(task_map.difference(*ends)).max() < 1e-6
+    assert np.abs(planned.q[-1] - recorded.q[-1]).max() > 0.01
 
 
 def test_the_limits_are_the_same_and_remarks_name_what_exceeds_them(
     both_motions, today
 ):
-    assert [use.limit for use in both_motions.uses] == [
-        "torque",
-        "velocity",
-        "acceleration",
-    ]
+    kinds = [use.limit for use in both_motions.uses]
+    assert kinds == ["torque", "velocity", "acceleration"]
     assert all(use.planned <= 1.0 + 1e-4 for use in both_motions.uses)
     worst = max(use.recorded for use in both_motions.uses)
     assert worst == pytest.approx(
@@ -134,13 +127,10 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
     assert use.recorded_up_to == verification.worst_ratio
     percent = f"{100 * use.recorded_up_to:.1f} %"
     assert use.recorded_text.endswith(f", between the rows up to {percent}")
-    words = f"{use.limit}: {use.recorded_text} used by the recorded motion"
-    assert words in str(coarse)
-    *_, ratio = plot_both_motions(coarse).axes
-    (band,) = ratio.collections
+    assert f"{use.limit}: {use.recorded_text} used by the recorded" in str(coarse)
+    (band,) = plot_both_motions(coarse).axes[-1].collections
     highest = band.get_paths()[0].vertices[:, 1].max()
     assert highest == pytest.approx(use.recorded_up_to, rel=0.02)
-    assert ratio.lines[0].get_ydata().max() <= 1.0 + 1e-4
 
 
 @pytest.mark.parametrize(("factor", "is_doubted"), [(2.0, False), (1000.0, True)])
@@ -158,19 +148,14 @@ def test_a_remark_doubts_a_recorded_motion_far_faster_than_its_limits_allow(
 
 def test_the_figure_shows_both(both_motions):
     figure = plot_both_motions(both_motions)
-    progress, speed, ratio = figure.axes
-    for ax in (progress, speed, ratio):
+    _, speed, ratio = figure.axes
+    expected = [both_motions.result.t_end, both_motions.recorded.t_end]
+    for ax in figure.axes:
         ends = sorted(line.get_xdata()[-1] for line in ax.lines[:2])
-        assert ends == pytest.approx(
-            [both_motions.result.t_end, both_motions.recorded.t_end]
-        )
-    assert progress.get_title() == both_motions.verdict
+        assert ends == pytest.approx(expected)
     t, speeds = speed.lines[1].get_data()
-    trajectory = both_motions.result.trajectory
-    places = trajectory.robot.tool_placements(trajectory.position(t))[0]
-    assert np.trapezoid(speeds, t) == pytest.approx(
-        np.linalg.norm(np.diff(places, axis=0), axis=1).sum(), rel=1e-3
-    )
+    motion = both_motions.result.trajectory.at(t)
+    np.testing.assert_allclose(speeds, motion.tool_speed)
     assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
 
 
@@ -184,11 +169,11 @@ def test_a_plan_may_keep_the_end_posture(both_motions):
 
 def test_other_plans_follow_a_slower_first_one(both_motions, monkeypatch):
     """The motion of a plan cannot be beaten with the same intervals: finer ones come next, then its own joint path."""
-    wanted = []
+    tasks = []
 
     def plan(_robot, task, **_):
-        wanted.append((task.spline.intervals, task.task_space))
-        raise brachis.PlanningError("none") if len(wanted) < 3 else Planned
+        tasks.append((task.spline.intervals, task.task_space))
+        raise brachis.PlanningError("none") if len(tasks) < 3 else Planned
 
     class Planned(Exception):  # noqa: N818
         pass
@@ -196,7 +181,7 @@ def test_other_plans_follow_a_slower_first_one(both_motions, monkeypatch):
     monkeypatch.setattr(sys.modules["brachis.apps.comparison.comparison"], "plan", plan)
     with pytest.raises(Planned):
         compare(both_motions.recorded)
-    assert wanted == [(12, ("x", "y")), (36, ("x", "y")), (36, "joints")]
+    assert tasks == [(12, ("x", "y")), (36, ("x", "y")), (36, "joints")]
 
 
 def test_the_joint_path_of_today_has_a_timing(both_motions):
@@ -205,7 +190,3 @@ def test_the_joint_path_of_today_has_a_timing(both_motions):
     assert result.verified
     assert result.t_end < 1.02 * both_motions.recorded.t_end
     assert brachis.compare is comparison.compare
-
-
-def test_the_names_are_public():
-    assert brachis.Comparison is comparison.Comparison

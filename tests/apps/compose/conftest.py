@@ -16,7 +16,7 @@ BASE_INERTIAL = (
 )
 
 
-def arm_text(*, more=""):
+def arm_text(*, elements=""):
     """Text of three joints about unlike axes, 4 kg + 3 kg + 2 kg, on a base of 7 kg below ``world``."""
     joints = [
         Joint("revolute", axis=(0.0, 0.0, 1.0), xyz=(0.0, 0.1, 0.4)),
@@ -25,7 +25,7 @@ def arm_text(*, more=""):
         ),
         Joint("revolute", axis=(1.0, 0.0, 0.2), xyz=(0.3, 0.0, 0.05)),
     ]
-    text = chain_urdf(joints, tool=(0.2, 0.1, 0.0), more=more)
+    text = chain_urdf(joints, tool=(0.2, 0.1, 0.0), elements=elements)
     return text.replace("<link name='base'/>", BASE_INERTIAL)
 
 

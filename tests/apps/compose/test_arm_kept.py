@@ -47,7 +47,7 @@ def files(text):
 
 @pytest.fixture
 def arm_with_meshes(arm):
-    arm.write_text(arm_text(more=MESHES))
+    arm.write_text(arm_text(elements=MESHES))
     return arm
 
 
@@ -82,9 +82,8 @@ def test_meshes_of_a_package_are_found_from_another_folder(
     output.parent.mkdir()
     package = files(on_rail(arm_with_meshes, Rail(**RAIL), output=output))[2]
     assert (package == "package://arm_description/b.dae") == ros
-    found = mesh_file(package, output.parent)
-    assert found is not None
-    assert found.samefile(tmp_path / "arm_description/b.dae")
+    file = mesh_file(package, output.parent)
+    assert file.samefile(tmp_path / "arm_description/b.dae")
 
 
 def test_relative_meshes_become_absolute_without_a_file(
@@ -108,7 +107,7 @@ def test_a_composed_robot_may_have_no_meshes(arm_with_meshes):
 
 
 def test_the_rest_of_the_arm_is_kept_as_written(arm):
-    arm.write_text(arm_text(more=OTHER))
+    arm.write_text(arm_text(elements=OTHER))
     robot = parse(on_rail(arm, Rail(**RAIL)))
     before = parse(arm.read_text())
     assert robot.get("name") == "chain_rail"
@@ -119,32 +118,25 @@ def test_the_rest_of_the_arm_is_kept_as_written(arm):
         "gazebo[@reference='link1']",
         "joint[@name='grip']",
     ):
-        kept, written = (
-            etree.tostring(each.find(place), method="c14n").split()
-            for each in (robot, before)
-        )
-        assert b"".join(kept) == b"".join(written)
-    assert [each.text for each in robot.iter(etree.Comment)] == [" a remark "]
+        elements = (tree.find(place) for tree in (robot, before))
+        texts = [etree.tostring(element, method="c14n") for element in elements]
+        assert b"".join(texts[0].split()) == b"".join(texts[1].split())
+    assert [comment.text for comment in robot.iter(etree.Comment)] == [" a remark "]
     # The arm's own world has become the frame that stands on the carriage.
-    assert [each.get("reference") for each in robot.findall("gazebo")] == [
-        "rail_base",
-        "link1",
-    ]
+    references = [element.get("reference") for element in robot.findall("gazebo")]
+    assert references == ["rail_base", "link1"]
     assert robot.find("joint[@name='mount']/parent").get("link") == "rail_base"
     assert robot.find("joint[@name='rail_mount']/child").get("link") == "rail_base"
 
 
 def test_root_link_with_a_name_of_its_own_keeps_it(arm):
-    arm.write_text(arm_text().replace("'world'", "'stand'"))
+    text = arm_text().replace("<robot name='chain'>", "<robot>")
+    arm.write_text(text.replace("'world'", "'stand'"))
     robot = parse(on_rail(arm, Rail(**RAIL)))
-    links = {each.get("name") for each in robot.findall("link")}
+    assert robot.get("name") == "arm_rail", "that of its file"
+    links = {link_element.get("name") for link_element in robot.findall("link")}
     assert {"world", "rail_carriage", "stand"} <= links
     assert robot.find("joint[@name='rail_mount']/child").get("link") == "stand"
-
-
-def test_robot_without_a_name_gets_that_of_its_file(arm):
-    arm.write_text(arm_text().replace("<robot name='chain'>", "<robot>"))
-    assert parse(on_rail(arm, Rail(**RAIL))).get("name") == "arm_rail"
 
 
 def test_text_in_other_scripts(arm):
@@ -157,50 +149,27 @@ def test_text_in_other_scripts(arm):
 
 
 CLASHES = {
-    "joint": ("'j2'", "'rail'", {}, "name", {"name": "slide"}),
-    "joint called as a link": (
-        "'j2'",
-        "'rail_carriage'",
-        {},
-        "name",
-        {"name": "slide"},
-    ),
-    "link": ("'link2'", "'rail_mount'", {}, "name", {"name": "slide"}),
-    "new name of the root link": (
-        "'link2'",
-        "'rail_base'",
-        {},
-        "name",
-        {"name": "slide"},
-    ),
-    "root": ("'base'", "'floor'", {"root": "floor"}, "root", {"root": "ground"}),
-    "name taken from the arm": (
-        "'j2'",
-        "'j2'",
-        {"name": "j3"},
-        "name",
-        {"name": "rail"},
-    ),
-    "both new names": (
-        "'j2'",
-        "'j2'",
-        {"name": "slide", "root": "slide"},
-        "name",
-        {"name": "rail", "root": "world"},
-    ),
+    "joint": ("j2", "rail", {}, "name"),
+    "joint called as a link": ("j2", "rail_carriage", {}, "name"),
+    "link": ("link2", "rail_mount", {}, "name"),
+    "new name of the root link": ("link2", "rail_base", {}, "name"),
+    "root": ("base", "floor", {"root": "floor"}, "root"),
+    "name taken from the arm": ("j2", "j2", {"name": "j3"}, "name"),
+    "both new names": ("j2", "j2", {"name": "slide", "root": "slide"}, "name"),
 }
 
 
 @pytest.mark.parametrize("case", CLASHES)
 def test_name_clash_names_its_cure(arm, case):
-    old, new, options, parameter, cure = CLASHES[case]
-    arm.write_text(arm_text().replace(old, new))
+    old, new, options, parameter = CLASHES[case]
+    arm.write_text(arm_text().replace(f"'{old}'", f"'{new}'"))
     with pytest.raises(InputError) as caught:
         on_rail(arm, Rail(**RAIL, **options))
     assert caught.value.where == parameter
     assert f"Choose another {parameter}" in str(caught.value)
     if old != new:
-        assert new in str(caught.value)
+        assert f"'{new}'" in str(caught.value)
         assert str(arm) in str(caught.value)
+    cure = {parameter: "unlike"}
     text = on_rail(arm, Rail(**RAIL, **(options | cure)))
     assert Robot.from_urdf("cured", urdf_text=text).n == 4

@@ -12,6 +12,7 @@ from brachis.robot import dynamics
 
 from .conftest import ROOT
 
+X, _, Z = np.eye(3)
 JOINTS = {"gen3": 7, "arm8": 8, "gen3_rails": 9}
 
 
@@ -27,10 +28,8 @@ def gen3():
 def anywhere(robot, count):
     """Joints without end are turned once around."""
     limits = robot.limits
-    lower, upper = (
-        np.maximum(limits.position_lower, -math.pi),
-        np.minimum(limits.position_upper, math.pi),
-    )
+    lower = np.maximum(limits.position_lower, -math.pi)
+    upper = np.minimum(limits.position_upper, math.pi)
     return np.random.default_rng(0).uniform(lower, upper, (count, robot.n))
 
 
@@ -62,33 +61,20 @@ def test_gen3_is_the_published_chain(gen3):
     turns = np.array([0, 1, 1, 1, 1, 1, 1]) * math.pi
     twists = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 1.0]) * math.pi
     for q in anywhere(gen3, 50):
-        expected = pin.SE3(pin.exp3(np.array([math.pi, 0.0, 0.0])), np.zeros(3))
+        expected = pin.SE3(pin.exp3(math.pi * X), 0.0 * X)
         for angle, along, twist in zip(q + turns, d, twists, strict=True):
-            turn = pin.SE3(
-                pin.exp3(np.array([0.0, 0.0, angle])), np.array([0.0, 0.0, along])
-            )
-            expected = (
-                expected
-                * turn
-                * pin.SE3(pin.exp3(np.array([twist, 0.0, 0.0])), np.zeros(3))
-            )
-        assert_allclose(
-            gen3.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-12
-        )
+            turn = pin.SE3(pin.exp3(angle * Z), along * Z)
+            expected = expected * turn * pin.SE3(pin.exp3(twist * X), 0.0 * X)
+        assert gen3.tool_placement(q).isApprox(expected, 1e-12)
 
 
 def test_gen3_rails_carry_the_same_arm_upside_down(gen3):
     robot = load("gen3_rails")
     hanging = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 1.6]))
     for q in anywhere(robot, 20):
-        moved = (
-            pin.SE3(np.eye(3), np.array([*q[:2], 0.0]))
-            * hanging
-            * gen3.tool_placement(q[2:])
-        )
-        assert_allclose(
-            robot.tool_placement(q).homogeneous, moved.homogeneous, atol=1e-12
-        )
+        shift = pin.SE3(np.eye(3), np.array([*q[:2], 0.0]))
+        expected = shift * hanging * gen3.tool_placement(q[2:])
+        assert robot.tool_placement(q).isApprox(expected, 1e-12)
     for name in ("position_lower", "position_upper", "velocity", "torque"):
         assert_array_equal(getattr(robot.limits, name)[2:], getattr(gen3.limits, name))
 

@@ -11,10 +11,11 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 import yaml
+from mcap.reader import make_reader
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from rosbags.rosbag2.storage_mcap import McapReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import brachis
 from brachis import export
@@ -43,24 +44,19 @@ def written(line_trajectory, tmp_path_factory):
 
 def equals_the_motion(trajectory, t, q, qdot, qddot):
     motion = trajectory.sample(DT)
-    for found, expected in (
-        (t, motion.t),
-        (q, motion.q),
-        (qdot, motion.qdot),
-        (qddot, motion.qddot),
-    ):
-        assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+    expected = (motion.t, motion.q, motion.qdot, motion.qddot)
+    for values, known in zip((t, q, qdot, qddot), expected, strict=True):
+        assert_allclose(values, known, rtol=0.0, atol=1e-9)
     assert len(t) > 100
 
 
 def test_parquet(line_trajectory, written):
     table = pyarrow.parquet.read_table(written(".parquet", dt=DT))
-    frame = {name: table[name].to_numpy() for name in table.column_names}
-    parts = (
-        np.column_stack([frame[f"{kind}_{name}"] for name in NAMES])
+    samples = (
+        np.column_stack([table[f"{kind}_{name}"] for name in NAMES])
         for kind in ("q", "qd", "qdd")
     )
-    equals_the_motion(line_trajectory, frame["t"], *parts)
+    equals_the_motion(line_trajectory, table["t"], *samples)
     about = json.loads(table.schema.metadata[b"brachis"])
     assert about == {
         "joints": dict.fromkeys(NAMES, "rad"),
@@ -70,17 +66,14 @@ def test_parquet(line_trajectory, written):
 
 
 def test_json_names_its_schema_and_fulfils_it(line_trajectory, written):
-    content, schema = (
-        json.loads(written(".json", dt=DT).read_text()),
-        export.samples_schema(),
-    )
+    content = json.loads(written(".json", dt=DT).read_text())
+    schema = export.samples_schema()
     assert content["$schema"] == schema["$id"]
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(content, schema)
     samples = content["samples"]
-    equals_the_motion(
-        line_trajectory, samples["t"], samples["q"], samples["qdot"], samples["qddot"]
-    )
+    curves = (samples[name] for name in ("t", "q", "qdot", "qddot"))
+    equals_the_motion(line_trajectory, *curves)
     assert content["joint_names"] == list(NAMES)
     del samples["q"]
     with pytest.raises(jsonschema.ValidationError, match="'q' is a required property"):
@@ -102,25 +95,17 @@ def equals_the_message(trajectory, message):
     equals_the_motion(trajectory, t, *parts)
 
 
-def test_mcap_bag(line_trajectory, written):
+def test_mcap_bag_with_the_definitions_of_ros(line_trajectory, written):
     reader = McapReader(written(".mcap", dt=DT))
     reader.open()
     ((connection, stamp, data),) = reader.messages(reader.connections, 0, 1)
+    (schema,) = reader.schemas.values()
     reader.close()
     assert (connection.topic, connection.msgtype, stamp) == (export.TOPIC, MESSAGE, 0)
     equals_the_message(line_trajectory, STORE.deserialize_cdr(data, MESSAGE))
-
-
-def test_the_bag_defines_its_messages_as_ros_does(written):
-    reader = McapReader(written(".mcap", dt=DT))
-    reader.open()
-    (schema,) = reader.schemas.values()
-    reader.close()
-    from rosbags.typesys import get_types_from_msg
-
-    found = get_types_from_msg(schema.data, schema.name)
-    assert MESSAGE in found
-    for name, definition in found.items():
+    types = get_types_from_msg(schema.data, schema.name)
+    assert MESSAGE in types
+    for name, definition in types.items():
         assert definition[1] == STORE.fielddefs[name][1], name
 
 
@@ -129,14 +114,14 @@ def as_message(value, name):
     kind = STORE.types[name]
     fields = {}
     for key, (form, detail) in STORE.fielddefs[name][1]:
-        given = value[key]
+        field = value[key]
         if form.name == "NAME":
-            given = as_message(given, detail)
+            field = as_message(field, detail)
         elif form.name == "SEQUENCE" and detail[0][0].name == "NAME":
-            given = [as_message(each, detail[0][1]) for each in given]
+            field = [as_message(item, detail[0][1]) for item in field]
         elif form.name == "SEQUENCE" and detail[0][1][0] == "float64":
-            given = np.array(given, dtype=np.float64)
-        fields[key] = given
+            field = np.array(field, dtype=np.float64)
+        fields[key] = field
     assert set(value) == set(fields)
     return kind(**fields)
 
@@ -163,28 +148,47 @@ def test_urscript(ur10, tmp_path):
     with pytest.warns(BrachisWarning, match="rail"):
         export.write(ur10, path, joints=joints, dt=0.01)
     text = path.read_text()
-    postures = [json.loads(found) for found in re.findall(r"servoj\((\[.*?\])", text)]
-    times = [
-        float(found)
-        for found in re.findall(r"servoj\(\[.*?\], 0, 0, ([0-9.e-]+),", text)
-    ]
+    calls = re.findall(r"servoj\((\[.*?\]), 0, 0, ([0-9.e-]+),", text)
+    postures = [json.loads(posture) for posture, _ in calls]
+    times = [float(time) for _, time in calls]
     assert times == [0.01] * 110
-    assert_allclose(
-        postures,
-        ur10.position(np.minimum(np.cumsum(times), ur10.t_end))[:, 1:],
-        atol=1e-9,
-    )
+    t = np.minimum(np.cumsum(times), ur10.t_end)
+    assert_allclose(postures, ur10.position(t)[:, 1:], atol=1e-9)
     (start,) = re.findall(r"start = (\[.*\])", text)
     assert_array_equal(json.loads(start), ur10.q[0, 1:])
-    assert [line.split()[0] for line in text.splitlines()].count(
-        "end"
-    ) == 3  # of def, while and if
+    assert len(re.findall(r"^ *end\b", text, re.MULTILINE)) == 3, "of def, while and if"
 
 
 SENTENCE = "joint rail moves by 0.6 m (0 to 0.6 m) and is not in this file"
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".yaml", ".script"])
+def remark_in(path):
+    """What a file says of joints that are left out."""
+    match path.suffix:
+        case ".json":
+            content = json.loads(path.read_text())
+            jsonschema.validate(content, export.samples_schema())
+            return content["warnings"]
+        case ".parquet":
+            metadata = pyarrow.parquet.read_table(path).schema.metadata
+            return json.loads(metadata[b"brachis"])["left_out"]
+        case ".mcap":
+            with path.open("rb") as stream:
+                (record,) = make_reader(stream).iter_metadata()
+            assert record.name == "brachis"
+            return [record.metadata["left_out"]]
+        case _:
+            lines = (line.split("# ") for line in path.read_text().splitlines())
+            return [
+                line[1].removeprefix("brachis: ")
+                for line in lines
+                if SENTENCE in line[-1]
+            ]
+
+
+@pytest.mark.parametrize(
+    "suffix", [".csv", ".json", ".yaml", ".script", ".parquet", ".mcap"]
+)
 def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(
     ur10, tmp_path, suffix
 ):
@@ -192,32 +196,9 @@ def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(
     with pytest.warns(BrachisWarning) as caught:
         export.write(ur10, path, joints=ur10.joint_names[1:], dt=0.1)
     (warning,) = caught
-    assert str(warning.message).startswith(
-        f"{SENTENCE}. Move the missing joints with their own controller"
-    )
-    text = path.read_text()
-    if suffix == ".json":
-        content = json.loads(text)
-        assert content["warnings"] == [SENTENCE]
-        jsonschema.validate(content, export.samples_schema())
-    else:
-        (line,) = [line for line in text.splitlines() if SENTENCE in line]
-        assert line.lstrip().startswith("# ")
-
-
-def test_metadata_name_a_rail_that_is_left_out(ur10, tmp_path):
-    from mcap.reader import make_reader
-
-    for suffix in (".parquet", ".mcap"):
-        with pytest.warns(BrachisWarning):
-            export.write(
-                ur10, tmp_path / f"motion{suffix}", joints=ur10.joint_names[1:], dt=0.1
-            )
-    table = pyarrow.parquet.read_table(tmp_path / "motion.parquet")
-    assert json.loads(table.schema.metadata[b"brachis"])["left_out"] == [SENTENCE]
-    with (tmp_path / "motion.mcap").open("rb") as stream:
-        (record,) = make_reader(stream).iter_metadata()
-    assert (record.name, record.metadata) == ("brachis", {"left_out": SENTENCE})
+    hint = "Move the missing joints with their own controller"
+    assert str(warning.message).startswith(f"{SENTENCE}. {hint}")
+    assert remark_in(path) == [SENTENCE]
 
 
 def test_a_joint_that_stands_still_may_be_left_out_without_a_word(ur10, tmp_path):
@@ -237,19 +218,13 @@ def test_gif(line_trajectory, written):
             durations.append(film.info["duration"])
             pictures.append(np.asarray(film.convert("RGB"), dtype=int))
     assert durations == [1200, 1200, 1200, 1000]
-    assert len(pictures) == len(times)
-    for (figure, _), t, picture in zip(
-        frames(line_trajectory, times), times, pictures, strict=True
-    ):
-        ax, *beside = figure.axes
-        place = line_trajectory.robot.tool_placement(
-            line_trajectory.position(t)
-        ).translation[:2]
-        x, y = ax.transData.transform(place)
-        assert (
-            picture[picture.shape[0] - round(y), round(x)].max() < 80
-        )  # the tool, black
-        (torques,) = beside
+    tool, _ = line_trajectory.robot.tool_placements(line_trajectory.position(times))
+    figures = (figure for figure, _ in frames(line_trajectory, times))
+    for figure, t, place, picture in zip(figures, times, tool, pictures, strict=True):
+        ax, torques = figure.axes
+        x, y = ax.transData.transform(place[:2])
+        black = picture[picture.shape[0] - round(y), round(x)]
+        assert black.max() < 80, "the tool"
         assert "tau" in torques.get_ylabel()
         (now,) = (line for line in torques.lines if line.get_gid() == "now")
         assert list(now.get_xdata()) == [t, t]
@@ -276,22 +251,10 @@ def test_an_animation_may_be_slower_and_nothing_else_may(line_trajectory, tmp_pa
 @pytest.mark.skipif(shutil.which("ffprobe") is None, reason="ffmpeg is not installed")
 def test_mp4(line_trajectory, written):
     path = written(".mp4", dt=0.5)
-    asked = [
-        "-count_frames",
-        "-select_streams",
-        "v",
-        "-show_entries",
-        "stream=nb_read_frames,r_frame_rate",
-        "-of",
-        "json",
-    ]
-    done = subprocess.run(
-        [shutil.which("ffprobe"), "-v", "error", *asked, path],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    (stream,) = json.loads(done.stdout)["streams"]
+    options = "-v error -count_frames -select_streams v -of json -show_entries"
+    entries = "stream=nb_read_frames,r_frame_rate"
+    command = [shutil.which("ffprobe"), *options.split(), entries, path]
+    (stream,) = json.loads(subprocess.check_output(command))["streams"]
     assert stream["nb_read_frames"] == str(len(line_trajectory.sample(0.5).t))
     assert stream["r_frame_rate"] == "2/1"
 
@@ -336,9 +299,8 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
         )
     _, header, first, *_ = (tmp_path / "motion.csv").read_text().splitlines()
     assert header == "t,q_j3,q_j1,qd_j3,qd_j1,qdd_j3,qdd_j1,tau_j3,tau_j1"
-    assert [float(cell) for cell in first.split(",")[1:3]] == line_trajectory.q[
-        0, [2, 0]
-    ].tolist()
+    q = [float(cell) for cell in first.split(",")[1:3]]
+    assert q == line_trajectory.q[0, [2, 0]].tolist()
     with pytest.raises(UnknownNameError, match="there is no joint named 'j4'"):
         export.write(line_trajectory, tmp_path / "motion.csv", joints=["j4"])
 
@@ -357,7 +319,6 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
             {"dt": 0.005},
             r"an animation cannot have this period; found 0.005 s; allowed: a multiple of 0.01 s",
         ),
-        ("motion.gif", {"dt": 0.0}, "an animation cannot have this period"),
         (
             "motion.gif",
             {"joints": ["j1"]},
@@ -368,10 +329,7 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
             {"slower": 1e9},
             r"slower: the animation would have too many pictures; .*Lower slower",
         ),
-        *(
-            (f"motion.{suffix}", {"joints": ["j1", "j2", "j1"]}, "'j1' is given twice")
-            for suffix in ("csv", "json", "parquet", "yaml")
-        ),
+        ("motion.csv", {"joints": ["j1", "j2", "j1"]}, "'j1' is given twice"),
         ("motion.json", {"last": "held"}, "Did you mean 'hold'"),
     ],
 )

@@ -31,28 +31,29 @@ def marks_of(candidates):
     (ax,) = plot_candidates(candidates).axes
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     times = [marks.get_offsets()[:, 0].tolist() for marks in ax.collections]
-    return dict(zip(labels, times, strict=True)), [
-        tick.get_text() for tick in ax.get_yticklabels()
-    ]
+    return dict(zip(labels, times, strict=True))
+
+
+def times_of(marks, words):
+    (times,) = (marks[label] for label in marks if label.startswith(words))
+    return times
 
 
 @pytest.mark.parametrize("t_end", [2.002, 1.9])
 def test_no_unfinished_one_is_left_of_the_fastest_for_its_estimate(t_end):
     """Finishing the fastest made its time longer, or splines of better knots shorter: so it would with the others."""
     fastest = candidate("j1", 2.0, t_end, verified=True)
-    marks, _ = marks_of([fastest, candidate("j2", 2.0005), candidate("j3", 2.5)])
+    marks = marks_of([fastest, candidate("j2", 2.0005), candidate("j3", 2.5)])
     (star,) = marks["the fastest"]
     assert star == t_end
-    (unfinished,) = (
-        times for label, times in marks.items() if label.startswith("not finished")
-    )
+    unfinished = times_of(marks, "not finished")
     assert unfinished == pytest.approx([2.0005 * t_end / 2.0, 2.5 * t_end / 2.0])
     assert min(unfinished) > star
 
 
 def test_refined_times_are_drawn_as_they_are():
     fastest = candidate("j1", 2.0, 2.002, verified=True)
-    marks, _ = marks_of(
+    marks = marks_of(
         [
             fastest,
             candidate("j2", 2.3, 2.4, verified=True),
@@ -60,20 +61,14 @@ def test_refined_times_are_drawn_as_they_are():
         ]
     )
     assert marks["refined and verified"] == [2.4]
-    (failed,) = (
-        times for label, times in marks.items() if label.startswith("no verified")
-    )
-    assert failed == [2.2]
+    assert times_of(marks, "no verified") == [2.2]
 
 
 def test_without_a_motion_times_stay_as_they_are():
-    marks, _ = marks_of(
+    marks = marks_of(
         [candidate("j1", 2.0), candidate("j2", math.inf, status="out of reach")]
     )
-    (unfinished,) = (
-        times for label, times in marks.items() if label.startswith("not finished")
-    )
-    assert unfinished == [2.0]
+    assert times_of(marks, "not finished") == [2.0]
 
 
 def test_nothing_to_draw_is_an_error():

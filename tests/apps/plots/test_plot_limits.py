@@ -1,12 +1,10 @@
 """Ratios to all limits, a panel for each kind."""
 
-import dataclasses
-
 import numpy as np
 
 from brachis.apps.bottleneck import limit_ratios
 from brachis.apps.plots import plot_limits
-from brachis.task import ToolLimits
+from support.motions import with_tool_speed
 
 
 def lines(ax):
@@ -19,10 +17,7 @@ def lines(ax):
 
 
 def test_a_panel_for_every_kind_and_a_line_for_every_value(line_trajectory):
-    capped = line_trajectory.task.model_copy(
-        update={"tool_limits": ToolLimits(speed=2.0)}
-    )
-    trajectory = dataclasses.replace(line_trajectory, task=capped)
+    trajectory = with_tool_speed(line_trajectory, 2.0)
     ratios = limit_ratios(trajectory)
     panels = plot_limits(trajectory).axes
     drawn = {

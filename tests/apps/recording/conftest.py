@@ -13,6 +13,11 @@ SCARA = ROOT / "robots/scara3/robot.urdf"
 DT = 0.004
 
 
+def smooth_step(u):
+    """From 0 to 1 for u from 0 to 1, with three derivatives that vanish at both ends."""
+    return u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
+
+
 @pytest.fixture(scope="package")
 def motion():
     """A planned motion, which a file has at every 4 ms."""

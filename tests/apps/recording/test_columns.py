@@ -4,30 +4,28 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import brachis
 from brachis.apps.recording import read_recording
 from brachis.apps.recording.recording import check_units
 from brachis.errors import InputError, TaskError
 from brachis.robot import Robot
 
-from .conftest import ROOT, SCARA
+from .conftest import smooth_step
 
-ROBOT = Robot.from_urdf(SCARA)
+ROBOT = brachis.robots.scara3
 
 
 def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
     t = np.linspace(0.0, 1.0, 1001)
-    way = t**4 * (
-        35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3
-    )  # 3.5e-11 rad in the first millisecond
-    found = read_recording(write("t,j1,j2,j3", t, way, -way, 0.5 * way), ROBOT, {})
-    assert found.t[-1] == 1.0
-    assert not any("stands still" in line for line in found.notes)
+    q = np.outer(smooth_step(t), [1.0, -1.0, 0.5])  # 3.5e-11 rad in the first ms
+    recording = read_recording(write("t,j1,j2,j3", t, q), ROBOT, {})
+    assert recording.t[-1] == 1.0
+    assert not any("stands still" in line for line in recording.notes)
 
 
 @pytest.mark.parametrize(
     ("header", "units", "factors"),
     [
-        ("t,j1,j2,j3", {}, (1.0, 1.0)),
         ("time,q_j1,q_j2,q_j3", {}, (1.0, 1.0)),
         ("Time [ms],J1_pos [deg],J2_pos [deg],J3_pos [deg]", {}, (1e3, 180.0 / np.pi)),
         ("t_ms,j1_deg,j2_deg,j3_deg", {}, (1e3, 180.0 / np.pi)),
@@ -58,22 +56,16 @@ def test_columns_in_any_order_and_others_beside_them(table, write):
     assert "left out the columns j1_effort" in found.notes
 
 
-def test_semicolons_and_decimal_commas(table, tmp_path):
+def test_semicolons_and_decimal_commas(table, write):
     t, q, _ = table
-    rows = [
-        ";".join(f"{value:.12f}".replace(".", ",") for value in row)
-        for row in np.column_stack([t, q])
-    ]
-    path = tmp_path / "today.csv"
-    path.write_text("\n".join(["t;j1;j2;j3", *rows]))
+    path = write("t,j1,j2,j3", t, q, fmt="%.12f")
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
     assert_allclose(read_recording(path, ROBOT, {}).q, q, atol=1e-12)
 
 
 def test_prismatic_joints_have_lengths(write):
-    robot, t = (
-        Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf"),
-        np.linspace(0.0, 1.0, 20),
-    )
+    robot = brachis.robots.gantry2
+    t = np.linspace(0.0, 1.0, 20)
     names = robot.joint_names
     path = write(f"t,{names[0]} [mm],{names[1]}", t, 100.0 * t, 0.2 * t)
     assert_allclose(
@@ -88,20 +80,13 @@ def test_prismatic_joints_have_lengths(write):
 
 def test_standing_still_before_and_after_does_not_count(table, write):
     t, q, _ = table
-    around = np.concatenate(
-        [np.repeat(q[:1], 10, axis=0), q[1:-1], np.repeat(q[-1:], 6, axis=0)]
-    )
-    times = 0.004 * np.arange(len(around))
-    found = read_recording(write("t,j1,j2,j3", times, around), ROBOT, {})
-    assert len(found.t) == len(t)
-    assert (
-        "left out 0.036 s before the motion, in which the robot stands still (9 rows)"
-        in found.notes
-    )
-    assert (
-        "left out 0.02 s after the motion, in which the robot stands still (5 rows)"
-        in found.notes
-    )
+    waiting = np.pad(q, ((9, 5), (0, 0)), mode="edge")
+    times = 0.004 * np.arange(len(waiting))
+    recording = read_recording(write("t,j1,j2,j3", times, waiting), ROBOT, {})
+    assert len(recording.t) == len(t)
+    reason = "in which the robot stands still"
+    assert f"left out 0.036 s before the motion, {reason} (9 rows)" in recording.notes
+    assert f"left out 0.02 s after the motion, {reason} (5 rows)" in recording.notes
 
 
 @pytest.mark.parametrize(
@@ -164,12 +149,8 @@ def test_rows_that_are_no_motion(table, write):
 @pytest.mark.parametrize("unit", ["deg/s^2", "deg/s2"])
 def test_accelerations_with_their_unit(unit, table, write):
     t, q, qdot = table
-    path = write(
-        f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2",
-        t,
-        q,
-        np.rad2deg(qdot),
-    )
+    header = f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2"
+    path = write(header, t, q, np.rad2deg(qdot))
     assert_allclose(read_recording(path, ROBOT, {}).qddot, qdot, rtol=1e-12)
 
 

@@ -13,11 +13,15 @@ from brachis.apps.recording import import_motion, read_recording
 from brachis.apps.recording.nodes import nodes_of
 from brachis.apps.recording.recording import Recording
 from brachis.errors import InputError, PathError, ResultFileError
-from brachis.robot import Robot
 from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import verify_trajectory
 
-from .conftest import DT, ROOT, SCARA
+from .conftest import DT, SCARA, smooth_step
+
+
+def failures_of(trajectory):
+    checks = verify_trajectory(trajectory).checks
+    return {check.name for check in checks if not check.passed}
 
 
 def test_the_motion_comes_back(imported, motion):
@@ -28,23 +32,21 @@ def test_the_motion_comes_back(imported, motion):
     assert imported.task.spline.rest == "full"
 
 
+def check_of_path(trajectory):
+    checks = verify_trajectory(trajectory).checks
+    return next(check for check in checks if check.name == "path error")
+
+
 def test_its_path_comes_back_and_it_verifies(imported, motion):
-    found = verify_trajectory(imported)
-    assert {check.name for check in found.checks if not check.passed} <= {
-        "torque ratio"
-    }
-    assert found.worst_ratio == pytest.approx(1.0, abs=2e-3)
-    assert found.path_error < 1e-6
-    (path,) = (check for check in found.checks if check.name == "path error")
-    assert (path.allowed, path.remark) == (
-        1e-6,
-        "the path was recovered from the motion",
-    )
-    places = np.array(
-        [motion.robot.tool_placement(q).translation[:2] for q in imported.q]
-    )
-    start = places[0]
-    assert np.abs(places[:, 0] - start[0]).max() < 1e-9  # a line along y
+    assert failures_of(imported) <= {"torque ratio"}
+    verification = verify_trajectory(imported)
+    assert verification.worst_ratio == pytest.approx(1.0, abs=2e-3)
+    assert verification.path_error < 1e-6
+    path = check_of_path(imported)
+    assert path.allowed == 1e-6
+    assert path.remark == "the path was recovered from the motion"
+    x = motion.robot.tool_placements(imported.q)[0][:, 0]
+    assert np.abs(x - x[0]).max() < 1e-9  # a line along y
 
 
 def test_a_saved_recording_keeps_its_notes_and_its_path(imported, tmp_path):
@@ -89,12 +91,7 @@ def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
 def test_a_motion_that_leaves_its_recovered_path_fails(imported):
     q = np.array(imported.q)
     q[len(q) // 2] += 1e-5
-    (path,) = (
-        check
-        for check in verify_trajectory(replace(imported, q=q)).checks
-        if check.name == "path error"
-    )
-    assert not path.passed
+    assert not check_of_path(replace(imported, q=q)).passed
 
 
 def test_bottlenecks_are_when_limits_are_active(imported):
@@ -111,28 +108,23 @@ def test_bottlenecks_are_when_limits_are_active(imported):
 
 
 def test_few_digits_get_a_smoothing_spline(motion, table, write):
-    t, q, _ = table
-    found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task)
+    path = write("t,j1,j2,j3", *table[:2], fmt="%.6f")
+    again = import_motion(path, task=motion.task)
     assert any(
         "smoothing spline, 2.9e-07 rad (rms) off" in line
-        for line in found.recovered.told
+        for line in again.recovered.told
     )
-    assert 1e-6 < found.recovered.tolerance < 1e-5  # as the digits have it
-    assert found.t_end == pytest.approx(motion.t_end, abs=2.5 * DT)
-    middle = np.linspace(0.2, 2.0, 500)
-    times = np.linspace(
-        0.0, 2.0 * DT, 3
-    )  # the rows that were left out at the beginning are whole ones
-    later = min(
-        times,
-        key=lambda late: np.abs(
-            found.position(middle) - motion.position(middle + late)
-        ).max(),
-    )
-    assert_allclose(found.position(middle), motion.position(middle + later), atol=2e-6)
-    assert_allclose(
-        found.acceleration(middle), motion.acceleration(middle + later), atol=0.2
-    )
+    assert 1e-6 < again.recovered.tolerance < 1e-5  # as the digits have it
+    assert again.t_end == pytest.approx(motion.t_end, abs=2.5 * DT)
+    t = np.linspace(0.2, 2.0, 500)
+
+    def error(delay):
+        return np.abs(again.position(t) - motion.position(t + delay)).max()
+
+    # The rows that were left out at the beginning are whole ones.
+    delay = min((0.0, DT, 2.0 * DT), key=error)
+    assert error(delay) < 2e-6
+    assert_allclose(again.acceleration(t), motion.acceleration(t + delay), atol=0.2)
 
 
 @pytest.mark.parametrize("digits", [4, 5, 6, 8])
@@ -150,25 +142,19 @@ def test_rest_is_found_in_few_digits(digits, motion, table, write):
 @pytest.mark.parametrize("digits", [4, 5, 6, 8])
 def test_accelerations_that_set_in_with_a_jump_are_no_rest(digits, write):
     t = np.arange(0.0, 2.001, DT)
-    way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)[:, None] * [
-        1.0,
-        -0.5,
-        0.02,
-    ]
-    recording = read_recording(
-        write("t,j1,j2,j3", t, way, fmt=f"%.{digits}f"), Robot.from_urdf(SCARA), {}
+    progress = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)
+    path = write(
+        "t,j1,j2,j3", t, progress, -0.5 * progress, 0.02 * progress, fmt=f"%.{digits}f"
     )
-    assert nodes_of(recording, recording.rounding / np.sqrt(3.0)).at_rest == (
-        True,
-        False,
-    )
+    recording = read_recording(path, brachis.robots.scara3, {})
+    nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
+    assert nodes.at_rest == (True, False)
 
 
 def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
     robot = brachis.robots.tx90l_rail
     t = np.linspace(0.0, 1.0, 251)
-    progress = t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3)
-    q = np.outer(progress, np.full(robot.n, 0.3))
+    q = np.outer(smooth_step(t), np.full(robot.n, 0.3))
     rail = robot.position_units.index("m")
     q[:, rail] = q[:, rail].round(4)  # 0.1 mm
     header = ",".join(["t", *robot.joint_names])
@@ -183,22 +169,13 @@ def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
 
 def test_rates_that_contradict_the_positions_are_left_out(motion, write):
     samples = motion.sample(DT)
-    header = ",".join(
-        [
-            "t",
-            *(
-                f"{kind}{joint}"
-                for kind in ("", "qd_", "qdd_")
-                for joint in ("j1", "j2", "j3")
-            ),
-        ]
-    )
+    header = "t,j1,j2,j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3"
     path = write(header, samples.t, samples.q, samples.qdot, 2.0 * samples.qddot)
-    found = import_motion(path, task=motion.task)
+    again = import_motion(path, task=motion.task)
     assert any(
-        "the file's accelerations do not agree" in line for line in found.recovered.told
+        "the file's accelerations do not agree" in line for line in again.recovered.told
     )
-    assert_allclose(found.acceleration(samples.t), samples.qddot, atol=0.05)
+    assert_allclose(again.acceleration(samples.t), samples.qddot, atol=0.05)
 
 
 def test_positions_with_noise_get_a_smoothing_spline(motion, write):
@@ -236,35 +213,23 @@ def test_accelerations_that_jump_do_not_overshoot():
 
 def test_ends_in_motion(motion, table, write):
     t, q, qdot = table
-    kept = slice(60, -60)
-    found = import_motion(
-        write("t,j1,j2,j3,qd_j1,qd_j2,qd_j3", t[kept], q[kept], qdot[kept]),
-        task=motion.task,
-    )
-    boundary = found.task.boundary
-    for speed, end in (
-        (boundary.start_speed, t[kept][0]),
-        (boundary.end_speed, t[kept][-1]),
-    ):
-        before, after = (
-            motion.robot.tool_placement(q).translation
-            for q in motion.position(end + np.array([-1e-5, 1e-5]))
-        )
-        assert speed == pytest.approx(np.linalg.norm(after - before) / 2e-5, rel=1e-4)
-    failed = {
-        check.name for check in verify_trajectory(found).checks if not check.passed
-    }
-    assert failed <= {"torque ratio"}
+    middle = slice(60, -60)
+    columns = (t[middle], q[middle], qdot[middle])
+    path = write("t,j1,j2,j3,qd_j1,qd_j2,qd_j3", *columns)
+    again = import_motion(path, task=motion.task)
+    boundary = again.task.boundary
+    speeds = [boundary.start_speed, boundary.end_speed]
+    ends = t[middle][[0, -1]]
+    assert speeds == pytest.approx(motion.at(ends).tool_speed, rel=1e-6)
+    assert failures_of(again) <= {"torque ratio"}
 
 
 def test_a_tool_that_stops_and_turns_off_is_an_error(motion, table, write):
     t, q, _ = table
     back = q + 0.5 * (q - q[0]) * [0.0, 0.0, 1.0]
-    path = write(
-        "t,j1,j2,j3",
-        np.append(t, t[-1] + t[1:]),
-        np.concatenate([q, back[-2::-1] + q[-1] - back[-1]]),
-    )
+    times = np.append(t, t[-1] + t[1:])
+    positions = np.concatenate([q, back[-2::-1] + q[-1] - back[-1]])
+    path = write("t,j1,j2,j3", times, positions)
     with pytest.raises(
         PathError,
         match=r"follows no smooth path within the tolerance.* split the file there",
@@ -287,25 +252,12 @@ def test_a_task_file_is_named_if_its_robot_is_wrong(file, motion, tmp_path):
 
 @pytest.mark.parametrize("space", ["pose", "pose_free_roll", "joints"])
 def test_the_path_of_an_arm_in_space_comes_back(space, write):
-    robot, t = (
-        Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf"),
-        np.linspace(0.0, 2.0, 401),
-    )
-    u = t / 2.0
-    progress = (u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3))[:, None]
-    q = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.4]) + progress * [
-        0.4,
-        -0.2,
-        0.3,
-        0.3,
-        -0.2,
-        0.1,
-        0.5,
-    ]
-    found = import_motion(
-        write(",".join(["t", *robot.joint_names]), t, q), robot, task_space=space
-    )
-    result = verify_trajectory(found)
+    robot = brachis.robots.iiwa14
+    t = np.linspace(0.0, 2.0, 401)
+    start = [0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.4]
+    q = start + np.outer(smooth_step(t / 2.0), [0.4, -0.2, 0.3, 0.3, -0.2, 0.1, 0.5])
+    path = write(",".join(["t", *robot.joint_names]), t, q)
+    result = verify_trajectory(import_motion(path, robot, task_space=space))
     assert result.passed, result
     assert result.path_error < 1e-6
     assert brachis.import_motion is import_motion

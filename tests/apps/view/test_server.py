@@ -101,9 +101,8 @@ def test_a_host_that_is_not_here_is_an_error(monkeypatch):
 
 
 def test_loopback_addresses_are_local():
-    assert is_local("127.0.0.1")
-    assert is_local("::1")
-    assert not is_local("192.0.2.1")
+    hosts = ("127.0.0.1", "::1", "192.0.2.1")
+    assert [is_local(host) for host in hosts] == [True, True, False]
 
 
 def test_without_viser_the_error_says_what_to_install(monkeypatch):
