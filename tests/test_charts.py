@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import null_space
 
 import brachis
@@ -90,17 +91,15 @@ def test_a_saved_motion_passes_its_checks_again(result, saved_file):
     loaded = Trajectory.load(saved_file)
     assert loaded.branch == "chart"
     assert loaded.redundant_joints == result.trajectory.redundant_joints
-    np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
-    np.testing.assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
+    assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
+    assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
     t = np.linspace(0.0, loaded.t_end, 50)
-    np.testing.assert_allclose(
-        loaded.position(t), result.trajectory.position(t), atol=1e-14
-    )
+    assert_allclose(loaded.position(t), result.trajectory.position(t), atol=1e-14)
     assert verify_trajectory(loaded).passed
     # The curves of the chart describe the motion: sigma = C q - p.
     rows = ChartRows(loaded.chart_rows, loaded.chart_knots)
     sigma = rows.values(loaded.path_coordinate(loaded.times), loaded.q)
-    np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
+    assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
 
 
 def with_arrays(path: Path, **changed: Any) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.verify import verify_trajectory
@@ -52,7 +53,7 @@ def test_everything_closes_over_the_seam(circle):
         trajectory.torque,
     ):
         first, last = part(ends)
-        np.testing.assert_allclose(last, first, atol=1e-9)
+        assert_allclose(last, first, atol=1e-9)
     assert np.abs(trajectory.velocity(0.0)).max() > 0.1
     names = {check.name for check in circle.verification.checks}
     assert {
@@ -113,9 +114,7 @@ def test_a_free_start_posture_is_the_end_posture():
         variant(start="free", path_start=place, search=QUICK, spline={"intervals": 12})
     )
     assert result.verified
-    np.testing.assert_allclose(
-        result.trajectory.q[0], result.trajectory.q[-1], atol=1e-9
-    )
+    assert_allclose(result.trajectory.q[0], result.trajectory.q[-1], atol=1e-9)
 
 
 def test_the_verification_sees_changes_at_seams(circle):
@@ -178,7 +177,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
         found = pin.getFrameVelocity(
             model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         ).linear
-        np.testing.assert_allclose(found, [0.0, speed, 0.0], atol=1e-9)
+        assert_allclose(found, [0.0, speed, 0.0], atol=1e-9)
     assert result.t_end < brachis.plan({**task, "boundary": {}}).t_end
     faster = replace(
         trajectory,

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.errors import InputError, TaskError, UnknownNameError
@@ -155,13 +156,9 @@ def test_a_robot_with_other_limits_keeps_the_rest():
         torque={"joint_1": 100.0}, velocity=1.0, scale={"torque": 0.5}
     )
     assert changed.limits.torque[1] == 50.0
-    np.testing.assert_array_equal(
-        changed.limits.torque[2:], 0.5 * robot.limits.torque[2:]
-    )
-    np.testing.assert_array_equal(changed.limits.velocity, 1.0)
-    np.testing.assert_array_equal(
-        changed.limits.position_lower, robot.limits.position_lower
-    )
+    assert_array_equal(changed.limits.torque[2:], 0.5 * robot.limits.torque[2:])
+    assert_array_equal(changed.limits.velocity, 1.0)
+    assert_array_equal(changed.limits.position_lower, robot.limits.position_lower)
     again = changed.with_limits(torque={"joint_2": 20.0}).with_payload(2.0).limits
     assert again.torque[1:3].tolist() == [50.0, 20.0]
     assert robot.limits.torque[1] == 318.0
@@ -185,17 +182,13 @@ def test_samples_carry_the_tool():
     result = brachis.plan("scara3", **LINE)
     samples = result.sample(0.01)
     placement = result.trajectory.robot.tool_placement(samples.q[30])
-    np.testing.assert_allclose(
-        samples.tool_position[30], placement.translation, atol=1e-12
-    )
+    assert_allclose(samples.tool_position[30], placement.translation, atol=1e-12)
     rotation = pin.Quaternion(*samples.tool_quaternion[30]).matrix()
-    np.testing.assert_allclose(rotation, placement.rotation, atol=1e-12)
+    assert_allclose(rotation, placement.rotation, atol=1e-12)
     step = 1e-6
     before, behind = result.trajectory.at([0.3 - step, 0.3 + step]).tool_position
     speed = result.trajectory.at(0.3).tool_speed
-    np.testing.assert_allclose(
-        speed, np.linalg.norm(behind - before) / (2 * step), rtol=1e-6
-    )
+    assert_allclose(speed, np.linalg.norm(behind - before) / (2 * step), rtol=1e-6)
     held = result.sample(0.01, last="hold")
     assert held.tool_speed[-1] == 0.0
 

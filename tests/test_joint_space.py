@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.apps.bottleneck import check_sensitivities, plan_again
@@ -85,10 +86,8 @@ def test_result_is_verified_and_follows_the_path(joint_motion):
     assert joint_motion.verification.path_error <= 1e-9
     assert joint_motion.trajectory.redundant_joints == ()
     assert joint_motion.family == "path of joints"
-    np.testing.assert_allclose(
-        joint_motion.trajectory.position(0.0), WAYPOINTS[0], atol=1e-12
-    )
-    np.testing.assert_allclose(
+    assert_allclose(joint_motion.trajectory.position(0.0), WAYPOINTS[0], atol=1e-12)
+    assert_allclose(
         joint_motion.trajectory.position(joint_motion.t_end), WAYPOINTS[-1], atol=1e-12
     )
 
@@ -102,7 +101,7 @@ def test_a_spline_of_scipys_is_the_path():
     result = brachis.plan(task([brachis.bspline_segment(curve)]))
     assert result.verified
     u = 3.0 * result.trajectory.path_coordinate(1.0)
-    np.testing.assert_allclose(result.trajectory.position(1.0), curve(u), atol=1e-9)
+    assert_allclose(result.trajectory.position(1.0), curve(u), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -329,4 +328,4 @@ def test_a_bspline_of_seven_joints_is_no_pose():
     asked = brachis.load_task(
         {"brachis": 1, "task_space": "joints", "path": [{"bspline": curve}]}
     )
-    np.testing.assert_array_equal(asked.start.joints, rows[0])
+    assert_array_equal(asked.start.joints, rows[0])

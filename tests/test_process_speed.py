@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.robot import dynamics
@@ -68,7 +69,7 @@ def test_the_speed_is_met_and_reached_and_left_fast():
     assert result.t_end > 1.2 * free.t_end
     s, speed = speeds_along(result.trajectory)
     inside = (s > BEGIN + 1e-3) & (s < END - 1e-3)
-    np.testing.assert_allclose(speed[inside], SPEED, rtol=1e-8)
+    assert_allclose(speed[inside], SPEED, rtol=1e-8)
     assert speed[s < 0.9 * BEGIN].max() > 1.4 * SPEED, (
         "on the way to it the tool is as fast as it can"
     )
@@ -126,7 +127,7 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     is_held |= (x > 0.3 + lead) & (x < 0.6 - lead)
     step = 2.0 * np.diff(t)[0]
     is_held &= np.roll(is_held, 3) & np.roll(is_held, -3)
-    np.testing.assert_allclose(speeds[is_held], speed, rtol=1e-6)
+    assert_allclose(speeds[is_held], speed, rtol=1e-6)
     is_behind = (x > 0.021) & (x < 0.599)
     assert speeds[is_behind].max() < speed * (1.0 + 1e-3), "faster in a lead"
     assert is_held.sum() * step > 0.5 * 0.5 / speed
@@ -161,7 +162,7 @@ def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():
     mean = np.sqrt(np.trapezoid(torque**2, t, axis=0) / result.t_end)
     assert 4.99 < mean.max() < 5.001
     for own in (motion.q, motion.qdot, motion.qddot):
-        np.testing.assert_allclose(own[-1], own[0], atol=1e-9 * np.abs(own).max())
+        assert_allclose(own[-1], own[0], atol=1e-9 * np.abs(own).max())
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.1])

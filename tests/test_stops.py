@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from support.effort import QUICK
@@ -46,11 +47,9 @@ def test_legs_between_stops_take_the_least_time():
     result = brachis.plan(task(path))
     assert result.verified
     ways = [from_rest(0.5), from_rest(0.2), DWELL, from_rest(0.5)]
-    np.testing.assert_allclose(
-        np.diff(result.trajectory.phase_ends, prepend=0.0), ways, rtol=2e-3
-    )
+    assert_allclose(np.diff(result.trajectory.phase_ends, prepend=0.0), ways, rtol=2e-3)
     states = result.trajectory.at(result.trajectory.phase_ends)
-    np.testing.assert_allclose(states.s, [5 / 12, 7 / 12, 7 / 12, 1.0], atol=1e-12)
+    assert_allclose(states.s, [5 / 12, 7 / 12, 7 / 12, 1.0], atol=1e-12)
     assert np.abs(states.qdot).max() < 1e-9
     at_once = brachis.plan(task([right(1.2)]))
     assert at_once.t_end < 0.7 * (result.t_end - DWELL)
@@ -91,6 +90,6 @@ def test_a_tool_turns_on_the_spot_between_lines():
     positions, rotations = result.trajectory.robot.tool_placements(
         result.trajectory.at(np.array([before, turned])).q
     )
-    np.testing.assert_allclose(positions[0], positions[1], atol=1e-9)
+    assert_allclose(positions[0], positions[1], atol=1e-9)
     cosine = 0.5 * (np.trace(rotations[0].T @ rotations[1]) - 1.0)
     assert np.degrees(np.arccos(cosine)) == pytest.approx(60.0, abs=1e-6)

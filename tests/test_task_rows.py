@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.ik import default_task_space, find_all
@@ -76,9 +77,9 @@ def test_position_and_yaw_follow_the_line(word, start, by, tmp_path):
     s, placements = tool_along(brachis.Trajectory.load(file))
     first = placements[0]
     moved = [placed.translation - first.translation for placed in placements]
-    np.testing.assert_allclose(moved, np.outer(s, by[:3]), atol=1e-8)
+    assert_allclose(moved, np.outer(s, by[:3]), atol=1e-8)
     turned = [pin.log3(placed.rotation @ first.rotation.T) for placed in placements]
-    np.testing.assert_allclose(turned, np.outer(s, [0.0, 0.0, by[3]]), atol=1e-8)
+    assert_allclose(turned, np.outer(s, [0.0, 0.0, by[3]]), atol=1e-8)
 
 
 LIMITS = {"torque": None, "velocity": 20.0}
@@ -185,11 +186,11 @@ def test_the_axis_of_the_tool_and_rows_of_its_position(
     placements = [robot.tool_placement(q) for q in sample.q[:, : robot.n]]
     axes = np.array([placed.rotation[:, 2] for placed in placements])
     about = [pin.exp3(s * np.deg2rad([0.0, 20.0, 0.0])) for s in sample.s]
-    np.testing.assert_allclose(axes, np.array(about) @ axes[0], atol=1e-8)
+    assert_allclose(axes, np.array(about) @ axes[0], atol=1e-8)
     if by:
         moved = np.array([placed.translation for placed in placements])
         expected = np.outer(sample.s, by)
-        np.testing.assert_allclose((moved - moved[0])[:, [1, 0]], expected, atol=1e-8)
+        assert_allclose((moved - moved[0])[:, [1, 0]], expected, atol=1e-8)
 
 
 @pytest.mark.parametrize("rows", [["axis"], ["z", "axis"], ["y", "x", "axis"]], ids=str)
@@ -206,7 +207,7 @@ def test_rows_with_the_axis_against_differences(rows):
     velocity = task_map.difference(task_map.values(at(h)), task_map.values(at(-h)))
     jacobian = task_map.jacobian(task_map.twists(q))
     rate = np.einsum("kmn,kn->km", jacobian, qdot)
-    np.testing.assert_allclose(rate, velocity / (2.0 * h), atol=1e-7)
+    assert_allclose(rate, velocity / (2.0 * h), atol=1e-7)
     slopes = task_map.derivatives(task_map.twists(q), qdot, qddot).velocity_q
 
     def rate_at(t):
@@ -217,7 +218,7 @@ def test_rows_with_the_axis_against_differences(rows):
 
     changed = (rate_at(h) - rate_at(-h)) / (2.0 * h)
     bias = np.einsum("kmn,kn->km", slopes, qdot)
-    np.testing.assert_allclose(bias, changed, atol=1e-6)
+    assert_allclose(bias, changed, atol=1e-6)
 
 
 def test_samples_of_a_path_with_the_axis_against_differences():
@@ -238,10 +239,10 @@ def test_samples_of_a_path_with_the_axis_against_differences():
     h = 1e-5
     before, here, after = (path.sample(s + step) for step in (-h, 0.0, h))
     velocity = task_map.difference(after.target, before.target) / (2.0 * h)
-    np.testing.assert_allclose(here.xi, velocity, atol=1e-7)
-    np.testing.assert_allclose(here.xi_ds, (after.xi - before.xi) / (2 * h), atol=1e-7)
+    assert_allclose(here.xi, velocity, atol=1e-7)
+    assert_allclose(here.xi_ds, (after.xi - before.xi) / (2 * h), atol=1e-7)
     bend = (after.xi_ds - before.xi_ds) / (2 * h)
-    np.testing.assert_allclose(here.xi_dds, bend, atol=1e-6)
+    assert_allclose(here.xi_dds, bend, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import BPoly
 
 from brachis.errors import InputError, ResultFileError
@@ -38,14 +39,10 @@ def trajectory():
 def test_nodes_are_met(trajectory):
     t = trajectory.times
     scale = np.abs(trajectory.qddot).max()
-    np.testing.assert_array_equal(trajectory.position(t[:-1]), trajectory.q[:-1])
-    np.testing.assert_allclose(
-        trajectory.position(t), trajectory.q, rtol=0.0, atol=1e-15
-    )
-    np.testing.assert_allclose(
-        trajectory.velocity(t), trajectory.qdot, rtol=0.0, atol=1e-13
-    )
-    np.testing.assert_allclose(
+    assert_array_equal(trajectory.position(t[:-1]), trajectory.q[:-1])
+    assert_allclose(trajectory.position(t), trajectory.q, rtol=0.0, atol=1e-15)
+    assert_allclose(trajectory.velocity(t), trajectory.qdot, rtol=0.0, atol=1e-13)
+    assert_allclose(
         trajectory.acceleration(t), trajectory.qddot, rtol=0.0, atol=1e-11 * scale
     )
 
@@ -56,7 +53,7 @@ def test_derivatives_against_differences(order, trajectory):
     h = 1e-6
     t = np.random.default_rng(1).uniform(h, trajectory.t_end - h, 200)
     difference = (curves[order](t + h) - curves[order](t - h)) / (2.0 * h)
-    np.testing.assert_allclose(
+    assert_allclose(
         difference,
         curves[order + 1](t),
         rtol=0.0,
@@ -79,16 +76,16 @@ def test_derivatives_of_a_very_short_motion_are_precise(length):
     )
     pieces = BPoly(piece_coefficients(*nodes)[0], times)
     inside = 0.5 * (times[1:] + times[:-1])
-    np.testing.assert_allclose(pieces(inside, nu=2), 3.0, rtol=1e-10)
-    np.testing.assert_allclose(pieces(inside, nu=1)[:, 0], 3.0 * inside, rtol=1e-10)
-    np.testing.assert_allclose(q[:-1, 0] + pieces.c[-1, :, 0], q[1:, 0], rtol=5e-16)
+    assert_allclose(pieces(inside, nu=2), 3.0, rtol=1e-10)
+    assert_allclose(pieces(inside, nu=1)[:, 0], 3.0 * inside, rtol=1e-10)
+    assert_allclose(q[:-1, 0] + pieces.c[-1, :, 0], q[1:, 0], rtol=5e-16)
     assert np.abs(piece_coefficients(*nodes)[1]).max() < 1e-4 * 3.0 / length
 
 
 def test_the_jerk_is_the_third_derivative_of_the_positions(trajectory):
     t = np.random.default_rng(3).uniform(0.0, trajectory.t_end, 300)
     jerk = trajectory.jerk(t)
-    np.testing.assert_allclose(
+    assert_allclose(
         trajectory.pieces(t, nu=3), jerk, rtol=0.0, atol=1e-8 * np.abs(jerk).max()
     )
 
@@ -150,11 +147,9 @@ def test_headers_of_arrays_that_are_broken(header, trajectory, tmp_path):
 def test_samples(trajectory):
     samples = trajectory.sample(0.01)
     assert samples.t[-1] == trajectory.t_end
-    np.testing.assert_array_equal(samples.t[:-1], 0.01 * np.arange(len(samples.t) - 1))
-    np.testing.assert_array_equal(samples.q, trajectory.position(samples.t))
-    np.testing.assert_allclose(
-        samples.tau, trajectory.torque(samples.t), rtol=1e-12, atol=1e-12
-    )
+    assert_array_equal(samples.t[:-1], 0.01 * np.arange(len(samples.t) - 1))
+    assert_array_equal(samples.q, trajectory.position(samples.t))
+    assert_allclose(samples.tau, trajectory.torque(samples.t), rtol=1e-12, atol=1e-12)
     assert samples.s[0] == 0.0
     assert samples.s[-1] == pytest.approx(1.0, abs=1e-12)
     assert np.abs(samples.tau).max() == pytest.approx(10.0, rel=1e-3)
@@ -174,15 +169,13 @@ def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(
     dt = trajectory.t_end / periods
     exact, held = trajectory.sample(dt), trajectory.sample(dt, last="hold")
     assert len(held.t) == int(np.ceil(periods)) + 1
-    np.testing.assert_array_equal(held.t, dt * np.arange(len(held.t)))
+    assert_array_equal(held.t, dt * np.arange(len(held.t)))
     assert held.t[-1] >= trajectory.t_end * (1.0 - 1e-12)
     for field in fields(held):
         before, same = getattr(held, field.name)[:-1], getattr(exact, field.name)[:-1]
-        np.testing.assert_allclose(before, same, rtol=1e-12, atol=1e-12)
+        assert_allclose(before, same, rtol=1e-12, atol=1e-12)
     assert held.s[-1] == 1.0
-    np.testing.assert_allclose(
-        held.q[-1], trajectory.position(trajectory.t_end), atol=1e-14
-    )
+    assert_allclose(held.q[-1], trajectory.position(trajectory.t_end), atol=1e-14)
     assert not held.qdot[-1].any()
     assert not held.qddot[-1].any()
 
@@ -194,7 +187,7 @@ def test_the_torque_that_holds_the_end_posture_is_the_static_one(trajectory):
         heavy.robot, held.q[-1:], np.zeros((1, 3)), np.zeros((1, 3))
     )[0]
     assert np.abs(lever).max() > 10.0
-    np.testing.assert_allclose(held.tau[-1], lever, rtol=1e-12)
+    assert_allclose(held.tau[-1], lever, rtol=1e-12)
 
 
 def test_unknown_ending(trajectory):
@@ -226,7 +219,7 @@ def test_times_outside_are_errors(curve, beyond, trajectory):
 
 def test_rounding_at_the_ends_is_forgiven(trajectory):
     t = np.array([-1e-13, trajectory.t_end * (1.0 + 1e-13)])
-    np.testing.assert_array_equal(
+    assert_array_equal(
         trajectory.position(t), trajectory.position(np.array([0.0, trajectory.t_end]))
     )
 
@@ -235,7 +228,7 @@ def test_arrays_are_frozen_copies(trajectory):
     own = np.array(trajectory.q)
     copy = replace(trajectory, q=own)
     own += 1.0
-    np.testing.assert_array_equal(copy.q, trajectory.q)
+    assert_array_equal(copy.q, trajectory.q)
     assert own.flags.writeable
     arrays = [getattr(copy, field.name) for field in fields(copy)]
     arrays = [array for array in arrays if isinstance(array, np.ndarray)]
@@ -261,17 +254,15 @@ def test_round_trip(trajectory, tmp_path):
     for field in fields(trajectory):
         one, other = getattr(trajectory, field.name), getattr(again, field.name)
         if isinstance(one, np.ndarray):
-            np.testing.assert_array_equal(one, other)
+            assert_array_equal(one, other)
         elif field.name != "robot":
             assert one == other, field.name
     assert again.joint_names == trajectory.joint_names
     for name in ("torque", "velocity"):
         limits = (getattr(own.robot.limits, name) for own in (again, trajectory))
-        np.testing.assert_array_equal(*limits)
+        assert_array_equal(*limits)
     t = np.linspace(0.0, trajectory.t_end, 50)
-    np.testing.assert_allclose(
-        trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12
-    )
+    assert_allclose(trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12)
 
 
 def test_file_does_not_need_the_urdf_file(trajectory, tmp_path):

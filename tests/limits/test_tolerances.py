@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.errors import PathError, TaskError
@@ -63,8 +64,8 @@ def test_virtual_joints_have_the_ranges_of_the_task():
     reach = 1.01 * min(0.004, np.linalg.norm([0.002, 0.003, 0.002]))
     tilt = 1.01 * np.radians(15)
     expected = [np.radians(40), tilt, tilt, reach, reach, reach]
-    np.testing.assert_allclose(robot.limits.position_upper[-6:], expected)
-    np.testing.assert_allclose(robot.limits.position_lower[-6], np.radians(-30))
+    assert_allclose(robot.limits.position_upper[-6:], expected)
+    assert_allclose(robot.limits.position_lower[-6], np.radians(-30))
 
 
 def test_positions_of_virtual_joints_are_how_far_the_tool_is_from_the_path():
@@ -86,7 +87,7 @@ def test_positions_of_virtual_joints_are_how_far_the_tool_is_from_the_path():
     assert tool.isApprox(expected, 1e-12)
     # The tool's axis leans towards x for a positive lead, and towards y for a positive side.
     axis = (path.rotation.T @ tool.rotation)[:, 2]
-    np.testing.assert_allclose(axis[:2], [np.sin(lead), np.sin(side) * np.cos(lead)])
+    assert_allclose(axis[:2], [np.sin(lead), np.sin(side) * np.cos(lead)])
 
 
 def test_limits_and_samples_are_those_of_the_real_tool():
@@ -100,15 +101,15 @@ def test_limits_and_samples_are_those_of_the_real_tool():
         expected = arm.chain.tool_sizes(quantity, *own)
         label = Label("tool", quantity, "-")
         limit = ToolMotionLimit(robot, quantity, [SpeedProfile([0.0], [1.0])], [label])
-        np.testing.assert_allclose(limit.values(moving)[:, 0], expected, rtol=1e-12)
+        assert_allclose(limit.values(moving)[:, 0], expected, rtol=1e-12)
         partials = limit.partials(moving)
         for slopes in (partials.q, partials.qdot):
             assert slopes.any()
             assert not slopes[..., arm.n :].any()
         assert (partials.qddot is not None) == (quantity == "acceleration")
     position, _, speed = tool_motion(robot, states[0], states[1])
-    np.testing.assert_allclose(position, arm.tool_placements(own[0])[0], atol=1e-12)
-    np.testing.assert_allclose(speed, arm.chain.tool_sizes("speed", *own), rtol=1e-9)
+    assert_allclose(position, arm.tool_placements(own[0])[0], atol=1e-12)
+    assert_allclose(speed, arm.chain.tool_sizes("speed", *own), rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["tool_tilt", "tool_distance", "tool_range"])
@@ -123,15 +124,15 @@ def test_slopes_are_those_of_differences(kind):
         step = 1e-6 * np.eye(robot.n)[joint]
         ends = [limit.values(Moments.at_rest(q + sign * step)) for sign in (1, -1)]
         by_difference = (ends[0] - ends[1]) / 2e-6
-        np.testing.assert_allclose(found[:, :, joint], by_difference, atol=1e-5)
+        assert_allclose(found[:, :, joint], by_difference, atol=1e-5)
 
 
 def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow():
     robot = robot_with({"orientation": {"lead": [5, 15]}, "position": {"x": 0.01}})
     q = robot.posture(list(START), "start")
-    np.testing.assert_allclose(q[-2:], [np.radians(5), 0.0])
+    assert_allclose(q[-2:], [np.radians(5), 0.0])
     named = robot.posture(dict(zip(robot.joint_names, START, strict=False)), "start")
-    np.testing.assert_array_equal(named, q)
+    assert_array_equal(named, q)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +203,7 @@ def test_a_tool_that_may_lean_is_faster_and_stays_within_its_range(leaning):
     assert lead.min() >= -5.001
     assert lead.max() <= 10.001
     assert np.abs(axis[:, 1]).max() < 1e-6
-    np.testing.assert_allclose(np.radians(lead), q[:, -1], atol=1e-6)
+    assert_allclose(np.radians(lead), q[:, -1], atol=1e-6)
 
 
 def test_a_plan_starts_from_the_motion_without_tolerances(leaning):

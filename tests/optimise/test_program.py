@@ -9,6 +9,7 @@ import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER
@@ -173,7 +174,7 @@ def test_a_program_in_another_process_is_the_same():
     program = two_moves()
     x = first_point(program)
     copy = pickle.loads(pickle.dumps(program))  # noqa: S301
-    np.testing.assert_array_equal(copy.rows(x), program.rows(x))
-    np.testing.assert_array_equal(copy.jacobian(x), program.jacobian(x))
+    assert_array_equal(copy.rows(x), program.rows(x))
+    assert_array_equal(copy.jacobian(x), program.jacobian(x))
     (limit,) = copy.limits
-    np.testing.assert_array_equal(copy.rows_of(limit), program.rows_of(TORQUE))
+    assert_array_equal(copy.rows_of(limit), program.rows_of(TORQUE))

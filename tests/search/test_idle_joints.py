@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import brachis
 from brachis.problem.problem import Problem
@@ -31,7 +32,7 @@ def result():
 def test_the_last_joint_of_an_arm_stands_still_along_positions(result):
     assert result.verified
     q = result.trajectory.position(np.linspace(0.0, result.t_end, 101))
-    np.testing.assert_array_equal(q[:, 6], START[6])
+    assert_array_equal(q[:, 6], START[6])
     assert np.ptp(q[:, :6], axis=0).max() > 0.05
     assert result.candidate.origin == HELD
 
@@ -78,7 +79,7 @@ def test_it_stands_still_in_named_postures_too():
         **QUICK,
     )
     assert result.verified
-    np.testing.assert_array_equal(result.trajectory.q[:, 6], START[6])
+    assert_array_equal(result.trajectory.q[:, 6], START[6])
     assert result.candidate.origin == HELD
 
 
@@ -96,7 +97,7 @@ def test_limits_and_friction_by_joint_hold_for_the_others():
         **QUICK,
     )
     assert result.verified
-    np.testing.assert_array_equal(result.trajectory.q[:, 1], 0.2)
+    assert_array_equal(result.trajectory.q[:, 1], 0.2)
     assert result.t_end == pytest.approx(2.0 * np.sqrt(0.3 / 3.0), rel=1e-3)
 
 

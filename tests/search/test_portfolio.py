@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.apps.plots import plot_candidates
@@ -134,8 +135,8 @@ def test_the_same_candidates_whatever_the_number_of_processes(robot, usual, aske
     assert one.t_end == pytest.approx(two.t_end, rel=1e-6)
     (first, times), (second, others) = without_times(one), without_times(two)
     assert first == second
-    np.testing.assert_allclose(others, times, rtol=1e-6)
-    np.testing.assert_allclose(
+    assert_allclose(others, times, rtol=1e-6)
+    assert_allclose(
         one.trajectory.control_points, two.trajectory.control_points, atol=1e-5
     )
 
@@ -154,7 +155,7 @@ def test_a_free_start_is_faster_and_on_the_path(robot, usual, from_anywhere):
     assert free.verified
     assert free.t_end < 0.9 * usual.t_end
     begun = robot.tool_placement(free.trajectory.position(0.0)).translation[:2]
-    np.testing.assert_allclose(begun, HERE, atol=1e-9)
+    assert_allclose(begun, HERE, atol=1e-9)
     assert {candidate.branch for candidate in free.candidates} == {CHART}
 
 

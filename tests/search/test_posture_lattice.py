@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.common.deadline import Deadline
@@ -76,7 +77,7 @@ def test_joint_paths_are_motions_of_the_robot(case):
     assert joint_paths
     for joint_path in joint_paths:
         q = joint_path.q
-        np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
+        assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
         miss = given.task_map.difference(
             given.task_map.values(q), given.path.sample(joint_path.s).target
         )
@@ -90,7 +91,7 @@ def test_joint_paths_are_motions_of_the_robot(case):
             np.abs(dynamics.torque(given.robot, q, still, still))
             <= limits.torque + 1e-9
         )
-        np.testing.assert_array_equal(q[0], given.start)
+        assert_array_equal(q[0], given.start)
 
 
 def test_gravity_and_ranges_turn_joint_paths_away():
@@ -194,8 +195,8 @@ def test_the_end_is_reached_in_its_own_turn(turns, reached):
     found = joint_paths_of(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
-        np.testing.assert_allclose(joint_path.q[-1], end, atol=1e-3)
-        np.testing.assert_array_equal(joint_path.q[0], START)
+        assert_allclose(joint_path.q[-1], end, atol=1e-3)
+        assert_array_equal(joint_path.q[0], START)
 
 
 @pytest.mark.parametrize(("turns", "reached"), [(0, True), (2, True), (-1, False)])
@@ -214,7 +215,7 @@ def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
     found = joint_paths_of(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
-        np.testing.assert_array_equal(joint_path.q[-1], end)
+        assert_array_equal(joint_path.q[-1], end)
         assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(TURN, abs=1.6)
 
 
@@ -260,7 +261,7 @@ def test_the_same_seed_gives_the_same_joint_paths():
     )
     assert len(first) == len(again)
     for one, two in zip(first, again, strict=True):
-        np.testing.assert_allclose(one.q, two.q, atol=1e-9)
+        assert_allclose(one.q, two.q, atol=1e-9)
     assert any(
         np.abs(one.q - two.q).max() > 1e-6
         for one, two in zip(first, other, strict=False)
@@ -290,5 +291,5 @@ def test_a_given_end_is_reached_with_several_redundant_joints(start, end):
     joint_paths = PostureLattice(given, [], nodes=60).joint_paths(4)
     assert isinstance(joint_paths, list)
     assert joint_paths
-    np.testing.assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)
+    assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)
     assert np.abs(np.diff(joint_paths[0].q, axis=0)).max() <= 0.8
