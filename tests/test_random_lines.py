@@ -5,14 +5,10 @@ The full count, 200, is `benchmarks/random_lines.py`.
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
 import brachis
-
-COUNT, PARTS = 4, 2
+from support.scara import scara
 
 
 @pytest.mark.parametrize("number", range(4))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +20,7 @@ from brachis.apps.view.tables import state_table
 from brachis.errors import InputError, LimitError, UrdfError
 from brachis.robot import Robot
 from support.command_line import code_of
+from support.scripts import load_script
 
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 ORIGINS = ("0 0 0.5", "0.15 0 0", "0 0 0.8", "0 0 0.2", "0.8 0 0", "0.1 0 0")
@@ -267,15 +266,7 @@ def test_the_commands(tmp_path, capsys):
     assert set(limits["acceleration"].values()) == {1.0}
 
 
-def _benchmark():
-    path = Path(__file__).parents[1] / "benchmarks/industrial_arms.py"
-    spec = importlib.util.spec_from_file_location("industrial_arms", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-ARMS = _benchmark()
+ARMS = load_script("benchmarks/industrial_arms.py")
 
 
 @pytest.mark.parametrize(

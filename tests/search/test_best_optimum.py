@@ -5,15 +5,12 @@ All lines, with more restarts: `studies/scara_restarts.py`.
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
-from support.scripts import load_script
 import numpy as np
 import pytest
 
 import brachis
 from brachis.problem.problem import Problem
+from support.scripts import load_script
 
 RESTARTS = 3
 LINES_DEG = (180, 270)
