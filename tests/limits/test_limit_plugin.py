@@ -329,14 +329,22 @@ class Failing(Given):
 
     def fail_in(self, part):
         if self.part == part:
-            raise ValueError("no licence")
+            raise RuntimeError("no licence")
 
     def bind(self, robot):
         self.fail_in("bind")
-        limit = Rate(robot)
-        if self.part in ("values", "partials"):
-            setattr(limit, self.part, lambda _motion: self.fail_in(self.part))
-        return limit
+        fail_in = self.fail_in
+
+        class Own(Rate):
+            def values(self, motion):
+                fail_in("values")
+                return super().values(motion)
+
+            def partials(self, motion):
+                fail_in("partials")
+                return super().partials(motion)
+
+        return Own(robot)
 
     def check(self, robot, q, qdot, qddot, tau):
         self.fail_in("check")
@@ -345,7 +353,7 @@ class Failing(Given):
 
 def install(monkeypatch, plugin):
     """Let a class be the one plug-in, named `failing`."""
-    entry = SimpleNamespace(name="failing", value="failing", load=lambda: plugin)
+    entry = SimpleNamespace(name="failing", value="__init__", load=lambda: plugin)
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: [entry])
 
 
@@ -355,7 +363,7 @@ def test_a_failing_plugin_is_in_the_message(part, monkeypatch):
     with pytest.raises(InputError, match="no licence") as caught:
         brachis.plan(LINE, custom_limits={"failing": {"part": part}})
     assert str(caught.value).startswith(
-        f"custom_limits.failing: the plug-in's {part} failed: ValueError: no licence"
+        f"custom_limits.failing: the plug-in's {part} failed: RuntimeError: no licence"
     )
 
 

@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import PathError
-from brachis.path import build_path
-from brachis.task.segments import ArcSegment
 from support.arrays import assert_scaled
 from support.poses import row_path
 
@@ -181,40 +179,29 @@ def test_a_spline_may_state_its_start():
 
 def test_a_centre_of_few_digits_is_moved_into_the_plane_of_the_arc():
     start = np.array([0.5, 0.0, 0.18959559])
-    arc = ArcSegment(
-        arc={
-            "center": (0.3, 0.0, 0.18959),
-            "angle_deg": 360.0,
-            "normal": (0.0, 0.0, 1.0),
-        }
-    )
-    path = build_path([arc], start, ["x", "y", "z"])
-    around = path.sample(np.linspace(0.0, 1.0, 9)).target
-    assert_allclose(around[:, 2], start[2], atol=1e-15)
-    assert_allclose(around[[0, -1]], [start, start], atol=1e-12)
-    wrong = arc.model_copy(
-        update={"arc": arc.arc.model_copy(update={"center": (0.3, 0.0, 0.18)})}
-    )
+
+    def around(height):
+        center = [0.3, 0.0, height]
+        arc = {"center": center, "angle_deg": 360.0, "normal": [0, 0, 1]}
+        return row_path([{"arc": arc}], start, XYZ).sample(np.linspace(0, 1, 9)).target
+
+    places = around(0.18959)
+    assert_allclose(places[:, 2], start[2], atol=1e-15)
+    assert_allclose(places[[0, -1]], [start, start], atol=1e-12)
     with pytest.raises(
         PathError, match=r"Move the centre by 0\.00959559 m along the normal"
     ):
-        build_path([wrong], start, ["x", "y", "z"])
+        around(0.18)
 
 
 def test_a_helix_climbs_by_its_pitch():
-    shape = {
-        "center": [0.3, 0.0, 1.0],
-        "pitch": 0.1,
-        "normal": [0, 0, 2],
-        "turns": -2.5,
-    }
-    curve = curve_of({"helix": shape}, [0.5, 0.0, 1.0], XYZ)
+    shape = "{center: [0.3, 0, 1], pitch: 0.1, normal: [0, 0, 2], turns: -2.5}"
+    curve = curve_of({"helix": yaml.safe_load(shape)}, [0.5, 0.0, 1.0], XYZ)
     length = 2.5 * np.hypot(2 * np.pi * 0.2, 0.1)
     assert curve.length == pytest.approx(length)
-    start, turn, end = curve.derivatives(np.array([0.0, length / 2.5, length]), 0)[0]
-    assert_allclose(start, [0.5, 0.0, 1.0], atol=1e-12)
-    assert_allclose(turn, [0.5, 0.0, 1.1], atol=1e-12)
-    assert_allclose(end, [0.1, 0.0, 1.25], atol=1e-12)
+    places = curve.derivatives(np.array([0.0, length / 2.5, length]), 0)[0]
+    expected = [[0.5, 0.0, 1.0], [0.5, 0.0, 1.1], [0.1, 0.0, 1.25]]
+    assert_allclose(places, expected, atol=1e-12)
     tangents = curve.derivatives(np.linspace(0.0, length, 20), 1)[1]
     assert_allclose(np.linalg.norm(tangents, axis=1), 1.0)
     assert tangents[0, 1] < 0.0, "against the right-hand rule about the normal"

@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 from brachis import InputError, bspline_segment
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import joint_rows
-from brachis.task import load_task
+from brachis.task import task_with
 from support.arrays import assert_scaled
 
 RNG = np.random.default_rng(0)
@@ -22,15 +22,8 @@ U = np.linspace(0.0, 1.0, 101)
 
 def along(segment, start):
     """The path that a task with this segment alone describes, at U."""
-    content = {
-        "brachis": 1,
-        "start": {"joints": start},
-        "task_space": "joints",
-        "path": [segment],
-    }
-    return build_path(
-        load_task(content).path, start, joint_rows(["a", "b", "c"])
-    ).derivatives(U)
+    path = task_with(start=start, task_space="joints", path=[segment]).path
+    return build_path(path, start, joint_rows(["a", "b", "c"])).derivatives(U)
 
 
 @pytest.mark.parametrize(

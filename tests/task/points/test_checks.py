@@ -21,7 +21,8 @@ MM = 1e-3
 
 
 def spikes(position):
-    refuse_spikes(points(position), scatter_of(points(position)), 0.05 * MM)
+    given = points(position)
+    refuse_spikes(given, scatter_of(given), 0.05 * MM)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.02])
