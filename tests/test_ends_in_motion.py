@@ -31,7 +31,7 @@ def circle():
     return plan()
 
 
-def failed(trajectory):
+def failures_of(trajectory):
     return set(failed_checks(verify_trajectory(trajectory)))
 
 
@@ -94,7 +94,9 @@ def test_the_verification_sees_changes_at_seams(circle):
     ):
         array = np.array(getattr(trajectory, name))
         array[-1] += 1e-3
-        assert f"{what} over the seam" in failed(replace(trajectory, **{name: array}))
+        assert f"{what} over the seam" in failures_of(
+            replace(trajectory, **{name: array})
+        )
 
 
 def test_closed_path_of_joints():
@@ -137,7 +139,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
         np.testing.assert_allclose(velocity, [0.0, speed, 0.0], atol=1e-9)
     assert result.t_end < plan(**line).t_end
     faster = task_with(result.task, end_speed=0.501)
-    assert failed(replace(trajectory, task=faster)) == {"end speed"}
+    assert failures_of(replace(trajectory, task=faster)) == {"end speed"}
 
 
 def test_a_turn_on_the_spot_ends_at_an_angular_speed():
@@ -241,5 +243,5 @@ def test_a_circle_round_the_arm_closes_if_joints_turn_freely(kind):
     np.testing.assert_allclose(turns, turns.round(), rtol=0.0, atol=1e-9)
     is_closed = kind == "continuous"
     seam = set() if is_closed else {"position over the seam"}
-    assert failed(result.trajectory) == seam
+    assert failures_of(result.trajectory) == seam
     assert result.verified == is_closed

@@ -165,8 +165,8 @@ def test_beyond_the_tolerance_the_message_tells_the_numbers_apart(excess, end, k
     waypoints[end, 0] = brachis.robots.iiwa14.limits.position_upper[0] + excess
     with pytest.raises(kind, match=r"joint_1.*out of its range") as caught:
         brachis.plan("iiwa14", path=waypoints, task_space="joints")
-    found, allowed = caught.value.found.split()[0], caught.value.allowed.split()[-2]
-    assert float(found) > float(allowed)
+    error = caught.value
+    assert float(error.found.split()[0]) > float(error.allowed.split()[-2])
 
 
 def test_a_start_posture_may_leave_its_range_and_exceed_its_torque_within_the_tolerance():

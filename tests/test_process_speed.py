@@ -8,7 +8,7 @@ import pytest
 import brachis
 from brachis.robot import dynamics
 from brachis.task import task_with
-from support.checks import check_named
+from support.checks import check_of
 from support.effort import QUICK
 
 SPEED, BEGIN, END, LENGTH = 1.0, 0.25, 0.75, 1.2
@@ -96,9 +96,9 @@ def test_a_part_soon_after_the_start():
 @pytest.mark.parametrize("speed", [0.02, 0.3])
 def test_a_segment_has_a_speed_but_for_its_leads(speed):
     """By differences of Pinocchio's positions, between an approach and a stop, and behind it."""
-    approach = brachis.Line(by=[0.0, 0.1], blend=0.02)
+    approach = {"line": {"by": [0.0, 0.1]}, "blend": 0.02}
     seam = {"line": {"by": [0.3, 0.0]}, "speed": speed}
-    result = plan(path=[*approach, {**seam, "stop": True}, seam])
+    result = plan(path=[approach, {**seam, "stop": True}, seam])
     assert result.verified
     assert result.trajectory.task.path[1].speed == speed
     t = np.linspace(0.0, result.t_end, 20_001)
@@ -114,7 +114,7 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     is_behind = (x > 0.021) & (x < 0.599)
     assert speeds[is_behind].max() < speed * (1.0 + 1e-3), "faster in a lead"
     assert is_held.sum() * 2.0 * t[1] > 0.5 * 0.5 / speed
-    assert check_named(result.verification, "process speed").passed
+    assert check_of(result.verification, "process speed").passed
 
 
 def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():
@@ -147,10 +147,10 @@ def test_a_recorded_motion_is_checked_on_the_part_alone(factor, tmp_path):
     result = plan(PART, rest="full")
     file = tmp_path / "motion.csv"
     brachis.export.write(result.trajectory, file, dt=0.002)
-    part = {"process_speed": {**PART, "speed": factor * SPEED}}
-    task = task_with(result.task, tool_limits=part, rest="velocity")
+    limits = {"process_speed": {**PART, "speed": factor * SPEED}}
+    task = task_with(result.task, tool_limits=limits, rest="velocity")
     verification = brachis.verify_trajectory(brachis.import_motion(file, task=task))
-    check = check_named(verification, "process speed")
+    check = check_of(verification, "process speed")
     assert check.value == pytest.approx(abs(1.0 / factor - 1.0), abs=1e-6)
     assert check.passed == (factor == 1.0)
     names = [check.name for check in verification.checks]

@@ -14,12 +14,12 @@ ACCELERATION = 200.0 / 25.0
 DWELL = 0.5
 
 
-def right(way, **keys):
-    return brachis.Line(by=[way, 0.0], **keys)
+def right(distance, **keys):
+    return brachis.Line(by=[distance, 0.0], **keys)
 
 
-def up(way, **keys):
-    return brachis.Line(by=[0.0, way], **keys)
+def up(distance, **keys):
+    return brachis.Line(by=[0.0, distance], **keys)
 
 
 def plan(path, **keys):
@@ -36,9 +36,9 @@ def plan(path, **keys):
     )
 
 
-def from_rest(way: float) -> float:
+def from_rest(distance: float) -> float:
     """Least time from rest to rest over a way in x, by full force either way."""
-    return float(2.0 * np.sqrt(way / ACCELERATION))
+    return float(2.0 * np.sqrt(distance / ACCELERATION))
 
 
 def test_legs_between_stops_take_the_least_time():

@@ -16,7 +16,7 @@ from brachis.planner import plan
 from brachis.robot import Robot, dynamics
 from brachis.trajectory import Trajectory
 from brachis.trajectory.pieces import piece_coefficients
-from support.checks import check_named, failed_checks
+from support.checks import check_of, failed_checks
 from support.effort import QUICK
 from support.result_files import with_parts
 
@@ -92,7 +92,7 @@ def test_very_short_lines_pass_their_checks(length):
     result = plan_length(length)
     assert result.t_end < 0.06
     assert failed_checks(result.verification) == []
-    assert check_named(result.verification, "torque jump").value < 1e-10
+    assert check_of(result.verification, "torque jump").value < 1e-10
 
 
 _HEADERS = (
@@ -208,11 +208,11 @@ def test_rounding_at_the_ends_is_forgiven(trajectory):
 
 
 def test_arrays_are_frozen_copies(trajectory):
-    own = np.array(trajectory.q)
-    copy = replace(trajectory, q=own)
-    own += 1.0
+    q = np.array(trajectory.q)
+    copy = replace(trajectory, q=q)
+    q += 1.0
     assert_array_equal(copy.q, trajectory.q)
-    assert own.flags.writeable
+    assert q.flags.writeable
     arrays = [getattr(copy, field.name) for field in fields(copy)]
     arrays = [array for array in arrays if isinstance(array, np.ndarray)]
     assert len(arrays) == 10
@@ -239,7 +239,9 @@ def test_round_trip(trajectory, saved_file):
             assert_array_equal(saved, loaded, err_msg=field.name)
     assert again.joint_names == trajectory.joint_names
     for name in ("torque", "velocity"):
-        saved, loaded = (getattr(own.robot.limits, name) for own in (trajectory, again))
+        saved, loaded = (
+            getattr(motion.robot.limits, name) for motion in (trajectory, again)
+        )
         assert_array_equal(saved, loaded)
     t = np.linspace(0.0, trajectory.t_end, 50)
     assert_allclose(trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12)

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import brachis
 from brachis.task import task_with
 from brachis.verify import verify_trajectory
-from support.checks import check_named, failed_checks
+from support.checks import check_of, failed_checks
 from support.effort import QUICK
 from support.slides import X, plan_slides, slides
 
@@ -38,7 +38,7 @@ def slide(*forces, limits=None, tool=None, intervals=40, **spline):
 
 
 def ratio(result, kind) -> float:
-    return check_named(result.verification, f"{kind} ratio").value
+    return check_of(result.verification, f"{kind} ratio").value
 
 
 def test_power_limited_slide():
@@ -211,7 +211,7 @@ def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(
     unaware = dataclasses.replace(free.trajectory, task=result.task)
     verification = verify_trajectory(unaware, robot=result.trajectory.robot)
     assert failed_checks(verification) == [f"{check} ratio"]
-    assert check_named(verification, f"{check} ratio").value > 1.2
+    assert check_of(verification, f"{check} ratio").value > 1.2
     report = brachis.bottleneck.report(result, check=True)
     entry = next(
         entry

@@ -11,9 +11,9 @@ import brachis
 from brachis import LimitSpec
 from brachis.limits import Moments, limits_of
 from brachis.task import SpeedTable, Task, task_with
-from support.arrays import assert_scaled
+from support.arrays import assert_near
 from support.chains import gantry_robot
-from support.checks import check_named
+from support.checks import check_of
 
 SLOW, FAST = 0.2, 0.6
 FREE = range(120, 180)
@@ -64,10 +64,10 @@ def test_speeds_are_held_where_they_are_prescribed_and_nowhere_else(robot, rates
     between = (sample.s > first.s[-1]) & (sample.s < second.s[0])
     assert speed[between].max() > 1.1 * FAST
     # The plan without feed rates is no motion for the task with them.
-    found = brachis.verify_trajectory(
+    verification = brachis.verify_trajectory(
         dataclasses.replace(free.trajectory, task=held.task)
     )
-    assert check_named(found, "tool speed ratio").value > 2.0
+    assert check_of(verification, "tool speed ratio").value > 2.0
 
 
 def test_partials_of_tables_over_parts_of_the_path(robot):
@@ -84,5 +84,5 @@ def test_partials_of_tables_over_parts_of_the_path(robot):
         return Moments(q, qdot, 0.0 * q, 0.0 * q, places)
 
     expected = (limit.values(at(s + h)) - limit.values(at(s - h))) / (2.0 * h)
-    assert_scaled(limit.partials(at(s)).s, expected, 1e-6)
+    assert_near(limit.partials(at(s)).s, expected, 1e-6)
     assert np.count_nonzero(np.abs(expected) > 1e-3) == 5

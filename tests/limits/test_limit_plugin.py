@@ -19,7 +19,7 @@ import brachis
 from brachis.errors import InputError, UnknownNameError
 from brachis.limits import Bound, Label, Limit, Partials
 from brachis.verify import verify_trajectory
-from support.checks import check_named
+from support.checks import check_of
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
@@ -76,7 +76,7 @@ def test_an_object_limits_the_motion(plugin, tmp_path):
     assert result.verified
     assert sums(result.trajectory).max() == pytest.approx(UPPER, abs=1e-4)
     assert result.t_end > free.t_end
-    check = check_named(result.verification, "coupled range ratio")
+    check = check_of(result.verification, "coupled range ratio")
     assert check.remark == "checked by its own formula"
     assert check.in_words().endswith(check.remark)
     assert (check.subject, check.value) == ("j2 + j3", pytest.approx(1.0, abs=1e-4))
@@ -100,7 +100,7 @@ def test_a_task_file_names_it():
     result = brachis.plan(TASK, **QUICK)
     assert result.verified
     assert sums(result.trajectory).max() <= UPPER + 1e-4
-    assert check_named(verify_trajectory(result.trajectory), "coupled range ratio")
+    assert check_of(verify_trajectory(result.trajectory), "coupled range ratio")
     content = json.loads(json.dumps(result.task.to_dict()))
     assert content["custom_limits"]["coupled_range"]["upper"] == UPPER
 
@@ -116,7 +116,7 @@ def test_a_check_of_its_own_takes_the_marks_place(plugin):
     result = brachis.plan(
         LINE, own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)], **QUICK
     )
-    check = check_named(result.verification, "coupled range ratio")
+    check = check_of(result.verification, "coupled range ratio")
     assert check.remark == ""
     assert check.value == pytest.approx(1.0, abs=1e-3)
 

@@ -89,12 +89,11 @@ def test_a_wrong_partial_derivative_is_in_the_message(partials, where, joint):
 
 
 def test_the_numbers_are_those_of_the_joint():
-    with pytest.raises(InputError) as caught:
-        bind(
-            Sum(right_values, lambda m: partials_with(m, qdot=rows(m, -0.5, 0.0, 0.0)))
-        )
-    assert "found -0.5 at q" in str(caught.value)
-    assert "allowed: 0.5, by differences" in str(caught.value)
+    wrong = Sum(right_values, lambda m: partials_with(m, qdot=rows(m, -0.5, 0.0, 0.0)))
+    with pytest.raises(
+        InputError, match=r"found -0.5 at q.*allowed: 0.5, by differences"
+    ):
+        bind(wrong)
 
 
 def test_values_that_use_the_jerk_need_order_3():

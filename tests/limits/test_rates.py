@@ -14,8 +14,8 @@ from brachis.robot.from_task import robot_for
 from brachis.task import task_with
 from brachis.verify import verify_trajectory
 from brachis.verify.mechanics import torque_rates, torques
-from support.arrays import assert_scaled
-from support.checks import check_named
+from support.arrays import assert_near
+from support.checks import check_of
 from support.effort import QUICK
 
 FIGURES = {"jerk": 12.0, "torque_rate": 25.0}  # rad/s^3 and Nm/s
@@ -79,7 +79,7 @@ def test_verification_finds_a_rate_within_a_microsecond(kind, result, follows, f
         for name, values in nodes.items()
     }
     verification = verify_trajectory(replace(trajectory, **arrays))
-    check = check_named(verification, f"{kind.replace('_', ' ')} ratio")
+    check = check_of(verification, f"{kind.replace('_', ' ')} ratio")
     jump = 0.1
     if kind == "torque_rate":
         tau = torques(trajectory.robot, at.q, at.qdot, at.qddot + change)
@@ -130,4 +130,4 @@ def test_rates_of_the_verification_are_differences_of_its_torques(free):
         return torques(robot, positions, velocities, qddot + step * qdddot)
 
     expected = (torques_after(h) - torques_after(-h)) / (2.0 * h)
-    assert_scaled(torque_rates(robot, q, qdot, qddot, qdddot), expected, 1e-6)
+    assert_near(torque_rates(robot, q, qdot, qddot, qdddot), expected, 1e-6)

@@ -18,7 +18,7 @@ from brachis.search.given_motion import EXACT, GIVEN
 from brachis.search.portfolio import Search
 from brachis.task import Tolerances, task_with
 from brachis.trajectory.samples import tool_motion
-from support.checks import check_named
+from support.checks import check_of
 from support.spatial import START, rail_arm
 
 EVERYTHING = {
@@ -89,10 +89,10 @@ def test_limits_and_samples_are_those_of_the_real_tool():
     arm = rail_arm()
     rng = np.random.default_rng(2)
     states = rng.normal(size=(3, 5, robot.n))
-    own = [each[:, : arm.n] for each in states]
+    arm_states = [curve[:, : arm.n] for curve in states]
     moving = Moments(*states, states[0], np.zeros(5))
     for quantity in ("speed", "angular speed", "acceleration"):
-        expected = arm.chain.tool_sizes(quantity, *own)
+        expected = arm.chain.tool_sizes(quantity, *arm_states)
         label = Label("tool", quantity, "-")
         limit = ToolMotionLimit(robot, quantity, [SpeedProfile([0.0], [1.0])], [label])
         assert_allclose(limit.values(moving)[:, 0], expected, rtol=1e-12)
@@ -102,8 +102,8 @@ def test_limits_and_samples_are_those_of_the_real_tool():
             assert not slopes[..., arm.n :].any()
         assert (partials.qddot is not None) == (quantity == "acceleration")
     position, _, speed = tool_motion(robot, states[0], states[1])
-    assert_allclose(position, arm.tool_placements(own[0])[0], atol=1e-12)
-    assert_allclose(speed, arm.chain.tool_sizes("speed", *own), rtol=1e-9)
+    assert_allclose(position, arm.tool_placements(arm_states[0])[0], atol=1e-12)
+    assert_allclose(speed, arm.chain.tool_sizes("speed", *arm_states), rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["tool_tilt", "tool_distance", "tool_range"])
@@ -286,10 +286,10 @@ def test_a_path_that_needs_its_tolerances_has_a_search():
     }
     with pytest.raises(PathError, match="out of reach from s = 0"):
         brachis.plan("tx90l_rail", **line, check_advice=False)
-    found = brachis.plan("tx90l_rail", tolerances={"position": {"x": 0.02}}, **line)
-    assert found.verified
-    assert found.candidate.origin.startswith("lattice")
-    assert found.not_completed == ()
+    result = brachis.plan("tx90l_rail", tolerances={"position": {"x": 0.02}}, **line)
+    assert result.verified
+    assert result.candidate.origin.startswith("lattice")
+    assert result.not_completed == ()
 
 
 def test_the_verification_sees_a_tool_that_leaves_its_range(leaning):
@@ -298,7 +298,7 @@ def test_the_verification_sees_a_tool_that_leaves_its_range(leaning):
     task = task_with(trajectory.task, tolerances=narrow)
     robot, _ = bind(plain.trajectory.robot, "pose", task.tolerances)
     changed = replace(trajectory, task=task, robot=robot)
-    check = check_named(brachis.verify_trajectory(changed), "tool range ratio")
+    check = check_of(brachis.verify_trajectory(changed), "tool range ratio")
     assert not check.passed
     assert check.subject == "tool lead"
     lead = np.degrees(trajectory.q[:, -1])

@@ -12,7 +12,7 @@ import brachis
 from brachis.limits.tool import SpeedProfile
 from brachis.task import task_with
 from brachis.verify import verify_trajectory
-from support.checks import check_named, failed_checks
+from support.checks import check_of, failed_checks
 from support.effort import QUICK
 
 CAP = 1.0
@@ -25,14 +25,14 @@ def result():
 
 
 def test_verification_finds_a_tool_that_is_too_fast_by_pinocchios_own_velocity(result):
-    check = check_named(result.verification, "tool speed ratio")
+    check = check_of(result.verification, "tool speed ratio")
     assert (check.subject, check.unit, check.remark) == ("tool", "-", "")
     assert check.value == pytest.approx(1.0, abs=1e-4)
     trajectory = result.trajectory
     tighter = task_with(result.task, tool_limits={"speed": CAP / 1.001})
     verification = verify_trajectory(dataclasses.replace(trajectory, task=tighter))
     assert failed_checks(verification) == ["tool speed ratio"]
-    check = check_named(verification, "tool speed ratio")
+    check = check_of(verification, "tool speed ratio")
     assert check.value == pytest.approx(1.001, abs=1e-4)
     robot, state = trajectory.robot, trajectory.at(check.time)
     data, axes = robot.model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

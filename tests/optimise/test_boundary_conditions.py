@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 
 from brachis.optimise.boundary import BoundarySpline, EndCondition, sum_powers
 from brachis.optimise.bspline import clamped_knots
-from support.arrays import assert_scaled
+from support.arrays import assert_near
 from support.jacobians import differences_of
 from support.phases import CASES, phase_of, reachable_points
 
@@ -42,8 +42,8 @@ def test_states_are_those_of_the_curves(case):
     t = phase.t_norm * x[0]
     curves = (state.y, state.ydot, state.yddot, state.ydddot)
     for order, (curve, moved) in enumerate(zip(curves, motion.at(t), strict=True)):
-        assert_scaled(curve, spline(t, nu=order), 1e-9, least=1.0)
-        assert_scaled(moved, curve, 1e-10, least=1.0)
+        assert_near(curve, spline(t, nu=order), 1e-9, least=1.0)
+        assert_near(moved, curve, 1e-10, least=1.0)
     assert_allclose(state.q[0], phase.joint_map.start, atol=1e-9)
 
 
@@ -83,5 +83,5 @@ def test_splines_meet_what_their_ends_prescribe_for_any_duration(
     by_differences = differences_of(
         lambda x: spline.fixed_points(float(x[0])), np.array([duration]), 1e-3
     )
-    assert_scaled(by_differences[:, 0], slope, 1e-9, least=1.0)
+    assert_near(by_differences[:, 0], slope, 1e-9, least=1.0)
     assert_allclose(spline.free_from(points, duration), free, atol=1e-9)

@@ -56,16 +56,16 @@ def solve(program, _x):
 
 def changes_to(*programs):
     """Changes to programs, one after the other, and the end times that each was proposed from."""
-    seen = []
+    begun_at = []
 
     def change_to(program):
         def change(kept):
-            seen.append(kept.t_end if kept.reports else None)
+            begun_at.append(kept.t_end if kept.reports else None)
             return program, np.array([5.0])
 
         return change
 
-    return [change_to(program) for program in programs], seen
+    return [change_to(program) for program in programs], begun_at
 
 
 FIRST = SolvedProgram(Fake(5.0), (solve(Fake(5.0), None),))
@@ -99,36 +99,36 @@ KEEPING = {
 @pytest.mark.parametrize("case", KEEPING)
 def test_which_motions_stay(case):
     times, options, t_end, proposed_from = KEEPING[case]
-    changes, seen = changes_to(*map(Fake, times))
+    changes, begun_at = changes_to(*map(Fake, times))
     best = run(FIRST, changes, **options)
     assert best.t_end == best.program.t_end == best.reports[-1].objective == t_end
-    assert seen == proposed_from
-    tried = times[: len(seen)]
+    assert begun_at == proposed_from
+    tried = times[: len(begun_at)]
     assert sorted(report.objective for report in best.reports) == sorted([5.0, *tried])
 
 
 def test_a_failure_ends_it():
-    changes, seen = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
+    changes, begun_at = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
     best = run(FIRST, changes)
     assert best.t_end == 4.0
-    assert len(seen) == 2
+    assert len(begun_at) == 2
 
 
 def test_without_a_motion_the_next_one_takes_its_place():
-    changes, seen = changes_to(Fake(4.0, usable=False), Fake(3.0), Fake(2.99))
+    changes, begun_at = changes_to(Fake(4.0, usable=False), Fake(3.0), Fake(2.99))
     nothing = SolvedProgram(Fake(np.inf))
-    found = run(nothing, changes, least_gain=0.1)
-    assert found.t_end == 3.0
-    assert seen == [None, 4.0, 3.0]
+    best = run(nothing, changes, least_gain=0.1)
+    assert best.t_end == 3.0
+    assert begun_at == [None, 4.0, 3.0]
     changes, _ = changes_to(Fake(4.0, usable=False), Fake(3.0, usable=False))
     assert run(nothing, changes).program.t_end == 3.0
 
 
 def test_it_ends_with_the_time_or_with_a_reason():
-    changes, seen = changes_to(Fake(4.0))
+    changes, begun_at = changes_to(Fake(4.0))
     over = run(FIRST, changes, deadline=Deadline(0.0))
     assert over.t_end == 5.0
-    assert not seen
+    assert not begun_at
     reasons = [lambda _kept: "too many", lambda _kept: pytest.fail("it went on")]
     assert run(FIRST, reasons).not_completed == "too many"
     nothing = [lambda _kept: None, lambda _kept: pytest.fail("it went on")]

@@ -157,12 +157,12 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     report = solve(coarse, next(starting_points(coarse)))
     nested = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
     assert not nested.not_completed
-    (found,), (expected,) = nested.program.phases, program.phases
-    np.testing.assert_array_equal(found.knots, expected.knots)
-    np.testing.assert_array_equal(found.t_norm, expected.t_norm)
+    (phase,), (expected,) = nested.program.phases, program.phases
+    np.testing.assert_array_equal(phase.knots, expected.knots)
+    np.testing.assert_array_equal(phase.t_norm, expected.t_norm)
     first, *later = nested.reports
     assert first is report
-    assert max(each.iterations for each in later) <= 10
+    assert max(level.iterations for level in later) <= 10
     cold = solve(program, next(starting_points(program)))
     assert later[-1].objective == pytest.approx(cold.objective, rel=1e-4)
 

@@ -7,7 +7,7 @@ import pytest
 
 from brachis.optimise.objective import LeastAcceleration
 from brachis.optimise.program import Program
-from support.arrays import assert_scaled
+from support.arrays import assert_near
 from support.jacobians import differences_of
 from support.phases import CASES, phase_of, reachable_points
 
@@ -30,7 +30,7 @@ def test_gradient_of_least_acceleration_equals_differences(case, knots):
         exact = program.gradient(x)
         expected = differences_of(program.objective, x, 1e-5)
         assert np.count_nonzero(exact) > 0.9 * len(exact)
-        assert_scaled(exact, expected, 1e-6)
+        assert_near(exact, expected, 1e-6)
 
 
 @pytest.mark.parametrize("knots", ["uniform", "free"])
@@ -47,7 +47,7 @@ def test_curvature_of_least_acceleration_is_that_of_its_squares(knots):
     slopes = differences_of(residuals, x, 1e-5)
     curvature = program.curvature(x)
     hessian = curvature.hessian(x, 0.5, np.zeros(len(program.lower)))
-    assert_scaled(hessian, slopes.T @ slopes, 1e-6)
+    assert_near(hessian, slopes.T @ slopes, 1e-6)
 
 
 def test_value_is_the_mean_square_over_time():
@@ -57,5 +57,5 @@ def test_value_is_the_mean_square_over_time():
     squares = (phase.with_points(t_norm).state(x).qddot * weights) ** 2
     expected = np.trapezoid(squares.sum(axis=1), t_norm)
     uneven = phase.with_points(np.union1d(t_norm, [0.123, 0.1231, 0.7]))
-    found = program.minimised.value(uneven, x)
-    assert found == pytest.approx(expected, rel=1e-6)
+    value = program.minimised.value(uneven, x)
+    assert value == pytest.approx(expected, rel=1e-6)

@@ -19,7 +19,7 @@ from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.path.time_law import TimeLaw
 from brachis.robot import dynamics
-from support.arrays import assert_scaled
+from support.arrays import assert_near
 from support.jacobians import comparable_rows, dense, differences, differences_of
 from support.phases import phase_of, reachable_points
 
@@ -61,7 +61,7 @@ def test_jacobian_with_a_given_speed(case):
             if not limit.guarantee.is_mean:
                 rows = phase.rows_of(limit).ravel()[comparable_rows(phase, limit, x)]
                 assert len(rows) > 0
-                assert_scaled(exact[rows], expected[rows], 1e-6, least=1e-3)
+                assert_near(exact[rows], expected[rows], 1e-6, least=1e-3)
         state = phase.state(x)
         y = np.array([state.y, state.ydot, state.yddot, state.ydddot])
         law = phase.time_law.at(phase.t_norm * DURATION)
@@ -91,25 +91,25 @@ def in_two_phases(
 ) -> Program:
     """Two phases, the first at a given speed, and a pause in between; the redundant joint is linked there."""
     moves = phase_of("r1")
-    given = at_given_speed("r1")
+    timed = at_given_speed("r1")
     free = EndCondition(np.nan, np.empty(0))
     start = (moves.boundary.start[0], free)
     moves = moves.with_grid(moves.grid, replace(moves.boundary, start=start))
-    end = (given.boundary.end[0], free)
-    boundary = replace(given.boundary, end=end)
+    end = (timed.boundary.end[0], free)
+    boundary = replace(timed.boundary, end=end)
     first = Phase(
-        given.joint_map,
-        given.limits,
-        given.grid,
+        timed.joint_map,
+        timed.limits,
+        timed.grid,
         boundary,
         margin=None,
         pause=PAUSE,
     )
     phases = [first, moves]
     if points is not None:
-        phases = [own.with_points(np.linspace(0.0, 1.0, points)) for own in phases]
+        phases = [phase.with_points(np.linspace(0.0, 1.0, points)) for phase in phases]
     if knots == "free":
-        phases = [own.with_free_knots(0.1) for own in phases]
+        phases = [phase.with_free_knots(0.1) for phase in phases]
     return Program(phases, [Link(0, 1, (1,), orders)])
 
 
@@ -130,11 +130,11 @@ def test_jacobian_of_phases_with_a_pause(knots, orders):
     exact = dense(program, x)
     expected = differences(program, x, 1e-5)
     (mean,) = program.means.limits
-    own = program.rows_of(mean).ravel()
-    size = np.abs(expected[own]).max()
-    assert np.count_nonzero(exact[own]) > 0.9 * exact[own].size
-    assert_allclose(exact[own], expected[own], atol=1e-6 * size)
-    linked = np.arange(own[-1] + 1, len(exact))
+    mean_rows = program.rows_of(mean).ravel()
+    size = np.abs(expected[mean_rows]).max()
+    assert np.count_nonzero(exact[mean_rows]) > 0.9 * exact[mean_rows].size
+    assert_allclose(exact[mean_rows], expected[mean_rows], atol=1e-6 * size)
+    linked = np.arange(mean_rows[-1] + 1, len(exact))
     assert len(linked) == len(orders)
     assert not exact[linked, 0].any(), "the given duration is no variable of links"
     expected[linked, 0] = 0.0
@@ -143,8 +143,8 @@ def test_jacobian_of_phases_with_a_pause(knots, orders):
     assert_allclose(exact[linked], expected[linked], atol=1e-8 * size)
     # A row is the difference of a derivative, in units of the last interval.
     first, second = (
-        phase.motion(part).at(np.array([place * part[0]]))
-        for (phase, part), place in zip(program.split(x), (1.0, 0.0), strict=True)
+        phase.motion(phase_x).at(np.array([place * phase_x[0]]))
+        for (phase, phase_x), place in zip(program.split(x), (1.0, 0.0), strict=True)
     )
     interval = DURATION * np.diff(program.phases[0].breaks)[-1]
     gaps = [interval**k * (first[k][0, 1] - second[k][0, 1]) for k in orders]
@@ -158,18 +158,18 @@ def test_mean_over_phases_and_pause_is_the_integral():
     x = point_in_two_phases(program)
     (mean,) = program.means.limits
     sums = 0.0
-    for phase, part in program.split(x):
+    for phase, phase_x in program.split(x):
         t_norm = np.linspace(0.0, 1.0, 4001)
-        state = phase.with_points(t_norm).state(part)
+        state = phase.with_points(t_norm).state(phase_x)
         values = mean.values(state)
-        sums = sums + simpson(values, x=t_norm * part[0], axis=0)
+        sums = sums + simpson(values, x=t_norm * phase_x[0], axis=0)
         if phase.pause:
             still = np.zeros_like(state.q[-1:])
             robot = phase.joint_map.robot
             load = dynamics.torque(robot, state.q[-1:], still, still)[0]
             sums = sums + PAUSE * (load / 70.0) ** 2
-    found = program.means.values(program.split(x))
-    assert_allclose(found, sums / program.end_time(x), rtol=1e-6)
+    means = program.means.values(program.split(x))
+    assert_allclose(means, sums / program.end_time(x), rtol=1e-6)
 
 
 def torque_ratios(program: Program, x: np.ndarray) -> np.ndarray:
@@ -195,16 +195,19 @@ def test_the_curvature_of_a_mean_is_that_of_its_squares(knots):
     ]
     slopes = np.array(ends).T / 2e-6
     shares = np.concatenate(
-        [part[0] * phase.mean_weights(part) for phase, part in program.split(x)]
+        [
+            phase_x[0] * phase.mean_weights(phase_x)
+            for phase, phase_x in program.split(x)
+        ]
     )
     factors = np.outer(shares / program.end_time(x), weights).ravel()
     expected = 2.0 * slopes.T @ (factors[:, None] * slopes)
-    found = known.hessian(x, 0.0, multipliers)
+    hessian = known.hessian(x, 0.0, multipliers)
     # As above: the first duration is given.
-    found[0] = 0.0
-    found[:, 0] = 0.0
+    hessian[0] = 0.0
+    hessian[:, 0] = 0.0
     size = np.abs(expected).max()
-    assert_allclose(found, expected, atol=1e-6 * size)
+    assert_allclose(hessian, expected, atol=1e-6 * size)
     assert not known.hessian(x, 0.0, np.zeros(len(program.lower))).any()
     assert known.hessian(x, 0.0, known.multipliers).any()
 
@@ -217,13 +220,13 @@ def test_the_hessian_at_a_given_speed_is_that_of_the_objective(case):
     known = program.curvature(x)
     assert known is not None
     no_rows = np.zeros(len(program.lower))
-    found = known.hessian(x, 2.0, no_rows)
+    hessian = known.hessian(x, 2.0, no_rows)
     steps = 1e-4 * np.eye(len(x))[1:]  # the duration is given
     ends = [program.gradient(x + h) - program.gradient(x - h) for h in steps]
     expected = 2.0 * np.array(ends)[:, 1:] / 2e-4
     size = np.abs(expected).max()
-    assert_allclose(found[1:, 1:], expected, atol=1e-6 * size)
-    assert not found[0].any()
+    assert_allclose(hessian[1:, 1:], expected, atol=1e-6 * size)
+    assert not hessian[0].any()
     assert not known.hessian(x, 0.0, no_rows).any()
 
 

@@ -21,14 +21,14 @@ def plan(ends):
 )  # the far ends look like degrees
 def test_a_far_end_changes_nothing():
     """The near end is held to 1e-4 rad, whether the other one is 6 rad away, 1e4, 1e6 or nowhere."""
-    found = [plan([NEAR, end]) for end in (None, 8.0, 1e4, 1e6)]
-    assert all(result.verified for result in found)
+    results = [plan([NEAR, end]) for end in (None, 8.0, 1e4, 1e6)]
+    assert all(result.verified for result in results)
     np.testing.assert_allclose(
-        [result.t_end for result in found], found[0].t_end, rtol=1e-5
+        [result.t_end for result in results], results[0].t_end, rtol=1e-5
     )
     lowest = [
         result.trajectory.position(np.linspace(0.0, result.t_end, 5000))[:, 2].min()
-        for result in found
+        for result in results
     ]
     np.testing.assert_allclose(
         lowest, NEAR, atol=1e-4

@@ -36,14 +36,14 @@ def rubbing(n, width, coulomb=1.0):
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
 def test_every_width_around_every_reversal(width):
     phases = [0.3, 1.7]
-    found = reversals(rubbing(2, width), *swinging(phases))
+    times = reversals(rubbing(2, width), *swinging(phases))
     steps = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
     expected = steps * width / (2.0 * np.pi)
     for phase in phases:
         for zero in (0.5 - phase / (2.0 * np.pi), 1.0 - phase / (2.0 * np.pi)):
-            near = found[np.abs(found - zero) < 2.0 * width] - zero
+            near = times[np.abs(times - zero) < 2.0 * width] - zero
             np.testing.assert_allclose(near, expected, atol=0.01 * width + 1e-8)
-    assert len(found) == 44
+    assert len(times) == 44
 
 
 def test_a_velocity_that_only_touches_zero():

@@ -8,7 +8,7 @@ import pytest
 import brachis
 from brachis.apps.bottleneck import report
 from brachis.verify import verify_trajectory
-from support.checks import check_named, failed_checks
+from support.checks import check_of, failed_checks
 from support.slides import X, plan_slides, slides
 
 MASS, LENGTH, PUSH, BRAKE = 4.0, 1.2, 50.0, 20.0
@@ -42,14 +42,14 @@ def test_the_plan_with_equal_limits_breaks_the_unequal_ones_and_sensitivities_na
     assert free.t_end < 0.9 * bound.t_end
     verification = verify_trajectory(free.trajectory, robot=bound.trajectory.robot)
     assert failed_checks(verification) == ["torque ratio"]
-    ratio = check_named(verification, "torque ratio").value
+    ratio = check_of(verification, "torque ratio").value
     assert ratio == pytest.approx(PUSH / BRAKE, rel=1e-3)
     sensitivities = report(bound).sensitivities
     for side, figure in (("lower", -BRAKE), ("upper", PUSH)):
         # t^2 = 2 m L (1 / |F1| + 1 / F2), so that dt / d|F| = -m L / (t F^2)
         slope = MASS * LENGTH / (bound.t_end * figure**2)
-        found = sensitivities.of("j1", "force", side).derivative
-        assert found == pytest.approx(-np.sign(figure) * slope, rel=0.05)
+        derivative = sensitivities.of("j1", "force", side).derivative
+        assert derivative == pytest.approx(-np.sign(figure) * slope, rel=0.05)
 
 
 def test_a_slide_that_is_faster_one_way():

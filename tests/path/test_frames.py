@@ -84,8 +84,8 @@ def test_every_kind_of_segment_and_orientation_is_in_the_frame():
         atol=1e-12,
     )
     rotations = (sample.target[:, 3:].reshape(-1, 3, 3) for sample in (world, local))
-    found, inner = rotations
-    assert_allclose(found, WORKPIECE.rotation @ inner, atol=1e-12)
+    outer, inner = rotations
+    assert_allclose(outer, WORKPIECE.rotation @ inner, atol=1e-12)
     # Twists are those of the tool frame, whatever the frame of the path.
     for name in ("xi", "xi_ds", "xi_dds"):
         assert_allclose(getattr(world, name), getattr(local, name), atol=1e-9)
@@ -151,8 +151,10 @@ def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path):
         tool = workpiece.actInv(data.oMf[frame])
         assert_allclose(tool.translation[1:], start.translation[1:], atol=1e-7)
         turned = pin.log3(tool.rotation @ start.rotation.T)
-        way = tool.translation[0] - start.translation[0]
-        assert_allclose(turned, [0.0, 0.0, np.radians(20.0) * way / 0.1], atol=1e-6)
+        distance = tool.translation[0] - start.translation[0]
+        assert_allclose(
+            turned, [0.0, 0.0, np.radians(20.0) * distance / 0.1], atol=1e-6
+        )
     assert_allclose(tool.translation, [0.12, 0.03, 0.05], atol=1e-7)
 
 

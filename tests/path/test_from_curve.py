@@ -9,7 +9,7 @@ from brachis import InputError, bspline_segment
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import joint_rows
 from brachis.task import task_with
-from support.arrays import assert_scaled
+from support.arrays import assert_near
 
 RNG = np.random.default_rng(0)
 TIMES, WAYPOINTS = (
@@ -41,7 +41,7 @@ def test_splines_are_taken_exactly(knots):
     found = along(bspline_segment(curve), curve(first))
     for order in range(4):
         expected = curve(first + U * (last - first), nu=order) * (last - first) ** order
-        assert_scaled(found[order], expected, 1e-9, least=1.0)
+        assert_near(found[order], expected, 1e-9, least=1.0)
 
 
 def test_piecewise_polynomials_and_parts_of_them():

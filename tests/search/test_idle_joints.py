@@ -65,10 +65,10 @@ def test_a_given_end_moves_it(result):
 def test_it_stands_still_in_named_postures_too():
     """On the way only the place of the tool counts, not the idle joint of the posture."""
     turned = [0.3, 0.7, 0.2, -1.2, 0.4, 0.9, -0.7]
-    there = brachis.Line(to_posture="turned", stop=True)
+    away = brachis.Line(to_posture="turned", stop=True)
     back = brachis.Line(to_posture="home")
     postures = {"home": START, "turned": turned}
-    result = plan(start="home", postures=postures, path=there + back)
+    result = plan(start="home", postures=postures, path=away + back)
     assert result.verified
     np.testing.assert_array_equal(result.trajectory.q[:, 6], START[6])
     assert result.candidate.origin == HELD

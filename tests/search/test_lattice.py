@@ -72,27 +72,29 @@ CASES = {
 }
 
 
-def courses_of(given: Problem, count: int) -> Any:
+def courses_of(line_problem: Problem, count: int) -> Any:
     """Joint paths of the first closed form."""
-    return ClosedFormLattice(decompositions_of(given)[0]).joint_paths(count)
+    return ClosedFormLattice(decompositions_of(line_problem)[0]).joint_paths(count)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_courses_are_motions_of_the_robot(case):
-    given = CASES[case]()
+    line_problem = CASES[case]()
     count = 0
-    for decomposition in decompositions_of(given):
+    for decomposition in decompositions_of(line_problem):
         joint_paths = ClosedFormLattice(decomposition).joint_paths(4)
         if isinstance(joint_paths, DeadEnd):
             continue
         count += len(joint_paths)
         solver = decomposition.match.solver
         for joint_path in joint_paths:
-            check_joint_path(given, joint_path, miss=1e-6, step=0.9)
+            check_joint_path(line_problem, joint_path, miss=1e-6, step=0.9)
             margins = solver.branch_margins(joint_path.q, joint_path.branch)
             assert margins.min(initial=1.0) > 0.0
-            if given.start is not None:
-                np.testing.assert_allclose(joint_path.q[0], given.start, atol=1e-12)
+            if line_problem.start is not None:
+                np.testing.assert_allclose(
+                    joint_path.q[0], line_problem.start, atol=1e-12
+                )
         for first, second in itertools.combinations(joint_paths, 2):
             assert np.abs(first.q - second.q).max() > 0.05
     assert count >= (1 if case == "none redundant" else 3)
@@ -130,19 +132,19 @@ REASONS = {
 @pytest.mark.parametrize("case", REASONS)
 def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
-    given = problem(scara(**options), **changes)
+    line_problem = problem(scara(**options), **changes)
     ends = [
         lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0])
-        for decomposition in decompositions_of(given)
+        for decomposition in decompositions_of(line_problem)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)
-    of_all_postures = PostureLattice(given, []).joint_paths(4)
+    of_all_postures = PostureLattice(line_problem, []).joint_paths(4)
     assert isinstance(of_all_postures, DeadEnd)
     for furthest in (max(ends, key=lambda end: end.s), of_all_postures):
         assert 0.0 < furthest.s <= 1.0
         assert reason in str(furthest)
     with pytest.raises(PathError, match=message) as caught:
-        brachis.plan(given.robot, given.task, check_advice=False)
+        brachis.plan(line_problem.robot, line_problem.task, check_advice=False)
     assert caught.value.s_interval is not None
 
 
@@ -159,7 +161,7 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
 
 
 def test_advice_names_what_was_kept_low():
-    given = problem(
+    line_problem = problem(
         scara(),
         solver={"max_iterations": 1, "name": "uno"},
         redundant_joints=["j1"],
@@ -168,7 +170,7 @@ def test_advice_names_what_was_kept_low():
     with pytest.raises(
         PlanningError, match=r"Raise solver.max_iterations, which is 1$"
     ) as caught:
-        brachis.plan(given.robot, given.task)
+        brachis.plan(line_problem.robot, line_problem.task)
     assert "effort" not in str(caught.value)
 
 
@@ -203,11 +205,11 @@ def test_a_free_start_that_no_torque_holds_says_so():
 @pytest.mark.parametrize(("turns", "joints"), [(4, ["j1"]), (30, ["j2"]), (30, ["j3"])])
 def test_small_circles_have_stations_enough(turns, joints):
     path = [{"circle": {"center": [0.0, 0.0], "turns": turns}}]
-    given = problem(
+    line_problem = problem(
         scara(), start={"joints": [0.5, -2.0, 1.7]}, path=path, redundant_joints=joints
     )
-    assert len(stations(given.path, given.task_map)) > 24 * turns / 2
-    assert not isinstance(courses_of(given, 1), DeadEnd)
+    assert len(stations(line_problem.path, line_problem.task_map)) > 24 * turns / 2
+    assert not isinstance(courses_of(line_problem, 1), DeadEnd)
 
 
 def test_an_end_posture_without_redundancy_may_have_few_digits():
@@ -217,8 +219,10 @@ def test_an_end_posture_without_redundancy_may_have_few_digits():
         robot, problem(robot, start={"joints": [0.3, 0.9]}, path=line).task
     )
     end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
-    given = problem(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
-    assert not isinstance(courses_of(given, 1), DeadEnd)
+    line_problem = problem(
+        robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end}
+    )
+    assert not isinstance(courses_of(line_problem, 1), DeadEnd)
 
 
 def back_from(
@@ -277,13 +281,13 @@ def test_a_motion_planned_one_way_is_found_the_other_way_round():
         "path": [{"line": {"by": [0.0, -0.4, 0.0]}}],
         "search": {"effort": "single"},
     }
-    there = brachis.plan(task | {"start": {"joints": begin.tolist()}})
+    forwards = brachis.plan(task | {"start": {"joints": begin.tolist()}})
     back = brachis.plan(
         task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]}
     )
-    assert there.verified
+    assert forwards.verified
     assert back.verified
-    assert back.t_end == pytest.approx(there.t_end, rel=2e-3)
+    assert back.t_end == pytest.approx(forwards.t_end, rel=2e-3)
 
 
 def test_a_dead_end_back_from_the_end_says_so():
@@ -291,14 +295,14 @@ def test_a_dead_end_back_from_the_end_says_so():
     end = np.array([0.5, -2.0, 2.0])
     x, y, _ = robot.tool_placement(end).translation
     path = [{"line": {"by": [-4.0, 0.0]}}]
-    given = problem(
+    line_problem = problem(
         robot,
         start="free",
         path_start=[x + 4.0, y],
         end={"joints": end.tolist()},
         path=path,
     )
-    dead = courses_of(given, 1)
+    dead = courses_of(line_problem, 1)
     assert isinstance(dead, DeadEnd)
     assert dead.interval[0] == 0.0
     assert 0.0 < dead.interval[1] < 1.0

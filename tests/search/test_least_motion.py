@@ -82,21 +82,21 @@ def test_bottlenecks_are_those_of_the_fastest_motion(result):
     compare_sensitivities(result, fastest, rel=1e-6, abs=1e-9)
 
 
-def compare_sensitivities(one, two, **near):
-    ours, theirs = (brachis.bottleneck.report(motion) for motion in (one, two))
+def compare_sensitivities(first, second, **near):
+    ours, theirs = (brachis.bottleneck.report(motion) for motion in (first, second))
     limits = ours.sensitivities.limits
     assert len(limits) == len(theirs.sensitivities.limits) > 0
     for entry in limits:
         label = entry.label
-        found = theirs.sensitivities.of(label.subject, label.kind, entry.side)
-        assert found.derivative == pytest.approx(entry.derivative, **near)
+        again = theirs.sensitivities.of(label.subject, label.kind, entry.side)
+        assert again.derivative == pytest.approx(entry.derivative, **near)
 
 
 def test_with_many_variables_only_a_slower_one_is_looked_for(monkeypatch):
     monkeypatch.setattr(least_motion, "_MANY", 20)
-    kept = plan().least_motion
-    assert kept.reports == ()
-    assert "variables" in kept.status
+    fastest = plan().least_motion
+    assert fastest.reports == ()
+    assert "variables" in fastest.status
     slower = plan(slower=0.05)
     assert slower.least_motion.reduction > 0.2
     assert slower.verified

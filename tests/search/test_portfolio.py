@@ -84,29 +84,36 @@ def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndar
 
 
 @pytest.mark.parametrize(
-    ("asked", "choices"),
+    ("changes", "choices"),
     [
         ({}, {()}),
         (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}),
         ({"redundant_joints": ["j1"]}, {("j1",)}),
     ],
 )
-def test_every_candidate_is_listed_the_fastest_first(usual, asked, choices):
-    result = plan(**asked) if asked else usual
-    first, *others = result.candidates
+def test_every_candidate_is_listed_the_fastest_first(usual, changes, choices):
+    result = plan(**changes) if changes else usual
+    first, *slower = result.candidates
     assert first.verified
     assert first.t_end == result.t_end
     assert first.redundant_joints == result.trajectory.redundant_joints
     assert first.branch == result.trajectory.branch
-    if asked:
+    if changes:
         assert choices_of(result) == choices
     else:
-        assert {one.redundant_joints for one in others} <= choices
-    keys = {(one.redundant_joints, one.origin) for one in result.candidates}
+        assert {candidate.redundant_joints for candidate in slower} <= choices
+    keys = {
+        (candidate.redundant_joints, candidate.origin)
+        for candidate in result.candidates
+    }
     assert len(keys) == len(result.candidates)
-    finished = [one.t_end for one in result.candidates if one.verified]
+    finished = [
+        candidate.t_end for candidate in result.candidates if candidate.verified
+    ]
     assert result.t_end == min(finished)
-    unfinished = [one.estimate for one in others if one.status in {RANKED, SLOW}]
+    unfinished = [
+        candidate.estimate for candidate in slower if candidate.status in {RANKED, SLOW}
+    ]
     assert unfinished
     # What was left unfinished could gain no more by its knots.
     assert min(unfinished) >= first.estimate * (1.0 - 2e-3)
@@ -114,16 +121,16 @@ def test_every_candidate_is_listed_the_fastest_first(usual, asked, choices):
 
 
 @pytest.mark.usefixtures("wall_clock")
-@pytest.mark.parametrize("asked", [{}, BRANCH, {"spline": {"intervals": "auto"}}])
-def test_the_same_candidates_whatever_the_number_of_processes(usual, asked):
-    one = plan(search={"jobs": 1}, **asked) if asked else usual
-    two = plan(search={"jobs": 2}, **asked)
-    assert one.t_end == pytest.approx(two.t_end, rel=1e-6)
-    (first, times), (second, others) = without_times(one), without_times(two)
+@pytest.mark.parametrize("changes", [{}, BRANCH, {"spline": {"intervals": "auto"}}])
+def test_the_same_candidates_whatever_the_number_of_processes(usual, changes):
+    alone = plan(search={"jobs": 1}, **changes) if changes else usual
+    shared = plan(search={"jobs": 2}, **changes)
+    assert alone.t_end == pytest.approx(shared.t_end, rel=1e-6)
+    (first, times), (second, times_shared) = without_times(alone), without_times(shared)
     assert first == second
-    assert_allclose(others, times, rtol=1e-6)
+    assert_allclose(times_shared, times, rtol=1e-6)
     assert_allclose(
-        one.trajectory.control_points, two.trajectory.control_points, atol=1e-5
+        alone.trajectory.control_points, shared.trajectory.control_points, atol=1e-5
     )
 
 
@@ -165,7 +172,9 @@ def test_a_free_start_needs_a_place_and_no_numeric_guess():
 def test_numeric_guesses_stay_an_option():
     result = plan(search={"guesses": "numeric"})
     assert result.verified
-    assert all(one.origin.startswith("numeric") for one in result.candidates)
+    assert all(
+        candidate.origin.startswith("numeric") for candidate in result.candidates
+    )
     assert choices_of(result) == {("j1",), ("j2",), ("j3",)}
 
 
@@ -191,19 +200,21 @@ def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_pat
     assert result.verified
     assert choices_of(result) == {(), ("j1",), ("j2",), ("j3",)}
     assert result.t_end <= 1.001 * plan(redundant_joints=["j1"]).t_end
-    in_charts = [one.status for one in result.candidates if not one.branch]
+    in_charts = [
+        candidate.status for candidate in result.candidates if not candidate.branch
+    ]
     assert in_charts == ["from s = 0.5 on nothing"]
 
 
 @pytest.mark.parametrize(
-    ("asked", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
+    ("changes", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
 )
 def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
-    monkeypatch, asked, lattices
+    monkeypatch, changes, lattices
 ):
     monkeypatch.setattr(guesses, "ClosedFormLattice", NoPosture)
     monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
-    result = plan(**asked)
+    result = plan(**changes)
     assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
     statuses = [candidate.status for candidate in result.candidates]
@@ -218,8 +229,8 @@ def test_a_real_ctrl_c_ends_worker_processes():
         if text.endswith(", verified"):
             os.kill(os.getpid(), signal.SIGINT)
 
-    asked = task(search={"effort": "exhaustive", "jobs": 2})
-    result = brachis.plan(ROBOT, asked, listener=listener)
+    changes = task(search={"effort": "exhaustive", "jobs": 2})
+    result = brachis.plan(ROBOT, changes, listener=listener)
     assert result.verified
     assert result.interrupted
     assert result.not_completed[-1] == UNFINISHED
@@ -310,7 +321,7 @@ def test_the_time_limit_gives_the_best_motion_so_far(clock):
 
 
 @pytest.mark.parametrize(
-    ("asked", "solved", "left"),
+    ("changes", "solved", "remark"),
     [
         ({}, 1, "of 2 candidates 1 not tried"),
         (BRANCH, 2, "of 5 candidates 3 not tried, 1 not finished"),
@@ -318,20 +329,22 @@ def test_the_time_limit_gives_the_best_motion_so_far(clock):
 )
 @pytest.mark.usefixtures("splines_are_too_fast")
 def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
-    clock, monkeypatch, asked, solved, left
+    clock, monkeypatch, changes, solved, remark
 ):
     monkeypatch.setattr(schedule, "_SIZE", 4)
     monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
     clock.jump(pipeline, "rank_candidate", at=solved)
-    result = plan(spline=FEW_POINTS, **asked)
+    result = plan(spline=FEW_POINTS, **changes)
     assert result.interrupted
     assert not result.verified
     assert result.verification.worst_ratio > 1.0
-    tried = [each for each in result.candidates if each.status != NOT_TRIED]
+    tried = [
+        candidate for candidate in result.candidates if candidate.status != NOT_TRIED
+    ]
     assert len(tried) == solved
-    fastest = min(each.estimate for each in tried)
+    fastest = min(candidate.estimate for candidate in tried)
     assert result.t_end == pytest.approx(fastest, rel=0.1)
-    assert left in result.not_completed
+    assert remark in result.not_completed
 
 
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
@@ -426,9 +439,9 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
 def test_within_other_workers_no_processes_start():
     joblib = pytest.importorskip("joblib")
     handler = signal.getsignal(signal.SIGINT)
-    asked = task(search={"jobs": 2}, redundant_joints=["j1"])
+    changes = task(search={"jobs": 2}, redundant_joints=["j1"])
     for backend in ("threading", "loky"):
-        work = [joblib.delayed(brachis.plan)(ROBOT, asked) for _ in range(2)]
+        work = [joblib.delayed(brachis.plan)(ROBOT, changes) for _ in range(2)]
         first, second = joblib.Parallel(n_jobs=2, backend=backend)(work)
         assert first.t_end == pytest.approx(second.t_end, rel=1e-9)
     assert signal.getsignal(signal.SIGINT) is handler
@@ -442,11 +455,13 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(usual, monkeypatch)
     monkeypatch.setattr(portfolio, "tolerances", never_enough)
     every = plan()
     few, finished = (
-        [one for one in result.candidates if math.isfinite(one.t_end)]
+        [candidate for candidate in result.candidates if math.isfinite(candidate.t_end)]
         for result in (usual, every)
     )
     assert len(finished) > len(few)
-    assert all(one.t_end >= one.estimate * (1.0 - 1e-6) for one in finished)
+    assert all(
+        candidate.t_end >= candidate.estimate * (1.0 - 1e-6) for candidate in finished
+    )
     assert usual.t_end <= every.t_end * (1.0 + 2e-4)
 
 
@@ -469,8 +484,8 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     monkeypatch.setattr(portfolio.Search, "_may_win", lambda *_: True)
     monkeypatch.setattr(pipeline, "adapt_mesh", note)
     monkeypatch.setattr(pipeline, "finish_candidate", against_faster)
-    asked = task(start="free", path_start=HERE, spline={"intervals": "auto"})
-    result = brachis.plan(robot, asked)
+    changes = task(start="free", path_start=HERE, spline={"intervals": "auto"})
+    result = brachis.plan(robot, changes)
     assert result.verified
     assert meshes == [0]
     first, *rest = tried

@@ -41,8 +41,8 @@ def line(
     )
 
 
-def joint_paths_of(given: Problem, **options: Any) -> Any:
-    return PostureLattice(given, [], **options).joint_paths(4)
+def joint_paths_of(line_problem: Problem, **options: Any) -> Any:
+    return PostureLattice(line_problem, [], **options).joint_paths(4)
 
 
 CASES = {
@@ -71,14 +71,14 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_joint_paths_are_motions_of_the_robot(case):
-    given = CASES[case]()
-    joint_paths = joint_paths_of(given, nodes=40)
+    line_problem = CASES[case]()
+    joint_paths = joint_paths_of(line_problem, nodes=40)
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
         np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
-        check_joint_path(given, joint_path, miss=1e-10, step=0.8 + 1e-12)
-        np.testing.assert_array_equal(joint_path.q[0], given.start)
+        check_joint_path(line_problem, joint_path, miss=1e-10, step=0.8 + 1e-12)
+        np.testing.assert_array_equal(joint_path.q[0], line_problem.start)
 
 
 def test_gravity_and_ranges_turn_joint_paths_away():
@@ -116,16 +116,16 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
 def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_forms(
     angle,
 ):
-    given = problem(
+    line_problem = problem(
         scara(),
         start={"joints": START},
         path=[{"line": {"length": 1.0, "angle_deg": angle}}],
     )
     best = min(
         ClosedFormLattice(one).joint_paths(1)[0].length
-        for one in decompositions_of(given)
+        for one in decompositions_of(line_problem)
     )
-    assert joint_paths_of(given)[0].length < 1.15 * best
+    assert joint_paths_of(line_problem)[0].length < 1.15 * best
 
 
 def component(q: np.ndarray) -> int:
@@ -137,13 +137,13 @@ def component(q: np.ndarray) -> int:
     "known", [True, False], ids=["closed forms", "random postures"]
 )
 def test_a_free_start_finds_both_components_of_the_self_motion(known):
-    given = problem(
+    line_problem = problem(
         scara(),
         start="free",
         path_start=[0.5, 0.2],
         path=[{"line": {"by": [-0.3, 0.1]}}],
     )
-    decompositions = decompositions_of(given)
+    decompositions = decompositions_of(line_problem)
     expected = {
         component(joint_path.q[0])
         for one in decompositions
@@ -151,7 +151,7 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
     }
     assert expected == {-1, 1}
     joint_paths = PostureLattice(
-        given, decompositions if known else [], cells_per_turn=36
+        line_problem, decompositions if known else [], cells_per_turn=36
     ).joint_paths(6)
     for joint_path in joint_paths:
         assert len({component(q) for q in joint_path.q}) == 1
@@ -173,12 +173,12 @@ RANGE = {"position": {"j1": [START[0] - 7.0, START[0] + 13.0]}}
 def test_the_end_is_reached_in_its_own_turn(turns, reached):
     """Once round the base, so far from it that no other joint can turn in place of the first."""
     end = START + TURN * turns * np.eye(3)[0]
-    given = problem(
+    line_problem = problem(
         scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()}
     )
-    found = joint_paths_of(given, **COARSE)
-    assert isinstance(found, list) is reached
-    for joint_path in found if reached else []:
+    joint_paths = joint_paths_of(line_problem, **COARSE)
+    assert isinstance(joint_paths, list) is reached
+    for joint_path in joint_paths if reached else []:
         assert_allclose(joint_path.q[-1], end, atol=1e-3)
         assert_array_equal(joint_path.q[0], START)
 
@@ -189,25 +189,27 @@ def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
     robot = scara(RANGE)
     end = START + TURN * turns * np.eye(3)[0]
     path_start = robot.tool_placement(end).translation[:2].tolist()
-    given = problem(
+    line_problem = problem(
         robot,
         path=CIRCLE,
         start="free",
         path_start=path_start,
         end={"joints": end.tolist()},
     )
-    found = joint_paths_of(given, **COARSE)
-    assert isinstance(found, list) is reached
-    for joint_path in found if reached else []:
+    joint_paths = joint_paths_of(line_problem, **COARSE)
+    assert isinstance(joint_paths, list) is reached
+    for joint_path in joint_paths if reached else []:
         assert_array_equal(joint_path.q[-1], end)
         assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(TURN, abs=1.6)
 
 
 LATTICES = {
-    "of all postures": lambda given: PostureLattice(
-        given, decompositions_of(given), density=0.2
+    "of all postures": lambda line_problem: PostureLattice(
+        line_problem, decompositions_of(line_problem), density=0.2
     ),
-    "of a closed form": lambda given: ClosedFormLattice(*decompositions_of(given)),
+    "of a closed form": lambda line_problem: ClosedFormLattice(
+        *decompositions_of(line_problem)
+    ),
 }
 
 
@@ -221,8 +223,8 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
 
     def end_of(turns):
         circle = [{"circle": {"center": [0.0, 0.0], "turns": turns * way}}]
-        given = problem(robot, start="free", path_start=here, path=circle)
-        return lattice(given).joint_paths(4)
+        line_problem = problem(robot, start="free", path_start=here, path=circle)
+        return lattice(line_problem).joint_paths(4)
 
     joint_paths = end_of(1.5)
     assert all(
@@ -236,10 +238,13 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
 
 
 def test_the_same_seed_gives_the_same_joint_paths():
-    given = CASES["r = 2, 4R"]()
+    line_problem = CASES["r = 2, 4R"]()
     first, again, changed = (
         joint_paths_of(
-            dataclasses.replace(given, task=task_with(given.task, seed=seed)), nodes=60
+            dataclasses.replace(
+                line_problem, task=task_with(line_problem.task, seed=seed)
+            ),
+            nodes=60,
         )
         for seed in (3, 3, 4)
     )
@@ -266,8 +271,8 @@ def test_a_given_end_is_reached_with_several_redundant_joints(start, end):
     robot = planar_robot("CCCCC"[: len(start)])
     tool = [robot.tool_placement(np.array(q)).translation[:2] for q in (start, end)]
     by = (tool[1] - tool[0]).tolist()
-    given = line(robot, start, by, end={"joints": end})
-    joint_paths = PostureLattice(given, [], nodes=60).joint_paths(4)
+    line_problem = line(robot, start, by, end={"joints": end})
+    joint_paths = PostureLattice(line_problem, [], nodes=60).joint_paths(4)
     assert isinstance(joint_paths, list)
     assert joint_paths
     assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)

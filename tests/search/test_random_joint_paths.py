@@ -27,13 +27,13 @@ def problem_of(**keys) -> Problem:
     return Problem.of(brachis.robots.iiwa14, task_with(**(line | keys)))
 
 
-@pytest.mark.parametrize("given", ["start", "end", "none"])
-def test_they_are_on_the_path_from_given_ends_within_the_ranges(given):
+@pytest.mark.parametrize("end", ["start", "end", "none"])
+def test_they_are_on_the_path_from_given_ends_within_the_ranges(end):
     place = brachis.robots.iiwa14.tool_placement(START).translation
     free = {"start": "free", "path_start": [0.5, 0.1, 0.6]}
     by = np.array([0.0, 0.3, 0.0])
     back = {"path_start": place - by, "path": brachis.Line(by=by), "end": START}
-    problem = problem_of(**{"start": {}, "end": free | back, "none": free}[given])
+    problem = problem_of(**{"start": {}, "end": free | back, "none": free}[end])
     joint_paths = random_joint_paths(problem, 12)
     assert 6 <= len(joint_paths) <= 12
     limits = problem.robot.limits
@@ -46,7 +46,7 @@ def test_they_are_on_the_path_from_given_ends_within_the_ranges(given):
         assert np.abs(np.diff(q, axis=0)).max() < 0.8
     for name, row in (("start", 0), ("end", -1)):
         postures = np.array([joint_path.q[row] for joint_path in joint_paths])
-        assert (np.ptp(postures, axis=0).max() < 1e-6) == (name == given)
+        assert (np.ptp(postures, axis=0).max() < 1e-6) == (name == end)
 
 
 class LateLattice(Deadline):

@@ -143,9 +143,9 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_cost_no_plan(monkeypatch):
         path=brachis.Line(by=[0, 0.8, 0]),
         effort="single",
     )
-    part = {"process_speed": {"speed": 20.0, "s": [0.3, 0.7]}}
+    limits = {"process_speed": {"speed": 20.0, "s": [0.3, 0.7]}}
     reason = "the process speed is too high for the .* along the best joint path that was found"
-    error_of(task_with(task, tool_limits=part), reason)
+    error_of(task_with(task, tool_limits=limits), reason)
     reason = r"boundary.start_speed: the start speed is too high for the"
     error_of(task_with(task, start_speed=20.0), reason)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 
-def assert_scaled(
+def assert_near(
     actual: Any, expected: Any, tolerance: float, *, least: float = 0.0
 ) -> None:
     """Compare arrays to a tolerance times the largest size of what is expected, and at least times `least`."""

@@ -10,7 +10,7 @@ def failed_checks(verification: Verification) -> list[str]:
     return [check.name for check in verification.checks if not check.passed]
 
 
-def check_named(verification: Verification, name: str) -> Check:
+def check_of(verification: Verification, name: str) -> Check:
     """Return the one check with a name."""
     (check,) = (check for check in verification.checks if check.name == name)
     return check

@@ -288,8 +288,8 @@ def test_the_tools_axis_leaves_the_roll_open():
     write("x,y,z,i,j,k", np.hstack([POINTS, axes]))
     spline = spline_of(task("pose_free_roll"))
     turns = [turn.rotation for turn in turns_of(spline)]
-    found = [turn.apply([0.0, 0.0, 1.0]) for turn in turns]
-    assert_allclose(found, axes, atol=1e-12)
+    tool_axes = [turn.apply([0.0, 0.0, 1.0]) for turn in turns]
+    assert_allclose(tool_axes, axes, atol=1e-12)
     for (before, after), axis in zip(itertools.pairwise(turns), axes, strict=False):
         roll = (after * before.inv()).as_rotvec() @ axis
         assert roll == pytest.approx(0.0, abs=1e-12)

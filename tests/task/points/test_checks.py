@@ -21,8 +21,8 @@ MM = 1e-3
 
 
 def spikes(position):
-    given = points(position)
-    refuse_spikes(given, scatter_of(given), 0.05 * MM)
+    seam = points(position)
+    refuse_spikes(seam, scatter_of(seam), 0.05 * MM)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.02])

@@ -66,8 +66,8 @@ def test_orientations_are_fitted_too():
     scatter = np.random.default_rng(2).normal(size=(800, 3)) * 2e-4
     turned = Rotation.from_rotvec(smooth) * Rotation.from_rotvec(scatter)
     quaternions = with_like_signs(np.roll(turned.as_quat(canonical=True), 1, axis=1))
-    given = points(position, quaternions)
-    (curve,), report = fit_curves(given, tolerance(0.1 * MM, 2e-3))
+    seam = points(position, quaternions)
+    (curve,), report = fit_curves(seam, tolerance(0.1 * MM, 2e-3))
     assert 1e-4 < report.orientation_error <= 2e-3
     drawn = curve.spline(np.linspace(0.0, report.length, 5_000))
     gaps = np.linalg.norm(drawn[:, None, :3] - position[::20], axis=2)
