@@ -11,16 +11,6 @@ from brachis.errors import InputError, ResultFileError, UnknownNameError
 SCARA = brachis.robots.path_of("scara3")
 
 
-@pytest.fixture(scope="module")
-def motion():
-    return brachis.plan(
-        brachis.examples.scara_line,
-        redundant_joints=["j1"],
-        effort="single",
-        intervals=6,
-    ).trajectory
-
-
 @pytest.mark.parametrize(
     ("make", "told"),
     [
@@ -168,12 +158,13 @@ def test_a_key_of_a_section_is_found_in_a_file():
         ),
     ],
 )
-def test_wrong_types_on_a_motion(use, told, motion):
+def test_wrong_types_on_a_motion(use, told, line_trajectory):
     with pytest.raises(InputError, match=told):
-        use(motion)
+        use(line_trajectory)
 
 
-def test_files_of_motions_are_taken_as_motions(motion, tmp_path):
+def test_files_of_motions_are_taken_as_motions(line_trajectory, tmp_path):
+    motion = line_trajectory
     motion.save(tmp_path / "result.npz")
     assert brachis.verify_trajectory(
         tmp_path / "result.npz"

@@ -3,6 +3,7 @@
 import pickle
 
 import numpy as np
+from numpy.testing import assert_array_equal
 
 from brachis.common.arrays import LastCall, clear_rounding
 
@@ -18,11 +19,11 @@ def test_the_last_call_is_remembered_and_no_other():
     remembered = LastCall(double)
     first = np.array([1.0, 2.0])
     CALLS.clear()
-    np.testing.assert_array_equal(remembered(first), [2.0, 4.0])
+    assert_array_equal(remembered(first), [2.0, 4.0])
     assert remembered(first.copy()) is remembered(first)
     assert len(CALLS) == 1
-    np.testing.assert_array_equal(remembered(first + 1.0), [4.0, 6.0])
-    np.testing.assert_array_equal(remembered(first), [2.0, 4.0])
+    assert_array_equal(remembered(first + 1.0), [4.0, 6.0])
+    assert_array_equal(remembered(first), [2.0, 4.0])
     assert len(CALLS) == 3
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import null_space
 
 import brachis
@@ -18,23 +18,19 @@ from brachis.errors import (
 )
 from brachis.kinematics import ChartRows
 from brachis.robot import task_map_of
+from brachis.task import task_with
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 from support.charts import jacobian
+from support.checks import failed_checks
+from support.result_files import with_parts
 from support.scara import START, scara
-
-ROOT = Path(__file__).parents[1]
 
 
 def scara_line(angle: float, **changes: Any) -> brachis.Result:
-    task = {
-        "brachis": 1,
-        "start": {"joints": START},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
-        "spline": {"degree": 3, "intervals": 20, "rest": "full"},
-    }
-    return brachis.plan(scara(), task | changes)
+    line = brachis.Line(length=1.0, angle_deg=angle)
+    task = {"start": START, "task_space": ["x", "y"], "path": line, "intervals": 20}
+    return brachis.plan(scara(), **(task | changes))
 
 
 @pytest.fixture(scope="module")
@@ -69,48 +65,30 @@ def test_an_end_posture_may_have_few_digits(result, redundant):
     exact = result.trajectory.position(result.t_end)
     end = np.round(exact, 7)
     assert np.abs(end - exact).max() > 1e-9
-    reached = scara_line(270, end={"joints": end.tolist()}, redundant_joints=redundant)
+    reached = scara_line(270, end=end, redundant_joints=redundant)
+    trajectory = reached.trajectory
     assert reached.verified
-    assert 1e-9 < np.abs(reached.trajectory.position(reached.t_end) - end).max() < 1e-6
-    robot = reached.trajectory.robot
-    self_motion = null_space(jacobian(task_map_of(robot, ["x", "y"]), end[None])[0])[
-        :, 0
-    ]
-    other = reached.task.to_dict() | {
-        "end": {"joints": (end + 1e-5 * self_motion).tolist()}
-    }
-    aside = brachis.load_task(other)
-    checks = verify_trajectory(
-        dataclasses.replace(reached.trajectory, task=aside)
-    ).checks
-    assert [check.name for check in checks if not check.passed] == ["end posture"]
+    assert 1e-9 < np.abs(trajectory.position(reached.t_end) - end).max() < 1e-6
+    task_map = task_map_of(trajectory.robot, ["x", "y"])
+    self_motion = null_space(jacobian(task_map, end[None])[0])[:, 0]
+    aside = task_with(reached.task, end=end + 1e-5 * self_motion)
+    verification = verify_trajectory(dataclasses.replace(trajectory, task=aside))
+    assert failed_checks(verification) == ["end posture"]
 
 
 def test_a_saved_motion_passes_its_checks_again(result, saved_file):
     loaded = Trajectory.load(saved_file)
     assert loaded.branch == "chart"
     assert loaded.redundant_joints == result.trajectory.redundant_joints
-    np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
-    np.testing.assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
+    assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
+    assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
     t = np.linspace(0.0, loaded.t_end, 50)
-    np.testing.assert_allclose(
-        loaded.position(t), result.trajectory.position(t), atol=1e-14
-    )
+    assert_allclose(loaded.position(t), result.trajectory.position(t), atol=1e-14)
     assert verify_trajectory(loaded).passed
     # The curves of the chart describe the motion: sigma = C q - p.
     rows = ChartRows(loaded.chart_rows, loaded.chart_knots)
     sigma = rows.values(loaded.path_coordinate(loaded.times), loaded.q)
-    np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
-
-
-def with_arrays(path: Path, **changed: Any) -> None:
-    with np.load(path) as archive:
-        arrays = dict(archive)
-    arrays |= {
-        name: change(arrays[name]) if callable(change) else change
-        for name, change in changed.items()
-    }
-    np.savez(path, **arrays)
+    assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
 
 
 BROKEN = {
@@ -137,7 +115,7 @@ BROKEN = {
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_a_broken_chart_is_an_error(case, saved_file):
-    with_arrays(saved_file, **BROKEN[case])
+    with_parts(saved_file, **BROKEN[case])
     with pytest.raises(
         ResultFileError, match=r"the result file is broken|not a brachis result"
     ) as caught:
@@ -148,39 +126,31 @@ def test_a_broken_chart_is_an_error(case, saved_file):
 def test_a_chart_that_is_not_broken_is_read(saved_file):
     """The same rows as splines."""
     knots = np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(6)])
-    with_arrays(
+    with_parts(
         saved_file, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots
     )
     assert len(Trajectory.load(saved_file).chart_knots) == 14
 
 
 @pytest.mark.parametrize(
-    ("urdf", "start", "space", "line"),
+    ("robot", "space", "by"),
     [
-        ("scara3", [0.0, 0.0, 0.0], ["x", "y"], [-0.3, 0.2]),
-        ("gen3", [0.0] * 7, "pose", [0.0, 0.1, -0.1]),
+        ("scara3", ["x", "y"], [-0.3, 0.2]),
+        ("gen3", "pose", [0.0, 0.1, -0.1]),
     ],
 )
-def test_a_singular_start_is_an_error(urdf, start, space, line):
-    task = {
-        "brachis": 1,
-        "start": {"joints": start},
-        "task_space": space,
-        "path": [{"line": {"by": line}}],
-    }
+def test_a_singular_start_is_an_error(robot, space, by):
+    start = [0.0] * getattr(brachis.robots, robot).n
     with pytest.raises(StartError, match="singular"):
-        brachis.plan(ROOT / "robots" / urdf / "robot.urdf", task)
+        brachis.plan(robot, start=start, task_space=space, path=brachis.Line(by=by))
 
 
 def test_numeric_guesses_need_a_closed_form():
-    start = [0.3, 0.4, 0.3, -1.2, 0.3, -0.9, 0.2]
-    line = {"line": {"by": [0.0, 0.05, -0.05]}}
-    task = {
-        "brachis": 1,
-        "start": {"joints": start},
-        "task_space": "pose",
-        "path": [line],
-        "search": {"guesses": "numeric"},
-    }
     with pytest.raises(DecompositionError):
-        brachis.plan(ROOT / "robots" / "gen3/robot.urdf", task)
+        brachis.plan(
+            "gen3",
+            start=[0.3, 0.4, 0.3, -1.2, 0.3, -0.9, 0.2],
+            task_space="pose",
+            path=brachis.Line(by=[0.0, 0.05, -0.05]),
+            search={"guesses": "numeric"},
+        )

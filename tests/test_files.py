@@ -48,20 +48,21 @@ def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(
 def endless(request, tmp_path):
     """What must not be read, and what is said of it."""
     path = tmp_path / request.param
-    if request.param == "pipe":
-        os.mkfifo(path)
-        return path, "it is a pipe, not a file"
-    if request.param == "folder":
-        path.mkdir()
-        return path, "it is a folder, not a file"
-    if request.param == "socket":
-        with socket.socket(socket.AF_UNIX) as server:
-            server.bind(str(path)[:100])
-        return path, "."  # some systems do not even open it
-    if request.param == "zeros":
-        return Path("/dev/zero"), "it is a device, not a file"
-    if request.param == "name":
-        return tmp_path / "a\0b", "not the name of a file"
+    match request.param:
+        case "pipe":
+            os.mkfifo(path)
+            return path, "it is a pipe, not a file"
+        case "folder":
+            path.mkdir()
+            return path, "it is a folder, not a file"
+        case "socket":
+            with socket.socket(socket.AF_UNIX) as server:
+                server.bind(str(path)[:100])
+            return path, "."  # some systems do not even open it
+        case "zeros":
+            return Path("/dev/zero"), "it is a device, not a file"
+        case "name":
+            return tmp_path / "a\0b", "not the name of a file"
     with path.open("wb") as stream:
         stream.truncate(LARGE)  # takes no room
     return path, r"it is longer than 16 MB"

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.errors import InputError, TaskError, UnknownNameError
@@ -36,6 +38,11 @@ LINE = {
     "task_space": ["x", "y"],
     **QUICK,
 }
+
+
+@pytest.fixture(scope="module")
+def result():
+    return brachis.plan("scara3", **LINE)
 
 
 def test_the_script_of_a_new_user_runs(tmp_path, capsys):
@@ -92,85 +99,76 @@ def test_a_wrong_keyword_is_answered_with_the_nearest():
 
 
 def test_segments_are_those_of_the_task_file():
-    content = {
-        "brachis": 1,
-        "start": {"joints": [0.0]},
-        "task_space": "pose",
-        "path": [
-            {
-                "line": {"to": [0.5, 0.0, 0.3]},
-                "orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 0]}},
-                "blend": 0.01,
-            },
-            {"arc": {"center": [0.4, 0.0, 0.3], "angle_deg": 90, "normal": [0, 0, 1]}},
-            {"circle": {"center": [0.4, 0.0, 0.3], "turns": 2, "normal": [0, 0, 1]}},
-            {"helix": {"center": [0.4, 0.0, 0.3], "pitch": 0.01, "normal": [0, 0, 1]}},
-            {
-                "spline": {
-                    "through": [[0.1, 0.2, 0.3], [0.2, 0.2, 0.3]],
-                    "orientations": [{"quaternion_wxyz": [1, 0, 0, 0]}] * 2,
-                }
-            },
-        ],
-    }
+    content = yaml.safe_load("""
+    - {line: {to: [0.5, 0, 0.3]}, orientation: {to: {quaternion_wxyz: [1, 0, 0, 0]}}, blend: 0.01}
+    - arc: {center: [0.4, 0, 0.3], angle_deg: 90, normal: [0, 0, 1]}
+    - circle: {center: [0.4, 0, 0.3], turns: 2, normal: [0, 0, 1]}
+    - helix: {center: [0.4, 0, 0.3], pitch: 0.01, normal: [0, 0, 1]}
+    - spline:
+        through: [[0.1, 0.2, 0.3], [0.2, 0.2, 0.3]]
+        orientations: [{quaternion_wxyz: [1, 0, 0, 0]}, {quaternion_wxyz: [1, 0, 0, 0]}]
+    """)
     here, up = [0.4, 0.0, 0.3], np.array([0, 0, 1])
-    poses = [pin.SE3(np.eye(3), np.array([x, 0.2, 0.3])) for x in (0.1, 0.2)]
+    places = ([0.5, 0.0, 0.3], [0.1, 0.2, 0.3], [0.2, 0.2, 0.3])
+    end, *poses = (pin.SE3(np.eye(3), np.array(place)) for place in places)
     joined = (
-        brachis.Line(to=pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.3])), blend=0.01)
+        brachis.Line(to=end, blend=0.01)
         + brachis.Arc(center=here, angle_deg=90, normal=up)
         + brachis.Circle(np.array(here), turns=2, normal=up)
         + brachis.Helix(here, pitch=0.01)
         + brachis.Spline(through=poses)
     )
-    assert joined == brachis.load_task(content).path
-    assert brachis.Spline(through=[pose.homogeneous for pose in poses]) == joined[-1]
-    assert (
-        brachis.Spline(through=np.stack([pose.homogeneous for pose in poses]))
-        == joined[-1]
-    )
+    assert joined == task_with(start=[0.0], task_space="pose", path=content).path
+    matrices = [pose.homogeneous for pose in poses]
+    for through in (matrices, np.stack(matrices)):
+        assert brachis.Spline(through=through) == joined[-1]
 
 
 @pytest.mark.parametrize(
-    ("make", "parts"),
+    ("kind", "keys", "parts"),
     [
-        (brachis.Line, ["Line", "exactly one of its forms"]),
-        (lambda: brachis.Line(to=[1], by=[1]), ["Line", "exactly one of its forms"]),
-        (lambda: brachis.Line(by=["a", 1]), ["Line", "line.by[0]"]),
-        (lambda: brachis.Helix([0, 0, 0], pitch=0.1, turns=0), ["helix.turns"]),
-        (lambda: brachis.Spline(through=[]), ["Spline", "spline.through"]),
-        (lambda: brachis.Spline(through=[pin.SE3.Identity(), 3.0]), ["spline.through"]),
+        ("Line", {}, ["Line", "exactly one of its forms"]),
+        ("Line", {"by": ["a", 1]}, ["Line", "line.by[0]"]),
+        (
+            "Helix",
+            {"center": [0, 0, 0], "pitch": 0.1, "turns": 0},
+            ["helix.turns"],
+        ),
+        ("Spline", {"through": []}, ["Spline", "spline.through"]),
+        ("Spline", {"through": [pin.SE3.Identity(), 3.0]}, ["spline.through"]),
     ],
+    ids=["no form", "text", "turns", "empty", "a number"],
 )
-def test_wrong_segments_are_errors(make, parts):
+def test_wrong_segments_are_errors(kind, keys, parts):
     with pytest.raises(TaskError) as caught:
-        make()
+        getattr(brachis, kind)(**keys)
     assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+def test_segments_are_joined_with_segments_alone():
     with pytest.raises(TypeError):
         _ = brachis.Line(by=[1.0]) + 3
 
 
 def test_a_robot_with_other_limits_keeps_the_rest():
     robot = brachis.robots.tx90l_rail
-    changed = robot.with_limits(
-        torque={"joint_1": 100.0}, velocity=1.0, scale={"torque": 0.5}
-    )
-    assert changed.limits.torque[1] == 50.0
-    np.testing.assert_array_equal(
-        changed.limits.torque[2:], 0.5 * robot.limits.torque[2:]
-    )
-    np.testing.assert_array_equal(changed.limits.velocity, 1.0)
-    np.testing.assert_array_equal(
-        changed.limits.position_lower, robot.limits.position_lower
-    )
+    changes = {"torque": {"joint_1": 100.0}, "velocity": 1.0, "scale": {"torque": 0.5}}
+    changed = robot.with_limits(**changes)
+    before, after = robot.limits, changed.limits
+    assert after.torque[1] == 50.0
+    assert_array_equal(after.torque[2:], 0.5 * before.torque[2:])
+    assert_array_equal(after.velocity, 1.0)
+    assert_array_equal(after.position_lower, before.position_lower)
     again = changed.with_limits(torque={"joint_2": 20.0}).with_payload(2.0).limits
     assert again.torque[1:3].tolist() == [50.0, 20.0]
-    assert robot.limits.torque[1] == 318.0
-    with pytest.raises(UnknownNameError, match="torque"):
-        robot.with_limits(torques=3.0)
-    with pytest.raises(UnknownNameError, match="joint_1"):
-        robot.with_limits(torque={"joint1": 3.0})
-    with pytest.raises(TaskError, match=r"limits.torque: out of range"):
-        robot.with_limits(torque=-3.0)
+    assert before.torque[1] == 318.0
+    for wrong, kind, match in (
+        ({"torques": 3.0}, UnknownNameError, "torque"),
+        ({"torque": {"joint1": 3.0}}, UnknownNameError, "joint_1"),
+        ({"torque": -3.0}, TaskError, r"limits.torque: out of range"),
+    ):
+        with pytest.raises(kind, match=match):
+            robot.with_limits(**wrong)
 
 
 def test_a_robot_whose_tool_rolls_may_have_other_limits():
@@ -181,48 +179,35 @@ def test_a_robot_whose_tool_rolls_may_have_other_limits():
     assert not robot.with_payload(1.0).tool_joints
 
 
-def test_samples_carry_the_tool():
-    result = brachis.plan("scara3", **LINE)
+def test_samples_carry_the_tool(result):
     samples = result.sample(0.01)
     placement = result.trajectory.robot.tool_placement(samples.q[30])
-    np.testing.assert_allclose(
-        samples.tool_position[30], placement.translation, atol=1e-12
-    )
+    assert_allclose(samples.tool_position[30], placement.translation, atol=1e-12)
     rotation = pin.Quaternion(*samples.tool_quaternion[30]).matrix()
-    np.testing.assert_allclose(rotation, placement.rotation, atol=1e-12)
-    step = 1e-6
-    before, behind = result.trajectory.at([0.3 - step, 0.3 + step]).tool_position
-    speed = result.trajectory.at(0.3).tool_speed
-    np.testing.assert_allclose(
-        speed, np.linalg.norm(behind - before) / (2 * step), rtol=1e-6
-    )
-    held = result.sample(0.01, last="hold")
-    assert held.tool_speed[-1] == 0.0
+    assert_allclose(rotation, placement.rotation, atol=1e-12)
+    before, after = result.trajectory.at([0.3 - 1e-6, 0.3 + 1e-6]).tool_position
+    speed = np.linalg.norm(after - before) / 2e-6
+    assert_allclose(result.trajectory.at(0.3).tool_speed, speed, rtol=1e-6)
+    assert result.sample(0.01, last="hold").tool_speed[-1] == 0.0
 
 
-def test_many_plans_keep_their_order_and_failures_are_values():
+def test_many_plans_keep_their_order_and_failures_are_values(result):
     tasks = [
         {"brachis": 1},
         ("scara3", task_with(**LINE)),
         (None, brachis.examples.scara_line),
     ]
-    told = []
-    outcomes = brachis.plan_many(
+    counts = []
+    failure, first, second = brachis.plan_many(
         tasks,
         jobs=2,
-        progress=lambda done, total, _: told.append((done, total)),
+        progress=lambda done, total, _: counts.append((done, total)),
         **QUICK,
     )
-    assert [type(outcome).__name__ for outcome in outcomes] == [
-        "TaskError",
-        "Result",
-        "Result",
-    ]
-    assert told == [(1, 3), (2, 3), (3, 3)]
-    assert outcomes[1].t_end == pytest.approx(
-        brachis.plan("scara3", **LINE).t_end, rel=1e-9
-    )
-    assert outcomes[2].bottleneck().sensitivities.limits
+    assert isinstance(failure, TaskError)
+    assert counts == [(1, 3), (2, 3), (3, 3)]
+    assert first.t_end == pytest.approx(result.t_end, rel=1e-9)
+    assert second.bottleneck().sensitivities.limits
 
 
 def test_a_line_tells_of_many_plans(capsys):
@@ -234,27 +219,14 @@ def test_a_line_tells_of_many_plans(capsys):
 
 
 def test_every_key_of_a_task_is_a_keyword():
-    sections = {
-        "robot": RobotSettings,
-        "boundary": BoundarySettings,
-        "spline": SplineSettings,
-        "search": SearchSettings,
-    }
-    keys = {key for model in (Task, *sections.values()) for key in model.model_fields}
-    left = {
-        "brachis",
-        "urdf",
-        "limits_file",
-        "tolerance",
-        "shortest_interval",
-        "guesses",
-        "jobs",
-    }
-    assert keys - set(TaskKeywords.__annotations__) == left, "in whole sections alone"
-    assert set(TaskKeywords.__annotations__) <= keys
-    assert set(LimitKeywords.__annotations__) == {
-        each.name for each in fields(LimitSpec)
-    }
+    models = (Task, RobotSettings, BoundarySettings, SplineSettings, SearchSettings)
+    keys = {key for model in models for key in model.model_fields}
+    keywords = set(TaskKeywords.__annotations__)
+    in_sections = "brachis urdf limits_file tolerance shortest_interval guesses jobs"
+    assert keys - keywords == set(in_sections.split()), "in whole sections alone"
+    assert keywords <= keys
+    limits = {field.name for field in fields(LimitSpec)}
+    assert set(LimitKeywords.__annotations__) == limits
 
 
 def test_a_misspelt_robot_is_told_from_a_missing_file():
@@ -373,11 +345,6 @@ ANSWERS = {
 }
 
 
-@pytest.fixture(scope="module")
-def result():
-    return brachis.plan("scara3", **LINE)
-
-
 @pytest.mark.parametrize("snippet", ANSWERS)
 def test_what_strangers_type_is_answered_with_the_right_name(snippet, result):
     kind, answer = ANSWERS[snippet]
@@ -388,29 +355,19 @@ def test_what_strangers_type_is_answered_with_the_right_name(snippet, result):
 
 def test_what_is_there_is_not_hidden_by_answers(result):
     assert not hasattr(result, "_repr_png_")
-    assert pickle.loads(pickle.dumps(result.trajectory.task)) == result.trajectory.task  # noqa: S301
+    task = result.trajectory.task
+    assert pickle.loads(pickle.dumps(task)) == task  # noqa: S301
     assert copy.deepcopy(result.task).path == result.task.path
-    assert (
-        brachis.Robot.from_urdf(
-            result.trajectory.robot.source, limits={"torque": 12}
-        ).limits.torque[0]
-        == 12
-    )
+    source = result.trajectory.robot.source
+    robot = brachis.Robot.from_urdf(source, limits={"torque": 12})
+    assert robot.limits.torque[0] == 12
     with pytest.raises(AttributeError, match=r"no attribute 'xylophone'$"):
         _ = result.xylophone
 
 
 def test_a_solvers_name_keeps_the_solvers_other_settings():
-    file = {**LINE, "solver": {"tolerance": 1e-7}}
-    assert task_with(task_with(**file), solver="uno_interior").solver.model_dump(
-        exclude_defaults=True
-    ) == {
-        "name": "uno_interior",
-        "tolerance": 1e-7,
-    }
-    assert (
-        brachis.load_task(
-            {**task_with(**LINE).to_dict(), "solver": "uno_interior"}
-        ).solver.name
-        == "uno_interior"
-    )
+    task = task_with(**LINE, solver={"tolerance": 1e-7})
+    solver = task_with(task, solver="uno_interior").solver
+    assert (solver.name, solver.tolerance) == ("uno_interior", 1e-7)
+    content = {**task_with(**LINE).to_dict(), "solver": "uno_interior"}
+    assert brachis.load_task(content).solver.name == "uno_interior"

@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import brachis
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
-from support.mujoco_models import mujoco_model
+from support.mujoco_models import follow, mujoco_model
 
 mujoco = pytest.importorskip("mujoco")
 
-ROOT = Path(__file__).parents[1]
-TX90L = {
-    "brachis": 1,
-    "start": {"joints": [0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1]},
-    "task_space": "pose",
-    "path": [{"line": {"by": [0, 0.8, 0]}}],
-    "redundant_joints": ["rail"],
-    "spline": {"intervals": 20},
-}
-TASKS = {"scara3": ROOT / "examples/01_scara_line.yaml", "tx90l_rail": TX90L}
-BANDWIDTH = 50.0
-"""Of the feedback, rad/s: slow beside motions that last half a second, so that feedforward does the work."""
+TASKS = (brachis.examples.scara_line, brachis.examples.tx90l_rail_line)
 
 
-@pytest.fixture(scope="module", params=sorted(TASKS))
+@pytest.fixture(scope="module", params=TASKS, ids=lambda path: path.stem)
 def motion(request):
     """A planned trajectory and MuJoCo's own model of its robot."""
-    urdf = ROOT / f"robots/{request.param}/robot.urdf"
-    trajectory = brachis.plan(urdf, TASKS[request.param], **QUICK).trajectory
+    trajectory = brachis.plan(request.param, intervals=20, **QUICK).trajectory
     assert verify_trajectory(trajectory).passed
     return trajectory, *mujoco_model(trajectory.robot)
 
@@ -61,27 +46,11 @@ def test_inverse_dynamics_agree(motion):
 
 
 def test_the_planned_torque_follows_the_path(motion):
-    """Feedforward of the planned torque and a weak feedback, in small steps of MuJoCo's own integrator."""
     trajectory, model, order = motion
-    model.opt.timestep = 2e-4
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    data = mujoco.MjData(model)
-    data.qpos[order] = trajectory.q[0]
-    inertia = np.diag(
-        pin.crba(
-            trajectory.robot.model, trajectory.robot.model.createData(), trajectory.q[0]
-        )
-    )
-    stiffness, damping = BANDWIDTH**2 * inertia, 2.0 * BANDWIDTH * inertia
-    tool = model.body(trajectory.robot.tool_frame).id
-    worst, t = 0.0, np.arange(0.0, trajectory.t_end, model.opt.timestep)
-    planned = (trajectory.position(t), trajectory.velocity(t), trajectory.torque(t))
-    positions, _ = trajectory.robot.tool_placements(planned[0])
-    for q, v, tau, position in zip(*planned, positions, strict=True):
-        error, rate = q - data.qpos[order], v - data.qvel[order]
-        mujoco.mj_kinematics(model, data)
-        worst = max(worst, float(np.linalg.norm(data.xpos[tool] - position)))
-        data.qfrc_applied[order] = tau + stiffness * error + damping * rate
-        mujoco.mj_step(model, data)
-    print(f"largest distance from the path {worst:.2e} m")  # noqa: T201
-    assert worst < 1e-4
+    robot = trajectory.robot
+    tool = model.body(robot.tool_frame).id
+    t = np.arange(0.0, trajectory.t_end, 2e-4)
+    positions, _ = robot.tool_placements(trajectory.position(t))
+    states = follow(trajectory, model, order, t)
+    places = np.array([data.xpos[tool].copy() for data, _ in states])
+    assert np.linalg.norm(places - positions, axis=1).max() < 1e-4

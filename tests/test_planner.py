@@ -16,17 +16,15 @@ from support.scara import START, scara
 from support.starts import starting_points
 
 
-def task(**changes) -> dict:
-    base = {
-        "brachis": 1,
-        "start": {"joints": START},
+def plan(robot=None, **changes) -> brachis.Result:
+    line = {
+        "start": START,
         "task_space": ["x", "y"],
-        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+        "path": brachis.Line(length=1.0, angle_deg=90),
         "redundant_joints": ["j3"],
-        "spline": {"intervals": 20},
-        "search": QUICK,
+        "intervals": 20,
     }
-    return {**base, **changes}
+    return brachis.plan(robot or scara(), **{**line, **QUICK, **changes})
 
 
 def solve_with_uno(program, x):
@@ -34,13 +32,13 @@ def solve_with_uno(program, x):
 
 
 def test_task_of_the_result_repeats_the_plan():
-    result = brachis.plan(scara({"torque": 12.0}), task())
+    result = plan(scara({"torque": 12.0}))
     assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
 
 
 def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_refined_one_does_not():
     program, _ = brachis.transcribe(
-        scara(), brachis.load_task(task(redundant_joints=["j1"]))
+        brachis.examples.scara_line, redundant_joints=["j1"]
     )
     first = solve_with_uno(program, next(starting_points(program)))
     (phase,) = program.phases
@@ -53,9 +51,7 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
 
 
 def test_without_refinement_the_answer_is_left_as_it_is():
-    result = brachis.plan(
-        scara(), task(redundant_joints=["j1"], refinement={"max_rounds": 0})
-    )
+    result = plan(redundant_joints=["j1"], refinement={"max_rounds": 0})
     assert not result.verified
     assert result.verification.worst_ratio > 1.01
     assert result.candidate.time_scaled == 1.0
@@ -65,65 +61,52 @@ def test_without_refinement_the_answer_is_left_as_it_is():
 @pytest.mark.parametrize("name", ["auto", "uno_interior"])
 def test_without_ipopt_plans_are_made_by_what_uno_brings(name, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipyopt", None)
-    spec = task(spline={"intervals": 8}, solver={"name": name})
-    assert brachis.plan(scara(), spec).verified
+    assert plan(intervals=8, solver=name).verified
 
 
 def test_a_solver_that_is_not_installed_is_an_error_that_names_the_others(monkeypatch):
     monkeypatch.setitem(sys.modules, "ipyopt", None)
     others = r"Linux on x86_64.*auto, uno or uno_interior, or .*\.\[ipopt\]"
     with pytest.raises(NotInstalledError, match=f"solver.name: ipopt.*{others}"):
-        brachis.plan(scara(), task(solver={"name": "ipopt"}))
+        plan(solver={"name": "ipopt"})
 
 
 def test_path_start_has_to_be_that_of_the_posture():
-    assert brachis.plan(scara(), task(path_start=[np.sqrt(3.0), 0.0])).verified
+    assert plan(path_start=[np.sqrt(3.0), 0.0]).verified
     with pytest.raises(
         StartError, match=r"the start posture is off the path; found 0.01 m off in y"
     ):
-        brachis.plan(scara(), task(path_start=[np.sqrt(3.0), 0.01]))
+        plan(path_start=[np.sqrt(3.0), 0.01])
     with pytest.raises(
         brachis.InputError, match="path_start: this is the wrong number of coordinates"
     ):
-        brachis.plan(scara(), task(path_start=[1.0, 0.0, 0.0]))
+        plan(path_start=[1.0, 0.0, 0.0])
 
 
 def test_end_posture_on_another_branch_is_an_error():
-    free = brachis.plan(scara(), task())
+    free = plan()
     end = free.trajectory.position(free.t_end)
-    assert brachis.plan(scara(), task(end={"joints": end})).verified
+    assert plan(end=end).verified
     # The mirror image of the first two links about the line to the third joint reaches the same point.
-    elbow = np.array([np.cos(end[0]), np.sin(end[0])])
-    wrist = elbow + np.array([np.cos(end[0] + end[1]), np.sin(end[0] + end[1])])
+    turns = np.cumsum(end[:2])
+    wrist = np.array([np.cos(turns).sum(), np.sin(turns).sum()])
     bearing = np.arctan2(wrist[1], wrist[0])
-    mirrored = np.array(
-        [2 * bearing - end[0], -end[1], end[2] + 2 * (end[0] + end[1] - bearing)]
-    )
+    mirrored = [2 * bearing - end[0], -end[1], end[2] + 2 * (turns[1] - bearing)]
     with pytest.raises(StartError, match="the end posture is on another branch"):
-        brachis.plan(scara(), task(end={"joints": mirrored}))
+        plan(end=mirrored)
 
 
 @pytest.mark.parametrize("size", [0.01, 0.004])
-def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
+def test_a_blend_of_millimetres_is_not_stepped_over(size):
     """The torque peak inside a blend lies between the points of any even grid."""
-    corner = [
-        {"line": {"by": [-0.3, 0.3]}, "blend": size},
-        {"line": {"by": [-0.3, -0.2]}},
-    ]
-    task = {
-        "brachis": 1,
-        "start": {"joints": [0.3, 0.8, -0.9]},
-        "task_space": ["x", "y"],
-        "path": corner,
+    line = {
+        "path": brachis.Line(by=[-0.3, 0.3], blend=size)
+        + brachis.Line(by=[-0.3, -0.2]),
+        "start": [0.3, 0.8, -0.9],
         "redundant_joints": ["j1"],
-        "spline": {"intervals": 20},
-        "search": QUICK,
     }
-    result = brachis.plan(scara_urdf, task)
+    result = plan(brachis.robots.scara3, **line)
     assert result.verified
-    breaks = (
-        brachis.transcribe(result.trajectory.robot, result.task)[0]
-        .phases[0]
-        .joint_map.path.breaks
-    )
+    program, _ = brachis.transcribe(result.trajectory.robot, result.task)
+    breaks = program.phases[0].joint_map.path.breaks
     assert np.diff(breaks).min() < size / 0.3

@@ -9,17 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from support.scripts import load_script
+
 ROOT = Path(__file__).parents[1]
 
 
-def load(path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-platforms = load(ROOT / "platforms.py")
+platforms = load_script("platforms.py")
 
 
 def test_ipopt_is_needed_by_an_extra_alone():

@@ -10,6 +10,7 @@ import pytest
 
 import brachis
 
+LINE = brachis.examples.scara_line
 QUICK = {"redundant_joints": ["j1"], "intervals": 8, "effort": "single"}
 SCRIPT = """
 import brachis
@@ -19,23 +20,19 @@ print([outcome.verified for outcome in outcomes])
 
 
 def test_nothing_is_said_unless_asked_for(capfd):
-    brachis.plan(brachis.examples.scara_line, **QUICK)
+    brachis.plan(LINE, **QUICK)
     assert capfd.readouterr() == ("", "")
 
 
 def test_the_log_has_stages_at_info_and_iterations_at_debug(caplog):
     with caplog.at_level(logging.DEBUG, logger="brachis"):
-        result = brachis.plan(brachis.examples.scara_line, **QUICK)
-    stages = [
-        record.message for record in caplog.records if record.levelno == logging.INFO
-    ]
-    details = [
-        record.message for record in caplog.records if record.levelno == logging.DEBUG
-    ]
-    assert (
-        stages[0]
-        == "planning for 3 joints along a path of 1 segment, task space [x, y]"
+        result = brachis.plan(LINE, **QUICK)
+    stages, details = (
+        [record.message for record in caplog.records if record.levelno == level]
+        for level in (logging.INFO, logging.DEBUG)
     )
+    first = "planning for 3 joints along a path of 1 segment, task space [x, y]"
+    assert stages[0] == first
     assert stages[-1].startswith(f"planned: t_E = {result.t_end:.4f} s, verified")
     assert details
     assert all("iteration" in text for text in details)

@@ -2,63 +2,59 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[1]
 ACCELERATION = 200.0 / 25.0
 """Of the gantry's bridge and tool, m/s^2."""
 DWELL = 0.5
 
 
-def right(way, **keys):
-    return {"line": {"by": [way, 0.0]}, **keys}
+def right(distance, **keys):
+    return brachis.Line(by=[distance, 0.0], **keys)
 
 
-def task(path, **keys):
-    return {
-        "brachis": 1,
-        "robot": {
-            "urdf": str(ROOT / "robots/gantry2/robot.urdf"),
-            "limits": {"velocity": None},
-        },
-        "start": {"joints": [-0.6, 0.0]},
-        "task_space": ["x", "y"],
-        "path": path,
-        "spline": {"intervals": 20, "rest": "velocity"},
-        "search": QUICK,
+def up(distance, **keys):
+    return brachis.Line(by=[0.0, distance], **keys)
+
+
+def plan(path, **keys):
+    return brachis.plan(
+        "gantry2",
+        limits={"velocity": None},
+        start=[-0.6, 0.0],
+        task_space=["x", "y"],
+        path=path,
+        intervals=20,
+        rest="velocity",
+        **QUICK,
         **keys,
-    }
+    )
 
 
-def from_rest(way: float) -> float:
+def from_rest(distance: float) -> float:
     """Least time from rest to rest over a way in x, by full force either way."""
-    return float(2.0 * np.sqrt(way / ACCELERATION))
+    return float(2.0 * np.sqrt(distance / ACCELERATION))
 
 
 def test_legs_between_stops_take_the_least_time():
-    path = [right(0.5, stop=True), right(0.2, dwell=DWELL), right(0.5)]
-    result = brachis.plan(task(path))
+    result = plan(right(0.5, stop=True) + right(0.2, dwell=DWELL) + right(0.5))
     assert result.verified
     ways = [from_rest(0.5), from_rest(0.2), DWELL, from_rest(0.5)]
-    np.testing.assert_allclose(
-        np.diff(result.trajectory.phase_ends, prepend=0.0), ways, rtol=2e-3
-    )
+    assert_allclose(np.diff(result.trajectory.phase_ends, prepend=0.0), ways, rtol=2e-3)
     states = result.trajectory.at(result.trajectory.phase_ends)
-    np.testing.assert_allclose(states.s, [5 / 12, 7 / 12, 7 / 12, 1.0], atol=1e-12)
+    assert_allclose(states.s, [5 / 12, 7 / 12, 7 / 12, 1.0], atol=1e-12)
     assert np.abs(states.qdot).max() < 1e-9
-    at_once = brachis.plan(task([right(1.2)]))
+    at_once = plan(right(1.2))
     assert at_once.t_end < 0.7 * (result.t_end - DWELL)
 
 
 def test_the_tool_passes_a_corner_exactly():
-    up = {"line": {"by": [0.0, 0.3]}}
-    result = brachis.plan(task([right(0.5, stop=True), up]))
+    result = plan(right(0.5, stop=True) + up(0.3))
     assert result.verified
     trajectory = result.trajectory
     t = np.linspace(0.0, trajectory.t_end, 4001)
@@ -70,27 +66,24 @@ def test_the_tool_passes_a_corner_exactly():
 
 def test_a_periodic_motion_may_stop():
     """It starts in motion: half of the side before the first stop is left for the end."""
-    up = {"line": {"by": [0.0, 0.2]}, "stop": True}
-    down = {"line": {"by": [0.0, -0.2]}, "stop": True}
-    path = [right(0.2, stop=True), up, right(-0.4, stop=True), down, right(0.2)]
-    result = brachis.plan(task(path, boundary={"periodic": True}))
+    there = right(0.2, stop=True) + up(0.2, stop=True)
+    back = right(-0.4, stop=True) + up(-0.2, stop=True)
+    result = plan(there + back + right(0.2), periodic=True)
     assert result.verified
     first, *_, last = np.diff(result.trajectory.phase_ends, prepend=0.0)
     assert first + last == pytest.approx(from_rest(0.4), rel=2e-3)
 
 
 def test_a_tool_turns_on_the_spot_between_lines():
-    given = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     line = {"line": {"by": [0.0, 0.4, 0.0]}}
     turn = {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 60}}, "dwell": 0.2}
     path = [{**line, "stop": True}, turn, line]
-    result = brachis.plan({**given, "path": path, "search": QUICK})
+    result = brachis.plan(brachis.examples.tx90l_rail_line, path=path, **QUICK)
     assert result.verified
     before, turned, waited, _ = result.trajectory.phase_ends
     assert waited - turned == pytest.approx(0.2, abs=1e-12)
-    positions, rotations = result.trajectory.robot.tool_placements(
-        result.trajectory.at(np.array([before, turned])).q
-    )
+    q = result.trajectory.position([before, turned])
+    positions, rotations = result.trajectory.robot.tool_placements(q)
     np.testing.assert_allclose(positions[0], positions[1], atol=1e-9)
     cosine = 0.5 * (np.trace(rotations[0].T @ rotations[1]) - 1.0)
     assert np.degrees(np.arccos(cosine)) == pytest.approx(60.0, abs=1e-6)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.ik import default_task_space, find_all
 from brachis.path import build_path
 from brachis.robot import Robot, bind, task_map_of
-from brachis.task import load_task
+from brachis.task import task_with
 from support.chains import Joint, chain_urdf
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -76,18 +77,16 @@ def test_position_and_yaw_follow_the_line(word, start, by, tmp_path):
     s, placements = tool_along(brachis.Trajectory.load(file))
     first = placements[0]
     moved = [placed.translation - first.translation for placed in placements]
-    np.testing.assert_allclose(moved, np.outer(s, by[:3]), atol=1e-8)
+    assert_allclose(moved, np.outer(s, by[:3]), atol=1e-8)
     turned = [pin.log3(placed.rotation @ first.rotation.T) for placed in placements]
-    np.testing.assert_allclose(turned, np.outer(s, [0.0, 0.0, by[3]]), atol=1e-8)
+    assert_allclose(turned, np.outer(s, [0.0, 0.0, by[3]]), atol=1e-8)
 
 
 LIMITS = {"torque": None, "velocity": 20.0}
 BANG_BANG = [
     # The joint that takes longest from rest to rest decides: t = 2 sqrt(d / a).
     (GANTRY, [0.0, 0.0, 0.1, 0.2], [0.5, 0.4, 0.1, 1.0], [3.0, 2.0, 4.0, 10.0]),
-    (GANTRY, [0.0, 0.0, 0.1, 0.2], [0.1, 0.1, 0.1, 2.0], [3.0, 2.0, 4.0, 10.0]),
     (SCARA, [0.3, 1.2, 0.1, 0.2], [0.0, 0.0, 0.3, 0.5], [20.0, 20.0, 5.0, 40.0]),
-    (SCARA, [0.3, 1.2, 0.1, 0.2], [0.0, 0.0, 0.02, 1.5], [20.0, 20.0, 5.0, 40.0]),
 ]
 
 
@@ -145,13 +144,13 @@ def test_closed_forms(word, rows, family):
     ],
 )
 def test_charts_serve_rows_without_a_closed_form(word, rows, start, by):
-    result = plan(chain(word), start, rows, [{"line": {"by": by}}])
+    result = plan(chain(word), start, rows, brachis.Line(by=by))
     assert result.verified
     s, placements = tool_along(result.trajectory)
     space = task_map_of(chain(word), rows)
+    positions = np.array([tool.translation for tool in placements])
     values = space.of_placements(
-        np.array([placed.translation for placed in placements]),
-        np.array([placed.rotation for placed in placements]),
+        positions, np.array([tool.rotation for tool in placements])
     )
     missed = space.difference(values, values[0] + np.outer(s, by))
     assert np.abs(missed).max() < 1e-8
@@ -162,34 +161,28 @@ ABOUT_Y = {"rotate": {"axis": [0, 1, 0], "angle_deg": 20}}
 
 
 @pytest.mark.parametrize(
-    ("robot", "start", "space", "segment", "by"),
+    ("space", "segment", "by"),
     [
-        ("iiwa14", IIWA, "axis", {"turn": ABOUT_Y}, []),
+        ("axis", {"turn": ABOUT_Y}, []),
         (
-            "iiwa14",
-            IIWA,
             ["y", "x", "axis"],
             {"line": {"by": [0.1, 0.05]}, "orientation": ABOUT_Y},
             [0.1, 0.05],
         ),
     ],
+    ids=["axis", "y, x, axis"],
 )
-def test_the_axis_of_the_tool_and_rows_of_its_position(
-    robot, start, space, segment, by
-):
-    robot = getattr(brachis.robots, robot)
-    result = plan(robot, start, space, [segment])
+def test_the_axis_of_the_tool_and_rows_of_its_position(space, segment, by):
+    robot = brachis.robots.iiwa14
+    result = plan(robot, IIWA, space, [segment])
     assert result.verified
-    trajectory = result.trajectory
-    sample = trajectory.sample(trajectory.t_end / 100)
-    placements = [robot.tool_placement(q) for q in sample.q[:, : robot.n]]
-    axes = np.array([placed.rotation[:, 2] for placed in placements])
+    sample = result.sample(result.t_end / 100)
+    positions, rotations = robot.tool_placements(sample.q[:, : robot.n])
+    axes = rotations[:, :, 2]
     about = [pin.exp3(s * np.deg2rad([0.0, 20.0, 0.0])) for s in sample.s]
-    np.testing.assert_allclose(axes, np.array(about) @ axes[0], atol=1e-8)
-    if by:
-        moved = np.array([placed.translation for placed in placements])
-        expected = np.outer(sample.s, by)
-        np.testing.assert_allclose((moved - moved[0])[:, [1, 0]], expected, atol=1e-8)
+    assert_allclose(axes, np.array(about) @ axes[0], atol=1e-8)
+    moved = (positions - positions[0])[:, [1, 0]]
+    assert not by or np.abs(moved - np.outer(sample.s, by or [0, 0])).max() < 1e-8
 
 
 @pytest.mark.parametrize("rows", [["axis"], ["z", "axis"], ["y", "x", "axis"]], ids=str)
@@ -206,7 +199,7 @@ def test_rows_with_the_axis_against_differences(rows):
     velocity = task_map.difference(task_map.values(at(h)), task_map.values(at(-h)))
     jacobian = task_map.jacobian(task_map.twists(q))
     rate = np.einsum("kmn,kn->km", jacobian, qdot)
-    np.testing.assert_allclose(rate, velocity / (2.0 * h), atol=1e-7)
+    assert_allclose(rate, velocity / (2.0 * h), atol=1e-7)
     slopes = task_map.derivatives(task_map.twists(q), qdot, qddot).velocity_q
 
     def rate_at(t):
@@ -217,31 +210,22 @@ def test_rows_with_the_axis_against_differences(rows):
 
     changed = (rate_at(h) - rate_at(-h)) / (2.0 * h)
     bias = np.einsum("kmn,kn->km", slopes, qdot)
-    np.testing.assert_allclose(bias, changed, atol=1e-6)
+    assert_allclose(bias, changed, atol=1e-6)
 
 
 def test_samples_of_a_path_with_the_axis_against_differences():
-    _, task_map = bind(brachis.robots.iiwa14, ["x", "y", "axis"])
+    rows = ["x", "y", "axis"]
+    _, task_map = bind(brachis.robots.iiwa14, rows)
     turning = {"rotate": {"axis": [1, 2, 0.5], "angle_deg": 80, "profile": "smooth"}}
-    task = load_task(
-        {
-            "brachis": 1,
-            "robot": {"urdf": "iiwa14"},
-            "start": {"joints": IIWA},
-            "task_space": ["x", "y", "axis"],
-            "path": [{"line": {"by": [0.1, 0.2]}, "orientation": turning}],
-        }
-    )
-    start = task_map.value(np.append(IIWA, 0.0))
-    path = build_path(task.path, start, task_map.rows)
-    s = np.linspace(0.1, 0.9, 7)
-    h = 1e-5
+    line = brachis.Line(by=[0.1, 0.2], orientation=turning)
+    segments = task_with(start=IIWA, task_space=rows, path=line).path
+    path = build_path(segments, task_map.value(np.append(IIWA, 0.0)), task_map.rows)
+    s, h = np.linspace(0.1, 0.9, 7), 1e-5
     before, here, after = (path.sample(s + step) for step in (-h, 0.0, h))
     velocity = task_map.difference(after.target, before.target) / (2.0 * h)
-    np.testing.assert_allclose(here.xi, velocity, atol=1e-7)
-    np.testing.assert_allclose(here.xi_ds, (after.xi - before.xi) / (2 * h), atol=1e-7)
-    bend = (after.xi_ds - before.xi_ds) / (2 * h)
-    np.testing.assert_allclose(here.xi_dds, bend, atol=1e-6)
+    assert_allclose(here.xi, velocity, atol=1e-7)
+    assert_allclose(here.xi_ds, (after.xi - before.xi) / (2 * h), atol=1e-7)
+    assert_allclose(here.xi_dds, (after.xi_ds - before.xi_ds) / (2 * h), atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -285,16 +269,10 @@ def test_rows_that_are_errors(word, space, path, texts):
 
 
 def test_rows_with_the_axis_have_one_name():
-    def space(rows):
-        """Load the task space."""
-        content = {
-            "brachis": 1,
-            "robot": {"urdf": "iiwa14"},
-            "start": {"joints": IIWA},
-            "task_space": rows,
-            "path": TURN,
-        }
-        return load_task(content).task_space
-
-    assert space("axis") == space(["axis"]) == ("axis",)
-    assert space(["x", "y", "z", "axis"]) == "pose_free_roll"
+    for rows, name in (
+        ("axis", ("axis",)),
+        (["axis"], ("axis",)),
+        (["x", "y", "z", "axis"], "pose_free_roll"),
+    ):
+        task = task_with(start=IIWA, task_space=rows, path=TURN)
+        assert task.task_space == name

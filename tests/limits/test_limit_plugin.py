@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,8 +18,8 @@ import pytest
 import brachis
 from brachis.errors import InputError, UnknownNameError
 from brachis.limits import Bound, Label, Limit, Partials
-from brachis.task import task_with
 from brachis.verify import verify_trajectory
+from support.checks import check_of
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
@@ -68,24 +69,21 @@ def test_it_is_one_short_file():
 
 
 def test_an_object_limits_the_motion(plugin, tmp_path):
-    task = task_with(ROOT / "examples/01_scara_line.yaml", **QUICK)
-    free = brachis.plan(task)
+    free = brachis.plan(LINE, **QUICK)
     assert sums(free.trajectory).max() > UPPER + 0.2, "the limit should bind"
     model = plugin.CoupledRange(("j2", "j3"), -0.5, UPPER)
-    result = brachis.plan(task, own_limits=[model])
+    result = brachis.plan(LINE, own_limits=[model], **QUICK)
     assert result.verified
     assert sums(result.trajectory).max() == pytest.approx(UPPER, abs=1e-4)
     assert result.t_end > free.t_end
-    check = {each.name: each for each in result.verification.checks}[
-        "coupled range ratio"
-    ]
+    check = check_of(result.verification, "coupled range ratio")
     assert check.remark == "checked by its own formula"
     assert check.in_words().endswith(check.remark)
     assert (check.subject, check.value) == ("j2 + j3", pytest.approx(1.0, abs=1e-4))
     report = brachis.bottleneck.report(result, check=True)
     entry = report.sensitivities.of("j2 + j3", "range", "upper")
     assert entry.change(0.1) < -1e-3
-    (checked,) = [each for each in report.check.entries if each.sensitivity == entry]
+    (checked,) = [row for row in report.check.entries if row.sensitivity == entry]
     assert checked.deviation < 0.05
     result.trajectory.save(tmp_path / "limited.npz")
     saved = brachis.Trajectory.load(tmp_path / "limited.npz")
@@ -102,15 +100,9 @@ def test_a_task_file_names_it():
     result = brachis.plan(TASK, **QUICK)
     assert result.verified
     assert sums(result.trajectory).max() <= UPPER + 1e-4
-    assert "coupled range ratio" in [
-        check.name for check in verify_trajectory(result.trajectory).checks
-    ]
-    assert (
-        json.loads(json.dumps(result.task.to_dict()))["custom_limits"]["coupled_range"][
-            "upper"
-        ]
-        == UPPER
-    )
+    assert check_of(verify_trajectory(result.trajectory), "coupled range ratio")
+    content = json.loads(json.dumps(result.task.to_dict()))
+    assert content["custom_limits"]["coupled_range"]["upper"] == UPPER
 
 
 def test_a_check_of_its_own_takes_the_marks_place(plugin):
@@ -124,9 +116,7 @@ def test_a_check_of_its_own_takes_the_marks_place(plugin):
     result = brachis.plan(
         LINE, own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)], **QUICK
     )
-    check = {each.name: each for each in result.verification.checks}[
-        "coupled range ratio"
-    ]
+    check = check_of(result.verification, "coupled range ratio")
     assert check.remark == ""
     assert check.value == pytest.approx(1.0, abs=1e-3)
 
@@ -202,7 +192,6 @@ LINE = ROOT / "examples/01_scara_line.yaml"
     ("parts", "where", "said"),
     [
         ({"labels": ()}, "own_limits[0].lower", "found (1,); allowed: (0,)"),
-        ({"lower": np.ones(2)}, "own_limits[0].lower", "(2,)"),
         (
             {"lower": np.ones(1)},
             "own_limits[0]",
@@ -250,11 +239,6 @@ LINE = ROOT / "examples/01_scara_line.yaml"
             "an array of complex128",
         ),
         (
-            {"values": lambda motion: motion.qdot[:, 2:].astype(str)},
-            "own_limits[0].values",
-            "an array of <U",
-        ),
-        (
             {"labels": (), "lower": np.empty(0), "upper": np.empty(0)},
             "own_limits[0].labels",
             "no values",
@@ -272,15 +256,11 @@ def test_a_limit_whose_parts_do_not_fit_is_an_error(parts, where, said):
     ("name", "wrong", "allowed"),
     [
         ("kind", None, "a name"),
-        ("kind", "", "a name"),
-        ("kind", 3, "a name"),
         ("kind", "torque", "a kind of its own"),
         ("order", 4, "2, or 3"),
-        ("order", "3", "2, or 3"),
         ("guarantee", "mean", "Guarantee.AS_MEAN"),
         ("role", "robot", "Role.PROCESS"),
         ("breaks", 0.5, "from 0 to 1"),
-        ("breaks", (np.nan,), "from 0 to 1"),
         ("breaks", (0.2, 1.5), "from 0 to 1"),
         ("longer_time", "relieve", "'neither'"),
         ("at_rest", "postures", "'posture'"),
@@ -288,7 +268,6 @@ def test_a_limit_whose_parts_do_not_fit_is_an_error(parts, where, said):
         ("bounds", (1,), "Bound"),
         ("bounds", (Bound(1, 1.0, 1.0, 1.0),), "0 to c - 1"),
         ("violation_scale", 0.0, "> 0"),
-        ("violation_scale", np.ones(3), "> 0"),
         ("inset", -1.0, ">= 0"),
         ("lower", [-1.0], "a numpy array"),
         ("labels", (Label("j3", "rate", None),), "of texts"),
@@ -344,51 +323,47 @@ class Failing(Given):
     """A plug-in of which one part fails."""
 
     def __init__(self, part):
-        if part == "__init__":
-            raise RuntimeError("no licence")
         self.part = part
+        self.fail_in("__init__")
         super().__init__()
 
+    def fail_in(self, part):
+        if self.part == part:
+            raise RuntimeError("no licence")
+
     def bind(self, robot):
-        if self.part == "bind":
-            raise ValueError("no licence")
+        self.fail_in("bind")
+        fail_in = self.fail_in
 
         class Own(Rate):
-            part = self.part
-
             def values(self, motion):
-                if self.part == "values":
-                    raise ValueError("no licence")
+                fail_in("values")
                 return super().values(motion)
 
             def partials(self, motion):
-                if self.part == "partials":
-                    raise ValueError("no licence")
+                fail_in("partials")
                 return super().partials(motion)
 
         return Own(robot)
 
     def check(self, robot, q, qdot, qddot, tau):
-        if self.part == "check":
-            raise ValueError("no licence")
+        self.fail_in("check")
         return np.abs(qdot[:, 2:])
+
+
+def install(monkeypatch, plugin):
+    """Let a class be the one plug-in, named `failing`."""
+    entry = SimpleNamespace(name="failing", value="__init__", load=lambda: plugin)
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: [entry])
 
 
 @pytest.mark.parametrize("part", ["__init__", "bind", "values", "partials", "check"])
 def test_a_failing_plugin_is_in_the_message(part, monkeypatch):
-    class Entry:
-        name = "failing"
-        value = "__init__"
-
-        def load(self):
-            return Failing
-
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: [Entry()])
+    install(monkeypatch, Failing)
     with pytest.raises(InputError, match="no licence") as caught:
         brachis.plan(LINE, custom_limits={"failing": {"part": part}})
-    kind = "RuntimeError" if part == "__init__" else "ValueError"
     assert str(caught.value).startswith(
-        f"custom_limits.failing: the plug-in's {part} failed: {kind}: no licence"
+        f"custom_limits.failing: the plug-in's {part} failed: RuntimeError: no licence"
     )
 
 
@@ -399,21 +374,12 @@ def test_a_plugin_that_fails_later_is_in_the_message(monkeypatch):
                 return super().values(motion)
             raise ValueError("no licence")
 
-    class Model:
-        def bind(self, robot):
-            return Late(robot)
-
-    class Entry:
-        name = "late"
-        value = "late:Model"
-
-        def load(self):
-            return Model
-
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: [Entry()])
-    said = r"custom_limits\.late: the plug-in's values failed: ValueError: no licence"
+    install(monkeypatch, lambda: SimpleNamespace(bind=Late))
+    said = (
+        r"custom_limits\.failing: the plug-in's values failed: ValueError: no licence"
+    )
     with pytest.raises(InputError, match=said):
-        brachis.plan(LINE, custom_limits={"late": {}}, **QUICK)
+        brachis.plan(LINE, custom_limits={"failing": {}}, **QUICK)
 
 
 def test_an_exception_in_the_users_own_program_passes():
@@ -454,20 +420,24 @@ def test_what_is_no_list_of_limits_is_an_error(line_result, own_limits, said):
         verify_trajectory(line_result, own_limits=own_limits)
 
 
+TWO_PROCESSES = """
+import brachis
+from brachis_coupled import CoupledRange
+result = brachis.plan(
+    brachis.examples.scara_line,
+    own_limits=[CoupledRange(("j2", "j3"), -0.5, 0.7)],
+    search={"jobs": 2, "least_motion": False},
+    redundant_joints=["j1"],
+    intervals=5,
+)
+print(result.verified, "coupled range ratio" in [check.name for check in result.verification.checks])
+"""
+
+
 def test_two_processes_take_it_as_well():
-    code = (
-        "import brachis, sys; from brachis_coupled import CoupledRange;"
-        "task = brachis.load_task(sys.argv[1]).to_dict();"
-        "search = {'jobs': 2, 'least_motion': False};"
-        "task |= {'search': search, 'redundant_joints': ['j1'], 'spline': {'intervals': 5}};"
-        "result = brachis.plan(task, own_limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
-        "print(result.verified, 'coupled range ratio' in [check.name for check in result.verification.checks])"
-    )
-    search = os.pathsep.join(
-        [str(PLUGIN / "src"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    )
-    environment = {**os.environ, "PYTHONPATH": search}
-    command = [sys.executable, "-c", code, LINE]
+    folders = [str(PLUGIN / "src"), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
+    command = [sys.executable, "-c", TWO_PROCESSES]
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, check=True
     )

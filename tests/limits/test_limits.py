@@ -18,6 +18,7 @@ from brachis.limits import (
 from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
 from brachis.task.tolerances import Margins
+from support.arrays import assert_near
 from support.chains import planar_robot
 from support.phases import FRICTION
 
@@ -102,9 +103,7 @@ def test_partials_equal_differences(limit):
                 if part == "s"
                 else exact[:, :, column]
             )
-            np.testing.assert_allclose(
-                mine, expected, atol=1e-6 * max(1.0, np.abs(expected).max())
-            )
+            assert_near(mine, expected, 1e-6, least=1.0)
 
 
 def test_every_value_has_a_label_and_a_figure(limit):

@@ -66,7 +66,6 @@ def bind(limit):
 @pytest.mark.parametrize(
     ("partials", "where", "joint"),
     [
-        (lambda m: partials_with(m, q=-right_partials(m).q), "q", "j2"),
         (lambda m: partials_with(m, q=1.1 * right_partials(m).q), "q", "j2"),
         (lambda m: partials_with(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
         (lambda m: Partials(qdot=right_partials(m).q), "q", "j2"),
@@ -90,12 +89,11 @@ def test_a_wrong_partial_derivative_is_in_the_message(partials, where, joint):
 
 
 def test_the_numbers_are_those_of_the_joint():
-    with pytest.raises(InputError) as caught:
-        bind(
-            Sum(right_values, lambda m: partials_with(m, qdot=rows(m, -0.5, 0.0, 0.0)))
-        )
-    assert "found -0.5 at q" in str(caught.value)
-    assert "allowed: 0.5, by differences" in str(caught.value)
+    wrong = Sum(right_values, lambda m: partials_with(m, qdot=rows(m, -0.5, 0.0, 0.0)))
+    with pytest.raises(
+        InputError, match=r"found -0.5 at q.*allowed: 0.5, by differences"
+    ):
+        bind(wrong)
 
 
 def test_values_that_use_the_jerk_need_order_3():
@@ -144,10 +142,6 @@ def speed_in_steps(motion):
             ),
         ),
         (
-            lambda m: np.floor(4.0 * m.q[:, :1]) + m.q[:, 1:2],
-            lambda m: Partials(q=rows(m, 0.0, 1.0, 0.0)),
-        ),
-        (
             lambda m: np.tanh(m.qdot[:, :1] / 1e-3) + m.q[:, 1:2],
             lambda m: Partials(
                 q=rows(m, 0.0, 1.0, 0.0),
@@ -168,7 +162,6 @@ def speed_in_steps(motion):
         "float32",
         "large",
         "s step",
-        "steps",
         "steep",
         "noisy",
         "torques, which a motion keeps",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.limits.drives import WIDTH, RoundedCurve
 
@@ -52,7 +53,7 @@ def test_it_lies_below_the_curve_by_little_and_falls_to_zero_at_most(pieces):
     assert np.all(within >= true - WIDTH * 50.0 - eps)
     assert np.all(values >= -eps)
     assert np.all(np.diff(values) <= eps)
-    np.testing.assert_array_equal(values, rounded.values(-speeds))
+    assert_array_equal(values, rounded.values(-speeds))
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_its_slope_equals_differences_inside_corners_and_off_them(curve):
     ).ravel()
     speeds = np.concatenate([corners, -corners, np.linspace(-4.0, 4.0, 23)])
     differences = (rounded.values(speeds + h) - rounded.values(speeds - h)) / (2.0 * h)
-    np.testing.assert_allclose(
+    assert_allclose(
         rounded.slopes(speeds), differences, atol=1e-6 * np.abs(rounded.bends).max()
     )
 
@@ -79,5 +80,5 @@ def test_its_slope_equals_differences_inside_corners_and_off_them(curve):
 def test_a_level_beginning_is_left_to_the_plain_limit():
     rounded = RoundedCurve.below(((0.0, 50.0), (1.0, 50.0), (2.0, 10.0)))
     assert rounded.stall_torque == pytest.approx(90.0)
-    np.testing.assert_allclose(rounded.values(np.array([1.0, 1.5])), [50.0, 30.0])
+    assert_allclose(rounded.values(np.array([1.0, 1.5])), [50.0, 30.0])
     assert RoundedCurve.below(((0.0, 50.0), (1.0, 50.0))) is None

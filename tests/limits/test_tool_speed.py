@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -11,50 +10,36 @@ import pytest
 
 import brachis
 from brachis.limits.tool import SpeedProfile
+from brachis.task import task_with
 from brachis.verify import verify_trajectory
+from support.checks import check_of, failed_checks
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[2]
 CAP = 1.0
 
 
 @pytest.fixture(scope="module")
-def task():
-    found = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    return {**found, "tool_limits": {"speed": CAP}, "search": QUICK}
-
-
-@pytest.fixture(scope="module")
-def result(task):
-    return brachis.plan(task)
+def result():
+    line = brachis.examples.tx90l_rail_line
+    return brachis.plan(line, tool_limits={"speed": CAP}, **QUICK)
 
 
 def test_verification_finds_a_tool_that_is_too_fast_by_pinocchios_own_velocity(result):
-    check = {each.name: each for each in result.verification.checks}["tool speed ratio"]
+    check = check_of(result.verification, "tool speed ratio")
     assert (check.subject, check.unit, check.remark) == ("tool", "-", "")
     assert check.value == pytest.approx(1.0, abs=1e-4)
-    tighter = result.task.model_copy(
-        update={"tool_limits": brachis.task.ToolLimits(speed=CAP / 1.001)}
-    )
-    verification = verify_trajectory(
-        dataclasses.replace(result.trajectory, task=tighter)
-    )
-    failed = [each for each in verification.checks if not each.passed]
-    assert [each.name for each in failed] == ["tool speed ratio"]
-    assert failed[0].value == pytest.approx(1.001, abs=1e-4)
-    model, data = (
-        result.trajectory.robot.model,
-        result.trajectory.robot.model.createData(),
-    )
-    state = result.trajectory.at(np.array([failed[0].time]))
-    pin.forwardKinematics(model, data, state.q[0], state.qdot[0])
-    frame = result.trajectory.robot.frame_id
-    velocity = pin.getFrameVelocity(
-        model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    ).linear
-    assert np.linalg.norm(velocity) * 1.001 / CAP == pytest.approx(
-        failed[0].value, rel=1e-9
-    )
+    trajectory = result.trajectory
+    tighter = task_with(result.task, tool_limits={"speed": CAP / 1.001})
+    verification = verify_trajectory(dataclasses.replace(trajectory, task=tighter))
+    assert failed_checks(verification) == ["tool speed ratio"]
+    check = check_of(verification, "tool speed ratio")
+    assert check.value == pytest.approx(1.001, abs=1e-4)
+    robot, state = trajectory.robot, trajectory.at(check.time)
+    data, axes = robot.model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    pin.forwardKinematics(robot.model, data, state.q[0], state.qdot[0])
+    twist = pin.getFrameVelocity(robot.model, data, robot.frame_id, axes)
+    speed = np.linalg.norm(twist.linear)
+    assert speed * 1.001 / CAP == pytest.approx(check.value, rel=1e-9)
 
 
 def speeds(trajectory, count=5_000):
@@ -67,22 +52,17 @@ def speeds(trajectory, count=5_000):
 @pytest.mark.parametrize("rows", [["x", "y"], ["x"]])
 def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
     """With only x prescribed the tool may move along y; the cap is on its speed in space."""
-    task = {
-        "brachis": 1,
-        "robot": {
-            "urdf": str(ROOT / "robots/scara3/robot.urdf"),
-            "tool_frame": "tool",
-            "gravity": [0, 0, 0],
-            "limits": {"torque": 10, "velocity": None},
-        },
-        "start": {"joints": [0.5, -2.0, 2.0]},
-        "task_space": rows,
-        "path": [{"line": {"by": [-0.5, 0.3][: len(rows)]}}],
-        "tool_limits": {"speed": 0.4},
-        "spline": {"intervals": 20},
-        "search": QUICK,
-    }
-    result = brachis.plan(task)
+    result = brachis.plan(
+        "scara3",
+        gravity=[0, 0, 0],
+        limits={"torque": 10, "velocity": None},
+        start=[0.5, -2.0, 2.0],
+        task_space=rows,
+        path=brachis.Line(by=[-0.5, 0.3][: len(rows)]),
+        tool_limits={"speed": 0.4},
+        intervals=20,
+        **QUICK,
+    )
     assert result.verified
     assert speeds(result.trajectory).max() <= 0.4 * (1.0 + 1e-4)
 

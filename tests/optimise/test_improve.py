@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -54,25 +54,27 @@ def solve(program, _x):
     )
 
 
-def solution_of(program) -> SolvedProgram:
-    return SolvedProgram(program, (solve(program, None),))
-
-
 def changes_to(*programs):
     """Changes to programs, one after the other, and the end times that each was proposed from."""
-    seen = []
+    begun_at = []
 
     def change_to(program):
         def change(kept):
-            seen.append(kept.t_end if kept.reports else None)
+            begun_at.append(kept.t_end if kept.reports else None)
             return program, np.array([5.0])
 
         return change
 
-    return [change_to(program) for program in programs], seen
+    return [change_to(program) for program in programs], begun_at
 
 
-FIRST = solution_of(Fake(5.0))
+FIRST = SolvedProgram(Fake(5.0), (solve(Fake(5.0), None),))
+
+
+def run(start, changes, *, early=False, **options):
+    """Improve with the solver of fakes."""
+    attempt = partial(attempt_once, solve, accept_early_end=early)
+    return improve(start, changes, attempt, **options)
 
 
 GAINS = {"least_gain": 0.0, "go_on_above": None}
@@ -97,54 +99,48 @@ KEEPING = {
 @pytest.mark.parametrize("case", KEEPING)
 def test_which_motions_stay(case):
     times, options, t_end, proposed_from = KEEPING[case]
-    changes, seen = changes_to(*map(Fake, times))
-    best = improve(FIRST, changes, partial(attempt_once, solve), **options)
+    changes, begun_at = changes_to(*map(Fake, times))
+    best = run(FIRST, changes, **options)
     assert best.t_end == best.program.t_end == best.reports[-1].objective == t_end
-    assert seen == proposed_from
-    tried = times[: len(seen)]
+    assert begun_at == proposed_from
+    tried = times[: len(begun_at)]
     assert sorted(report.objective for report in best.reports) == sorted([5.0, *tried])
 
 
 def test_a_failure_ends_it():
-    changes, seen = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
-    best = improve(FIRST, changes, partial(attempt_once, solve))
+    changes, begun_at = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
+    best = run(FIRST, changes)
     assert best.t_end == 4.0
-    assert len(seen) == 2
+    assert len(begun_at) == 2
 
 
 def test_without_a_motion_the_next_one_takes_its_place():
-    changes, seen = changes_to(Fake(4.0, usable=False), Fake(3.0), Fake(2.99))
+    changes, begun_at = changes_to(Fake(4.0, usable=False), Fake(3.0), Fake(2.99))
     nothing = SolvedProgram(Fake(np.inf))
-    found = improve(nothing, changes, partial(attempt_once, solve), least_gain=0.1)
-    assert found.t_end == 3.0
-    assert seen == [None, 4.0, 3.0]
+    best = run(nothing, changes, least_gain=0.1)
+    assert best.t_end == 3.0
+    assert begun_at == [None, 4.0, 3.0]
     changes, _ = changes_to(Fake(4.0, usable=False), Fake(3.0, usable=False))
-    assert improve(nothing, changes, partial(attempt_once, solve)).program.t_end == 3.0
+    assert run(nothing, changes).program.t_end == 3.0
 
 
 def test_it_ends_with_the_time_or_with_a_reason():
-    changes, seen = changes_to(Fake(4.0))
-    over = improve(FIRST, changes, partial(attempt_once, solve), deadline=Deadline(0.0))
+    changes, begun_at = changes_to(Fake(4.0))
+    over = run(FIRST, changes, deadline=Deadline(0.0))
     assert over.t_end == 5.0
-    assert not seen
+    assert not begun_at
     reasons = [lambda _kept: "too many", lambda _kept: pytest.fail("it went on")]
-    assert (
-        improve(FIRST, reasons, partial(attempt_once, solve)).not_completed
-        == "too many"
-    )
+    assert run(FIRST, reasons).not_completed == "too many"
     nothing = [lambda _kept: None, lambda _kept: pytest.fail("it went on")]
-    assert improve(FIRST, nothing, partial(attempt_once, solve)).not_completed == ""
+    assert run(FIRST, nothing).not_completed == ""
 
 
-def test_an_early_end_counts_if_it_is_faster_than_its_beginning():
-    early = Fake(4.0, usable=False)
-    changes, _ = changes_to(early)
-    kept = improve(FIRST, changes, partial(attempt_once, solve, accept_early_end=True))
-    assert kept.t_end == 4.0
-    assert kept.report.status is SolveStatus.ACCEPTABLE
-    changes, _ = changes_to(Fake(6.0, usable=False))
-    kept = improve(FIRST, changes, partial(attempt_once, solve, accept_early_end=True))
-    assert kept.t_end == 5.0
+@pytest.mark.parametrize(("t_end", "best"), [(4.0, 4.0), (6.0, 5.0)])
+def test_an_early_end_counts_if_it_is_faster_than_its_beginning(t_end, best):
+    changes, _ = changes_to(Fake(t_end, usable=False))
+    result = run(FIRST, changes, early=True)
+    assert result.t_end == best
+    assert best == 5.0 or result.report.status is SolveStatus.ACCEPTABLE
 
 
 def test_the_end_time_has_the_factor_of_the_answer():
@@ -155,22 +151,12 @@ def test_the_end_time_has_the_factor_of_the_answer():
 
 def test_if_the_time_is_up_a_feasible_start_is_the_answer():
     program = Program([phase_of("r1")])
-    begun = shortest_time(program, next(starting_points(program)))
-    far = program.scale_time(begun, 0.5)
-    late = SolverReport(
-        "uno",
-        SolveStatus.TIME_LIMIT,
-        far,
-        1.0,
-        1.0,
-        np.zeros(len(program.lower)),
-        3,
-        1.0,
-        "",
-    )
-    kept = keep_feasible(SolvedProgram(program, (late,)), begun)
-    assert kept.usable
-    np.testing.assert_array_equal(kept.report.x, begun)
-    assert kept.t_end == program.end_time(begun)
-    none = keep_feasible(SolvedProgram(program, (late,)), far)
-    assert none.report is late
+    start = shortest_time(program, next(starting_points(program)))
+    far = program.scale_time(start, 0.5)
+    late = replace(FIRST.report, status=SolveStatus.TIME_LIMIT, x=far, violation=1.0)
+    unfinished = SolvedProgram(program, (late,))
+    result = keep_feasible(unfinished, start)
+    assert result.usable
+    np.testing.assert_array_equal(result.report.x, start)
+    assert result.t_end == program.end_time(start)
+    assert keep_feasible(unfinished, far).report is late

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 
 from brachis.common.arrays import spread
@@ -17,11 +18,6 @@ from brachis.optimise.bspline import (
 )
 
 LENGTHS = np.array([0.3, 0.05, 0.2, 0.01, 0.14, 0.3])
-
-
-def around(lengths: np.ndarray, degree: int, interval: int) -> np.ndarray:
-    """Lengths of the 2 d - 1 intervals around one; those beyond the ends are zero."""
-    return np.pad(lengths, degree - 1)[interval : interval + 2 * degree - 1]
 
 
 @settings(max_examples=60)
@@ -49,9 +45,8 @@ def test_the_same_curves(degree, old, new, seed):
 
 @pytest.mark.parametrize("degree", range(2, 7))
 def test_basis_derivatives_are_differences(degree):
-    lengths = np.array(
-        [around(LENGTHS, degree, interval) for interval in range(len(LENGTHS))]
-    )
+    padded = np.pad(LENGTHS, degree - 1)
+    lengths = np.lib.stride_tricks.sliding_window_view(padded, 2 * degree - 1)
     fraction = np.linspace(0.05, 1.0, len(LENGTHS))
     exact = basis_derivatives(lengths, fraction)
     assert exact.shape == (4, 2 * degree - 1, len(LENGTHS), degree + 1)
@@ -64,21 +59,17 @@ def test_basis_derivatives_are_differences(degree):
         for order in range(4):
             scale = np.abs(exact[order]).max()
             assert (scale > 0.0) == (order <= degree)
-            np.testing.assert_allclose(
-                exact[order, i], expected[order], atol=1e-4 * scale
-            )
+            assert_allclose(exact[order, i], expected[order], atol=1e-4 * scale)
     # Twice the lengths: the same values, half the slopes, a quarter of the bends (Euler's theorem).
     for order, values in enumerate(basis_functions(lengths, fraction)):
         turned = np.einsum("ikw,ki->kw", exact[order], lengths)
-        np.testing.assert_allclose(
+        assert_allclose(
             turned, -order * values, atol=1e-12 * max(1.0, np.abs(values).max())
         )
 
 
 def test_spread():
-    np.testing.assert_allclose(
-        spread(np.array([0.0, 0.2, 1.0]), 2), [0.0, 0.1, 0.2, 0.6, 1.0]
-    )
-    np.testing.assert_allclose(
+    assert_allclose(spread(np.array([0.0, 0.2, 1.0]), 2), [0.0, 0.1, 0.2, 0.6, 1.0])
+    assert_allclose(
         spread(np.array([0.0, 0.3, 1.0]), np.array([3, 1])), [0.0, 0.1, 0.2, 0.3, 1.0]
     )

@@ -108,20 +108,12 @@ def test_the_pattern_covers_all_differences(program, points_and_differences):
 
 def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
     phase = phase_of("r1", position={"j1": [None, 2.9], "j2": [-3.0, None], "j3": None})
-    (limit,) = (each for each in phase.limits if each.kind == "position")
+    (limit,) = (limit for limit in phase.limits if limit.kind == "position")
     assert [label.subject for label in limit.labels] == ["j1", "j2"]
-    x = reachable_points(phase_of("r1"), 1)[0]
+    (x,) = reachable_points(phase_of("r1"), 1)
     state = phase.state(x)
     values = limit.values(state)
-    np.testing.assert_allclose(
-        limit.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14
-    )
-    np.testing.assert_allclose(
-        values[:, 1] - limit.lower[1], state.q[:, 1] + 3.0, atol=1e-14
-    )
-    assert limit.lower[0] == -np.inf
-    assert limit.upper[1] == np.inf
-    rows = phase.rows_of(limit).ravel()
-    np.testing.assert_allclose(
-        dense(phase, x)[rows], differences(phase, x)[rows], atol=1e-9
-    )
+    q1, q2, _ = state.q.T
+    np.testing.assert_allclose(limit.upper[0] - values[:, 0], 2.9 - q1, atol=1e-14)
+    np.testing.assert_allclose(values[:, 1] - limit.lower[1], q2 + 3.0, atol=1e-14)
+    assert limit.lower[0] == -limit.upper[1] == -np.inf

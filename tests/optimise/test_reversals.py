@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 
 import brachis
 from brachis.kinematics import JointState
@@ -16,16 +15,13 @@ from brachis.robot import Friction
 COUNT = 61
 
 
-def swinging(phases, amplitude=1.0, offset=0.0):
-    """Velocities amplitude * sin(2 pi t + phase) + offset of n joints at grid times in [0, 1]."""
+def swinging(phases, offset=0.0):
+    """Velocities sin(2 pi t + phase) + offset of n joints at grid times in [0, 1]."""
     t = np.linspace(0.0, 1.0, COUNT)
     angle = 2.0 * np.pi * t[:, None] + np.array(phases)
-    qdot = amplitude * np.sin(angle) + offset
-    qddot = 2.0 * np.pi * amplitude * np.cos(angle)
-    return t, JointState(
-        **dict.fromkeys(JointState.__dataclass_fields__, None)
-        | {"qdot": qdot, "qddot": qddot}
-    )
+    qdot, qddot = np.sin(angle) + offset, 2.0 * np.pi * np.cos(angle)
+    empty = dict.fromkeys(JointState.__dataclass_fields__)
+    return t, JointState(**(empty | {"qdot": qdot, "qddot": qddot}))
 
 
 def rubbing(n, width, coulomb=1.0):
@@ -40,18 +36,14 @@ def rubbing(n, width, coulomb=1.0):
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
 def test_every_width_around_every_reversal(width):
     phases = [0.3, 1.7]
-    t, state = swinging(phases)
-    found = reversals(rubbing(2, width), t, state)
+    times = reversals(rubbing(2, width), *swinging(phases))
+    steps = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
+    expected = steps * width / (2.0 * np.pi)
     for phase in phases:
         for zero in (0.5 - phase / (2.0 * np.pi), 1.0 - phase / (2.0 * np.pi)):
-            near = found[np.abs(found - zero) < 2.0 * width] - zero
-            wanted = (
-                np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
-                * width
-                / (2.0 * np.pi)
-            )
-            np.testing.assert_allclose(near, wanted, atol=0.01 * width + 1e-8)
-    assert len(found) == 44
+            near = times[np.abs(times - zero) < 2.0 * width] - zero
+            np.testing.assert_allclose(near, expected, atol=0.01 * width + 1e-8)
+    assert len(times) == 44
 
 
 def test_a_velocity_that_only_touches_zero():
@@ -72,21 +64,18 @@ def test_joints_without_coulomb_friction_are_not_looked_at():
 
 
 @pytest.mark.parametrize("width", [1e-3, 1e-5])
-def test_plans_under_narrow_friction_are_verified_by_refinement_alone(
-    scara_urdf, width
-):
+def test_plans_under_narrow_friction_are_verified_by_refinement_alone(width):
     """The refinement sees the peaks itself: the verification finds nothing that it has missed."""
-    task = yaml.safe_load(
-        (scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text()
+    result = brachis.plan(
+        brachis.examples.scara_line,
+        friction={
+            "coulomb": [0.6, 0.4, 0.3],
+            "coulomb_velocity": width,
+            "viscous": 0.1,
+        },
+        path=brachis.Line(length=0.8, angle_deg=180),
+        effort="single",
     )
-    friction = {"coulomb": [0.6, 0.4, 0.3], "coulomb_velocity": width, "viscous": 0.1}
-    task["robot"] |= {"urdf": str(scara_urdf), "friction": friction}
-    task |= {
-        "redundant_joints": ["j3"],
-        "path": [{"line": {"length": 0.8, "angle_deg": 180}}],
-    }
-    task["search"] = {"effort": "single"}
-    result = brachis.plan(task)
     assert result.verified
     assert result.candidate.refinement_rounds >= 2
     assert result.verification.worst_ratio - 1.0 <= result.candidate.violation + 1e-5

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-import brachis
+from support.slides import X, plan_slides, slides
 
 MASS = 2.0
 """kg."""
@@ -17,15 +17,6 @@ FORCES = (0.5, 5.0, 50.0, 500.0, 5000.0, 50000.0)
 """N."""
 SAME = 2e-4
 """Part of the time by which a motion with a stronger drive may be slower: `tolerances.GAIN`."""
-
-
-def slide(speed: float) -> str:
-    """Return the URDF of a slide with a speed limit, m/s."""
-    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    return f"""<robot name="slide"><link name="base"/>
-    <link name="cart"><inertial><mass value="{MASS}"/>{inertia}</inertial></link>
-    <joint name="x" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
-    <limit lower="-5" upper="5" effort="1e9" velocity="{speed}"/></joint></robot>"""
 
 
 def least_time(speed: float, force: float) -> float:
@@ -40,24 +31,12 @@ def least_time(speed: float, force: float) -> float:
 @pytest.mark.parametrize(
     ("speed", "degree"), [(0.02, 3), (0.5, 3), (0.5, 4), (0.5, 5), (10.0, 3)]
 )
-def test_slides_of_any_force_are_as_fast_as_their_trapezoid(
-    speed, degree, rest, tmp_path
-):
-    urdf = tmp_path / "slide.urdf"
-    urdf.write_text(slide(speed))
+def test_slides_of_any_force_are_as_fast_as_their_trapezoid(speed, degree, rest):
     times = []
     for force in FORCES:
-        result = brachis.plan(
-            urdf,
-            tool_frame="cart",
-            gravity=[0.0, 0.0, 0.0],
-            limits={"torque": force},
-            start=[0.0],
-            task_space=["x"],
-            path=[{"line": {"by": [WAY]}}],
-            degree=degree,
-            rest=rest,
-        )
+        robot = slides([X], [force], MASS).with_limits(velocity=speed)
+        spline = {"degree": degree, "rest": rest}
+        result = plan_slides(robot, ["x"], [WAY], spline=spline)
         assert result.verified
         assert result.t_end == pytest.approx(least_time(speed, force), rel=1e-3)
         times.append(result.t_end)

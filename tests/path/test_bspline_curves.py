@@ -1,6 +1,7 @@
 """Curves given by knots and control points, as fits make them: moved to their start, joined, with speeds along them."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
@@ -9,8 +10,8 @@ from brachis.errors import PathError, TaskError
 from brachis.path import build_path
 from brachis.path.from_curve import feed_tables
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import Task, fit_path, load_task
-from support.poses import pose
+from brachis.task import fit_path, load_task, task_with
+from support.poses import pose, rotations
 from support.seams import bent, brute_distances, wave
 
 MM = 1e-3
@@ -34,76 +35,64 @@ def test_the_path_with_its_blends_is_within_the_tolerance_of_all_points():
 
 
 def poses(count=300):
+    """Positions and orientations, and both as matrices."""
     t = np.linspace(0.0, 1.0, count)
-    return wave(count), Rotation.from_rotvec(
-        np.column_stack([0.4 * t, np.sin(t), 3.0 - 0.0 * t])
-    )
+    rotation_vectors = np.column_stack([0.4 * t, np.sin(t), 3.0 - 0.0 * t])
+    turns = Rotation.from_rotvec(rotation_vectors)
+    matrices = np.tile(np.eye(4), (count, 1, 1))
+    matrices[:, :3, :3] = turns.as_matrix()
+    matrices[:, :3, 3] = wave(count)
+    return matrices[:, :3, 3], turns, matrices
 
 
-def matrices(position, turns):
-    result = np.tile(np.eye(4), (len(position), 1, 1))
-    result[:, :3, :3], result[:, :3, 3] = turns.as_matrix(), position
-    return result
+NEAR = {"position": "0.02 mm"}
 
 
 def test_all_forms_of_poses_give_the_same_path():
-    import pinocchio as pin
-
-    position, turns = poses()
-    allowed = {"position": "0.02 mm", "orientation": "0.05 deg"}
-    homogeneous = matrices(position, turns)
+    position, turns, matrices = poses()
+    tolerance = {**NEAR, "orientation": "0.05 deg"}
     forms = [
-        {"points": homogeneous},
-        {"points": [pin.SE3(one) for one in homogeneous]},
-        {"points": position, "orientations": turns.as_matrix()},
-        {"points": position.tolist(), "orientations": turns},
+        (matrices, None),
+        ([pin.SE3(matrix) for matrix in matrices], None),
+        (position, turns.as_matrix()),
+        (position.tolist(), turns),
     ]
-    start = pose(position[0], turns[0])
+    ends = np.array([pose(position[i], turns[i]) for i in (0, -1)])
     targets = []
-    for form in forms:
-        path = build_path(
-            fit_path(form.pop("points"), tolerance=allowed, **form), start, POSE_ROWS
-        )
-        targets.append(path.sample(S).target)
+    for points, orientations in forms:
+        path = fit_path(points, tolerance=tolerance, orientations=orientations)
+        targets.append(build_path(path, ends[0], POSE_ROWS).sample(S).target)
         assert_allclose(targets[-1], targets[0], atol=1e-9)
-    assert_allclose(
-        targets[0][[0, -1]], [pose(position[i], turns[i]) for i in (0, -1)], atol=1e-9
-    )
+    assert_allclose(targets[0][[0, -1]], ends, atol=1e-9)
 
 
 def test_a_relative_curve_moves_and_turns_to_the_start():
-    position, turns = poses()
-    segments = fit_path(
-        matrices(position, turns), tolerance={"position": "0.02 mm"}, relative=True
-    )
-    recorded = (
-        build_path(segments, pose(position[0], turns[0]), POSE_ROWS).sample(S).target
-    )
+    position, turns, matrices = poses()
+    segments = fit_path(matrices, tolerance=NEAR, relative=True)
     start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
-    moved = build_path(segments, pose(start, turn), POSE_ROWS).sample(S).target
-    assert_allclose(moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9)
-    change = (turn * turns[0].inv()).as_matrix()
-    assert_allclose(
-        moved[:, 3:].reshape(-1, 3, 3),
-        change @ recorded[:, 3:].reshape(-1, 3, 3),
-        atol=1e-9,
+    recorded, moved = (
+        build_path(segments, pose(*first), POSE_ROWS).sample(S).target
+        for first in ((position[0], turns[0]), (start, turn))
     )
+    assert_allclose(moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9)
+    change = turn * turns[0].inv()
+    gaps = rotations(moved).inv() * change * rotations(recorded)
+    assert_allclose(gaps.magnitude(), 0.0, atol=1e-9)
 
 
 def test_a_start_elsewhere_is_an_error():
-    position, turns = poses()
-    segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"})
-    with pytest.raises(
-        PathError,
-        match=r"control_points\[0\]: .*, 0.02 m off; allowed: at most 0.0001 m",
+    position, turns, matrices = poses()
+    segments = fit_path(matrices, tolerance=NEAR)
+    turned = Rotation.from_rotvec([0.0, 0.01, 0.0]) * turns[0]
+    for start, message in (
+        (
+            pose(position[0] + [0.0, 0.02, 0.0], turns[0]),
+            r"control_points\[0\]: .*, 0.02 m off; allowed: at most 0.0001 m",
+        ),
+        (pose(position[0], turned), r"control_points\[0\]: .*, 0.01 rad off"),
     ):
-        build_path(segments, pose(position[0] + [0.0, 0.02, 0.0], turns[0]), POSE_ROWS)
-    with pytest.raises(PathError, match=r"control_points\[0\]: .*, 0.01 rad off"):
-        build_path(
-            segments,
-            pose(position[0], Rotation.from_rotvec([0.0, 0.01, 0.0]) * turns[0]),
-            POSE_ROWS,
-        )
+        with pytest.raises(PathError, match=message):
+            build_path(segments, start, POSE_ROWS)
 
 
 def test_speeds_follow_the_path_over_its_blends():
@@ -131,8 +120,8 @@ def test_stretches_without_speed_have_no_table():
     segments = fit_path(position, tolerance={"position": "0.05 mm"}, speed=speed)
     path = build_path(segments, position[0], ["x", "y", "z"])
     first, second = feed_tables(segments, path)
-    assert first.s[-1] == pytest.approx(39 / 99, abs=0.01)
-    assert second.s[0] == pytest.approx(59 / 99, abs=0.01)
+    inner = [first.s[-1], second.s[0]]
+    assert inner == pytest.approx([39 / 99, 59 / 99], abs=0.01)
 
 
 def test_a_quaternion_of_length_zero_at_the_start_is_no_crash():
@@ -141,29 +130,15 @@ def test_a_quaternion_of_length_zero_at_the_start_is_no_crash():
         "control_points": [[0.1 * i, 0, 0, 0, 0, 0, 0] for i in range(6)],
     }
     with pytest.raises(TaskError, match="the quaternion's length is 0"):
-        load_task(
-            {
-                "brachis": 1,
-                "start": "free",
-                "task_space": "pose",
-                "path": [{"bspline": curve}],
-            }
-        )
+        task_with(start="free", task_space="pose", path=[{"bspline": curve}])
 
 
 def test_a_task_with_a_fit_comes_back():
-    position, turns = poses()
-    segments = fit_path(
-        matrices(position, turns),
-        tolerance={"position": "0.02 mm"},
-        speed=np.full(300, 0.1),
-    )
-    made = load_task(
-        {"brachis": 1, "start": "free", "task_space": "pose", "path": segments}
-    )
-    assert load_task(made.to_dict()) == made
-    assert isinstance(made, Task)
-    assert made.fits[0].points == 300
+    *_, matrices = poses()
+    path = fit_path(matrices, tolerance=NEAR, speed=np.full(300, 0.1))
+    task = task_with(start="free", task_space="pose", path=path)
+    assert load_task(task.to_dict()) == task
+    assert task.fits[0].points == 300
 
 
 WRONG = [

@@ -13,7 +13,7 @@ from brachis.errors import PathError, TaskError
 from brachis.path import build_path
 from brachis.path.sequence import PathFrame
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import Placement, load_task
+from brachis.task import Placement, task_with
 from brachis.task.settings import place_frame
 from brachis.trajectory import Trajectory
 
@@ -60,61 +60,55 @@ SEGMENTS = yaml.safe_load("""
 
 
 def written(path, **keys):
-    content = {
-        "brachis": 1,
-        "start": {"joints": [0.0]},
-        "task_space": "pose",
-        "path": path,
-    }
-    return load_task(
-        content | {"frames": {"workpiece": PLACE}, "path_frame": "workpiece"} | keys
-    )
-
-
-def coordinates(placement):
-    return np.concatenate([placement.translation, placement.rotation.ravel()])
-
-
-def placements(targets):
-    return [pin.SE3(target[3:].reshape(3, 3), target[:3]) for target in targets]
+    frame = {"frames": {"workpiece": PLACE}, "path_frame": "workpiece"}
+    content = {"start": [0.0], "task_space": "pose", "path": path}
+    return task_with(**(content | frame | keys))
 
 
 def test_every_kind_of_segment_and_orientation_is_in_the_frame():
     here = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.2, -0.4), np.array([0.1, 0.05, 0.0]))
     segments = written(SEGMENTS).path
     frame = PathFrame.of(Placement.model_validate(PLACE), POSE_ROWS)
-    local = build_path(segments, coordinates(here), POSE_ROWS).sample(S)
-    world = build_path(
-        segments, coordinates(WORKPIECE * here), POSE_ROWS, frame
-    ).sample(S)
-    for found, wanted in zip(
-        placements(world.target), placements(local.target), strict=True
-    ):
-        assert_allclose(found.homogeneous, (WORKPIECE * wanted).homogeneous, atol=1e-12)
-    for name in (
-        "xi",
-        "xi_ds",
-        "xi_dds",
-    ):  # twists are those of the tool frame, whatever the frame of the path
+    local, world = (
+        build_path(
+            segments,
+            np.append(start.translation, start.rotation.ravel()),
+            POSE_ROWS,
+            own_frame,
+        ).sample(S)
+        for start, own_frame in ((here, None), (WORKPIECE * here, frame))
+    )
+    assert_allclose(
+        world.target[:, :3],
+        local.target[:, :3] @ WORKPIECE.rotation.T + WORKPIECE.translation,
+        atol=1e-12,
+    )
+    rotations = (sample.target[:, 3:].reshape(-1, 3, 3) for sample in (world, local))
+    outer, inner = rotations
+    assert_allclose(outer, WORKPIECE.rotation @ inner, atol=1e-12)
+    # Twists are those of the tool frame, whatever the frame of the path.
+    for name in ("xi", "xi_ds", "xi_dds"):
         assert_allclose(getattr(world, name), getattr(local, name), atol=1e-9)
 
 
 @pytest.mark.parametrize(
-    "rows", [["x", "y"], ["x", "y", "yaw"], "position", ["y", "z"]]
+    ("names", "place"),
+    [
+        (["x", "y"], FLAT),
+        (["x", "y", "yaw"], FLAT),
+        (["x", "y", "z"], FLAT),
+        (["y", "z"], {"xyz": [0.3, 0.4, 0.7], "rpy_deg": [30.0, 0.0, 0.0]}),
+    ],
+    ids=lambda names: "".join(names) if isinstance(names, list) else "",
 )
-def test_a_frame_turns_and_moves_rows(rows):
-    names = ["x", "y", "z"] if rows == "position" else rows
-    place = {"y": {"xyz": [0.3, 0.4, 0.7], "rpy_deg": [30.0, 0.0, 0.0]}}.get(
-        names[0], FLAT
-    )
+def test_a_frame_turns_and_moves_rows(names, place):
     placement = Placement.model_validate(place)
     through = np.random.default_rng(3).uniform(-0.5, 0.5, (4, len(names)))
-    segments = written(
-        [{"spline": {"through": through.tolist()}}], task_space=rows
-    ).path
+    segments = written(brachis.Spline(through=through), task_space=names).path
     frame = PathFrame.of(placement, names)
-    local = build_path(segments, np.zeros(len(names)), names).sample(S)
-    world = build_path(segments, frame.to_world(np.zeros(len(names))), names, frame)
+    start = np.zeros(len(names))
+    local = build_path(segments, start, names).sample(S)
+    world = build_path(segments, frame.to_world(start), names, frame)
     rotation = pin.rpy.rpyToMatrix(*np.radians(placement.rpy_deg))
     axes = ["xyz".index(name) for name in names if name != "yaw"]
     points = np.zeros((len(S), 3))
@@ -124,45 +118,22 @@ def test_a_frame_turns_and_moves_rows(rows):
     assert_allclose(target[:, : len(axes)], expected[:, axes], atol=1e-12)
     if "yaw" in names:
         assert_allclose(target[:, 2], local.target[:, 2] + np.radians(30.0), atol=1e-12)
-    step = 1e-6
-    slopes = (world.sample(S + step).target - world.sample(S - step).target) / (
-        2.0 * step
-    )
-    assert_allclose(world.sample(S).xi, slopes, atol=1e-6)
-
-
-def tool_of(motion, frame):
-    """Where Pinocchio has the tool, from the URDF and the positions of a motion alone."""
-    model = pin.buildModelFromXML(motion.urdf)
-    data = model.createData()
-    found = []
-    for q in motion.position(np.linspace(0.0, motion.t_end, 15)):
-        turns = [
-            model.joints[i + 1].nq == 2 for i in range(len(q))
-        ]  # continuous joints have cosine and sine
-        angles = [
-            [np.cos(x), np.sin(x)] if turn else [x]
-            for x, turn in zip(q, turns, strict=True)
-        ]
-        pin.framesForwardKinematics(model, data, np.concatenate(angles))
-        found.append(data.oMf[model.getFrameId(frame)].copy())
-    return found
+    before, here, after = (world.sample(S + step) for step in (-1e-6, 0.0, 1e-6))
+    assert_allclose(here.xi, (after.target - before.target) / 2e-6, atol=1e-6)
 
 
 def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path):
+    """By Pinocchio, from the URDF and the positions of the saved motion alone."""
     robot = brachis.robots.iiwa14
     posture = np.array([0.3, 0.6, 0.2, -1.2, 0.1, 0.9, 0.4])
-    tool = robot.tool_placement(posture)
     start = pin.SE3(pin.rpy.rpyToMatrix(np.pi, 0.1, 0.0), np.array([0.02, 0.03, 0.05]))
-    workpiece = tool * start.inverse()
+    workpiece = robot.tool_placement(posture) * start.inverse()
+    turning = {"rotate": {"axis": [0, 0, 1], "angle_deg": 20}}
     result = brachis.plan(
         robot,
         frames={"pallet": FLAT, "workpiece": workpiece},
         path_frame="workpiece",
-        path=brachis.Line(
-            by=[0.1, 0.0, 0.0],
-            orientation={"rotate": {"axis": [0, 0, 1], "angle_deg": 20}},
-        ),
+        path=brachis.Line(by=[0.1, 0.0, 0.0], orientation=turning),
         path_start=start,
         start=posture,
         task_space="pose",
@@ -171,29 +142,25 @@ def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path):
     )
     assert result.verified
     result.trajectory.save(tmp_path / "result.npz")
-    in_workpiece = [
-        workpiece.actInv(each)
-        for each in tool_of(Trajectory.load(tmp_path / "result.npz"), robot.tool_frame)
-    ]
-    for each in in_workpiece:
-        assert_allclose(each.translation[1:], start.translation[1:], atol=1e-7)
-        turned = pin.log3(each.rotation @ start.rotation.T)
-        way = each.translation[0] - start.translation[0]
-        assert_allclose(turned, [0.0, 0.0, np.radians(20.0) * way / 0.1], atol=1e-6)
-    assert_allclose(in_workpiece[-1].translation, [0.12, 0.03, 0.05], atol=1e-7)
+    motion = Trajectory.load(tmp_path / "result.npz")
+    model = pin.buildModelFromXML(motion.urdf)
+    data = model.createData()
+    frame = model.getFrameId(robot.tool_frame)
+    for q in motion.position(np.linspace(0.0, motion.t_end, 15)):
+        pin.framesForwardKinematics(model, data, q)
+        tool = workpiece.actInv(data.oMf[frame])
+        assert_allclose(tool.translation[1:], start.translation[1:], atol=1e-7)
+        turned = pin.log3(tool.rotation @ start.rotation.T)
+        distance = tool.translation[0] - start.translation[0]
+        assert_allclose(
+            turned, [0.0, 0.0, np.radians(20.0) * distance / 0.1], atol=1e-6
+        )
+    assert_allclose(tool.translation, [0.12, 0.03, 0.05], atol=1e-7)
 
 
 def test_a_path_says_its_frame():
-    apart = written(SEGMENTS)
-    together = load_task(
-        {
-            **apart.model_dump(
-                mode="json", exclude={"path", "path_frame"}, exclude_defaults=True
-            )
-        }
-        | {"path": {"frame": "workpiece", "segments": SEGMENTS}}
-    )
-    assert together == apart
+    path = {"frame": "workpiece", "segments": SEGMENTS}
+    assert written(path, path_frame=None) == written(SEGMENTS)
 
 
 def test_frames_may_be_nested_as_deep_as_one_likes():

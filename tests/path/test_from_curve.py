@@ -8,7 +8,8 @@ from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 from brachis import InputError, bspline_segment
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import joint_rows
-from brachis.task import load_task
+from brachis.task import task_with
+from support.arrays import assert_near
 
 RNG = np.random.default_rng(0)
 TIMES, WAYPOINTS = (
@@ -21,15 +22,8 @@ U = np.linspace(0.0, 1.0, 101)
 
 def along(segment, start):
     """The path that a task with this segment alone describes, at U."""
-    content = {
-        "brachis": 1,
-        "start": {"joints": start},
-        "task_space": "joints",
-        "path": [segment],
-    }
-    return build_path(
-        load_task(content).path, start, joint_rows(["a", "b", "c"])
-    ).derivatives(U)
+    path = task_with(start=start, task_space="joints", path=[segment]).path
+    return build_path(path, start, joint_rows(["a", "b", "c"])).derivatives(U)
 
 
 @pytest.mark.parametrize(
@@ -47,9 +41,7 @@ def test_splines_are_taken_exactly(knots):
     found = along(bspline_segment(curve), curve(first))
     for order in range(4):
         expected = curve(first + U * (last - first), nu=order) * (last - first) ** order
-        assert_allclose(
-            found[order], expected, atol=1e-9 * (1.0 + np.abs(expected).max())
-        )
+        assert_near(found[order], expected, 1e-9, least=1.0)
 
 
 def test_piecewise_polynomials_and_parts_of_them():

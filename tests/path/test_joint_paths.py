@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from brachis.errors import BrachisError, PathError, TaskError
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import joint_rows
-from brachis.task import load_task
+from brachis.task import task_with
 
 ROWS = joint_rows(["a", "b", "x"])
 START = [0.1, 0.2, 0.3]
@@ -19,16 +19,8 @@ CLAMPED = {
 }
 
 
-def task(path, **more):
-    return load_task(
-        {
-            "brachis": 1,
-            "start": {"joints": START},
-            "task_space": "joints",
-            "path": path,
-            **more,
-        }
-    )
+def task(path, **keys):
+    return task_with(start=START, task_space="joints", path=path, **keys)
 
 
 def build(path, start=START):
@@ -48,23 +40,15 @@ def test_a_spline_passes_its_waypoints():
 
 def test_joints_may_stand_in_another_order(tmp_path):
     plain = build([{"spline": {"through": [[0.5, 0.6, 0.7], [0.1, 0.9, 0.2]]}}])
-    named = build(
-        [
-            {
-                "spline": {
-                    "through": [[0.7, 0.5, 0.6], [0.2, 0.1, 0.9]],
-                    "joints": ["x", "a", "b"],
-                }
-            }
-        ]
-    )
-    s = np.linspace(0.0, 1.0, 7)
-    assert_allclose(at(named, s), at(plain, s), atol=1e-14)
+    through = [[0.7, 0.5, 0.6], [0.2, 0.1, 0.9]]
     file = tmp_path / "path.csv"
     file.write_text("x,a,b\n0.3,0.1,0.2\n0.7,0.5,0.6\n0.2,0.1,0.9\n")
-    assert_allclose(
-        at(build([{"csv": {"file": str(file)}}]), s), at(plain, s), atol=1e-14
-    )
+    s = np.linspace(0.0, 1.0, 7)
+    for segment in (
+        {"spline": {"through": through, "joints": ["x", "a", "b"]}},
+        {"csv": {"file": str(file)}},
+    ):
+        assert_allclose(at(build([segment]), s), at(plain, s), atol=1e-14)
 
 
 def test_the_error_names_a_column_of_joints_in_degrees(tmp_path):

@@ -227,16 +227,12 @@ def test_targets_are_poses(path):
     assert_allclose(path.sample([0.0]).target[0], pose(START, TURNED), atol=1e-12)
 
 
-def one_sided(path):
-    inner, h = path.breaks[1:-1], 1e-10
-    return path.sample(inner - h), path.sample(inner + h)
-
-
-@pytest.mark.parametrize("name", ["blends", "two turns"])
-def test_the_twist_and_two_derivatives_continue_across_joins(name):
+@pytest.mark.parametrize(("name", "breaks"), [("blends", 8), ("two turns", 3)])
+def test_the_twist_and_two_derivatives_continue_across_joins(name, breaks):
     path = pose_path(SEGMENTS[name])
-    assert path.breaks.size == (8 if name == "blends" else 3)
-    before, after = one_sided(path)
+    assert path.breaks.size == breaks
+    inner = path.breaks[1:-1]
+    before, after = (path.sample(inner + side) for side in (-1e-10, 1e-10))
     everywhere = path.sample(np.linspace(0, 1, 2000))
     for what in ("target", "xi", "xi_ds", "xi_dds"):
         jump = np.abs(getattr(after, what) - getattr(before, what)).max()
@@ -274,17 +270,13 @@ def test_the_same_uniform_turn_may_go_on():
 @pytest.mark.parametrize("frame", ["path", "tool"])
 def test_a_rotation_has_a_constant_angular_velocity(frame):
     axis = np.array([1.0, 2.0, -2.0]) / 3
-    orientation = {"rotate": {"axis": 5 * axis, "angle_deg": -400, "frame": frame}}
-    sample = pose_path([ALONG | {"orientation": orientation}]).sample(
-        np.linspace(0, 1, 30)
-    )
-    in_tool = TURNED.inv().apply(axis) if frame == "path" else axis
-    assert_allclose(
-        sample.xi[:, 3:],
-        np.broadcast_to(-np.deg2rad(400) * in_tool, (30, 3)),
-        atol=1e-12,
-    )
-    turned = Rotation.from_rotvec(-np.deg2rad(400) * axis)
+    rotate = {"axis": 5 * axis, "angle_deg": -400, "frame": frame}
+    path = pose_path([ALONG | {"orientation": {"rotate": rotate}}])
+    sample = path.sample(np.linspace(0, 1, 30))
+    turn = -np.deg2rad(400) * axis
+    in_tool = TURNED.inv().apply(turn) if frame == "path" else turn
+    assert_allclose(sample.xi[:, 3:], [in_tool] * 30, atol=1e-12)
+    turned = Rotation.from_rotvec(turn)
     expected = turned * TURNED if frame == "path" else TURNED * turned
     assert_allclose(sample.target[-1, 3:], expected.as_matrix().ravel(), atol=1e-12)
 
@@ -306,13 +298,6 @@ def test_to_ends_there_by_the_shortest_way(profile):
     assert_allclose(turned, share[:, None] * whole, atol=1e-12)
 
 
-def test_to_where_the_tool_is_already():
-    sample = pose_path(
-        [ALONG | {"orientation": {"to": {"rotation_vector": [0.3, -0.5, 0.8]}}}]
-    ).sample([0.0, 0.5, 1.0])
-    assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
-
-
 def test_along_the_tangent_the_tool_keeps_to_the_velocity_and_has_no_roll():
     """What is level and square to the tangent at the start stays level and square to it."""
     sample = pose_path(SEGMENTS["tangent of a spline"]).sample(np.linspace(0, 1, 50))
@@ -326,8 +311,11 @@ def test_along_the_tangent_the_tool_keeps_to_the_velocity_and_has_no_roll():
     assert np.ptp(tangent[:, 2]) > 0.1
 
 
-def test_a_line_along_its_tangent_does_not_turn():
-    sample = pose_path([ALONG | {"orientation": "tangent"}]).sample([0.0, 0.5, 1.0])
+@pytest.mark.parametrize(
+    "orientation", ["tangent", {"to": {"rotation_vector": [0.3, -0.5, 0.8]}}], ids=str
+)
+def test_a_line_along_its_tangent_or_to_the_same_orientation_does_not_turn(orientation):
+    sample = pose_path([ALONG | {"orientation": orientation}]).sample([0.0, 0.5, 1.0])
     assert_allclose(sample.xi[:, 3:], 0.0, atol=1e-12)
 
 

@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from brachis.errors import PathError
 from brachis.path import build_path
 from brachis.path.sequence import PathFrame
-from brachis.task import Placement, load_task
+from brachis.robot.task_map.protocol import POSE_ROWS
+from brachis.task import Placement, task_with
 
 RIGHT = {"line": {"by": [0.3, 0.0, 0.0]}}
 UP = {"line": {"by": [0.0, 0.0, 0.1]}}
@@ -16,16 +17,9 @@ POSE = [0.5, 0.0, 0.4, *np.eye(3).ravel()]
 
 
 def path_of(segments, space="position", frame=None):
-    task = load_task(
-        {
-            "brachis": 1,
-            "start": {"joints": [0]},
-            "task_space": space,
-            "path": segments,
-        }
-    )
-    rows = ("x", "y", "z", "rx", "ry", "rz") if space == "pose" else ("x", "y", "z")
-    return build_path(task.path, POSE if space == "pose" else POSE[:3], rows, frame)
+    task = task_with(start=[0], task_space=space, path=segments)
+    start, rows = (POSE, POSE_ROWS) if space == "pose" else (POSE[:3], ("x", "y", "z"))
+    return build_path(task.path, start, rows, frame)
 
 
 def test_a_path_has_corners_at_its_stops_alone():

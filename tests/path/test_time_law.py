@@ -8,7 +8,7 @@ import brachis
 from brachis.errors import PathError
 from brachis.path import Leg, path_of, time_law_of
 from brachis.robot import bind, task_map_of
-from brachis.task import load_task
+from brachis.task import task_with
 
 LINE = {"line": {"by": [0.2, 0.0, 0.0]}}
 UP = {"line": {"by": [0.0, 0.0, 0.2]}}
@@ -19,11 +19,13 @@ POSE = {"position": [0.4, 0.0, 0.5], "rpy_deg": [180, 0, 0]}
 
 
 def path_and_map(segments, space="position"):
-    start = POSE if space == "pose" else POSE["position"]
-    keys = {"start": "free", "path_start": start}
+    keys = {
+        "start": "free",
+        "path_start": POSE if space == "pose" else POSE["position"],
+    }
     if space == "joints":
-        keys = {"start": {"joints": [0.0, 0.5, 0.0, -1.0, 0.0, 0.5, 0.0]}}
-    task = load_task({"brachis": 1, **keys, "task_space": space, "path": segments})
+        keys = {"start": [0.0, 0.5, 0.0, -1.0, 0.0, 0.5, 0.0]}
+    task = task_with(**keys, task_space=space, path=segments)
     _, task_map = bind(brachis.robots.iiwa14, task.task_space)
     return task_map, path_of(task_map, task)
 

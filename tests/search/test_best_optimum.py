@@ -5,24 +5,17 @@ All lines, with more restarts: `studies/scara_restarts.py`.
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import brachis
 from brachis.problem.problem import Problem
+from support.scripts import load_script
 
-ROOT = Path(__file__).parents[2]
 RESTARTS = 3
 LINES_DEG = (180, 270)
 """One with two optima, and the one whose plans with different redundant joints differ most."""
-spec = importlib.util.spec_from_file_location(
-    "scara_restarts", ROOT / "studies/scara_restarts.py"
-)
-bench = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(bench)
+bench = load_script("studies/scara_restarts.py")
 
 
 @pytest.mark.parametrize("angle", LINES_DEG)

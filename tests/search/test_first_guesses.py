@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,40 +9,30 @@ import brachis
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
+from brachis.robot.from_task import robot_for
 from brachis.search.guesses import FAMILY, joint_space_guess
 from brachis.search.phase_plane import initial_guess
-
-GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
+from brachis.task import task_with
 
 
 def guess(content: dict, *, is_timed: bool) -> tuple[Problem, Program, np.ndarray]:
-    robot = brachis.Robot.from_urdf(
-        GANTRY,
+    task = task_with(
+        robot={"urdf": "gantry2"},
         gravity=[0, 0, 0],
-        limits=brachis.LimitSpec(torque=None, velocity=None, acceleration=1.0),
+        limits={"torque": None, "velocity": None, "acceleration": 1.0},
+        task_space="joints",
+        start=[0.0, 0.0],
+        path=brachis.Line(by=[0.2, 0.0], stop=True) + brachis.Line(by=[0.3, 0.0]),
+        intervals=40,
+        **content,
     )
-    task = brachis.load_task(
-        {
-            "brachis": 1,
-            "task_space": "joints",
-            "start": {"joints": [0.0, 0.0]},
-            "path": [
-                {"line": {"by": [0.2, 0.0]}, "stop": True},
-                {"line": {"by": [0.3, 0.0]}},
-            ],
-            "spline": {"intervals": 40},
-            **content,
-        }
-    )
-    problem = Problem.of(robot, task)
+    problem = Problem.of(robot_for(None, task.robot), task)
     initial = joint_space_guess(problem)
     if not is_timed:
         even = np.linspace(0.0, 1.0, 101)[:, None]
         initial = type(initial)(problem, initial.joint_map, even, np.inf, "", FAMILY)
     program = program_of(problem, initial.maps_by_leg())
-    x = initial_guess(program, initial)
-    assert x is not None
-    return problem, program, x
+    return problem, program, initial_guess(program, initial)
 
 
 WITH_SPEED = {

@@ -13,6 +13,7 @@ from brachis.robot.from_task import robot_for
 from brachis.search.first_motion import find_first_motion
 from brachis.search.guesses import first_guess
 from brachis.search.stages import InitialGuess
+from brachis.task import task_with
 
 EXTRAS: dict[str, dict[str, Any]] = {
     "nothing else": {},
@@ -29,20 +30,14 @@ EXTRAS: dict[str, dict[str, Any]] = {
 
 
 def guess_with(extras: dict[str, Any]) -> InitialGuess:
-    task = brachis.load_task(
-        {
-            "brachis": 1,
-            "robot": {
-                "urdf": str(brachis.robots.path_of("scara3")),
-                "tool_frame": "tool",
-                "gravity": [0.0, 0.0, 0.0],
-                "limits": {"torque": 10.0},
-            },
-            "start": {"joints": [0.5236, -2.0944, 2.0944]},
-            "task_space": ["x", "y"],
-            "path": [{"line": {"by": [0.0, 0.8]}}],
-            **extras,
-        }
+    keys = {"path": brachis.Line(by=[0.0, 0.8]), **extras}
+    task = task_with(
+        robot={"urdf": "scara3"},
+        gravity=[0, 0, 0],
+        limits={"torque": 10.0},
+        start=[0.5236, -2.0944, 2.0944],
+        task_space=["x", "y"],
+        **keys,
     )
     problem = Problem.of(robot_for(None, task.robot), task)
     return first_guess(problem, decompositions_of(problem, ()))

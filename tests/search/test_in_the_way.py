@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,40 +9,34 @@ import brachis
 from brachis.errors import PathError
 from brachis.kinematics import JointSpaceMap
 from brachis.problem.problem import Problem
-from brachis.robot.from_task import robot_for
 from brachis.search.holding import explain_postures
 from brachis.search.stages import InitialGuess
-from brachis.task import load_task
+from brachis.task import task_with
 
-SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 FIRST = [0.5, -1.5, 0.5]
 LAST = [1.1, -1.5, 0.5]
 
 
 def guess(*posts):
     """Make a guess that turns the first joint, past posts at some of its angles."""
-    robot = brachis.Robot.from_urdf(SCARA)
-    middles = [robot.tool_placement([angle, *FIRST[1:]]) for angle in posts]
+    robot = brachis.robots.scara3
     scene = [
-        {
-            "name": f"post {k}",
-            "cylinder": {"radius": 0.05, "length": 1.0},
-            "position": middle.translation.tolist(),
-        }
-        for k, middle in enumerate(middles)
+        brachis.Cylinder(
+            0.05,
+            1.0,
+            name=f"post {number}",
+            position=robot.tool_placement([angle, *FIRST[1:]]).translation,
+        )
+        for number, angle in enumerate(posts)
     ]
-    task = load_task(
-        {
-            "brachis": 1,
-            "robot": {"urdf": str(SCARA)},
-            "start": {"joints": FIRST},
-            "task_space": "joints",
-            "path": [{"spline": {"through": [LAST]}}],
-            "scene": scene,
-            "collisions": {"self_collision": False},
-        }
+    task = task_with(
+        start=FIRST,
+        task_space="joints",
+        path=brachis.Spline(through=[LAST]),
+        scene=scene,
+        collisions={"self_collision": False},
     )
-    problem = Problem.of(robot_for(None, task.robot), task)
+    problem = Problem.of(robot, task)
     s = np.linspace(0.0, 1.0, 11)[:, None]
     joint_map = JointSpaceMap(problem.robot, problem.path)
     return InitialGuess(problem, joint_map, s, np.inf, "path of joints", "")

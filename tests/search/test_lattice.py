@@ -5,29 +5,38 @@ And lattices where ranges, turns, limits or paths are out of the ordinary.
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import brachis
 from brachis.errors import PathError, PlanningError
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.guesses import SEARCH_LEVELS, lattice_guesses
 from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import stations
 from brachis.search.posture_lattice import PostureLattice
+from support.joint_paths import check_joint_path
 from support.scara import START, scara
 from support.scara import problem as scara_problem
 
 ROOT = Path(__file__).parents[2]
+RAIL = "03_tx90l_rail_line.yaml"
 
 
+FREE = {
+    "start": "free",
+    "path_start": [math.sqrt(3.0), 0.0],
+    "path": [{"line": {"length": 0.6, "angle_deg": 90}}],
+    "redundant_joints": ["j1"],
+}
 LINE = {
     "start": {"joints": START},
     "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
@@ -38,10 +47,12 @@ def problem(robot: brachis.Robot, **changes: Any) -> Problem:
     return scara_problem(robot, **(LINE | changes))
 
 
-def example(name: str, **changes: Any) -> Problem:
-    task = brachis.load_task(
-        brachis.load_task(ROOT / "examples" / name).to_dict() | changes
-    )
+def content_of(name: str) -> dict[str, Any]:
+    return brachis.load_task(ROOT / "examples" / name).to_dict()
+
+
+def problem_of(content: dict[str, Any]) -> Problem:
+    task = brachis.load_task(content)
     return Problem.of(robot_from_settings(task.robot), task)
 
 
@@ -53,52 +64,40 @@ CASES = {
     "free start": lambda: problem(
         scara(), start="free", path_start=[math.sqrt(3.0), 0.0]
     ),
-    "rail": lambda: example("03_tx90l_rail_line.yaml", redundant_joints="auto"),
-    "two redundant": lambda: example("06_free_roll.yaml"),
+    "rail": lambda: problem_of(content_of(RAIL) | {"redundant_joints": "auto"}),
+    "two redundant": lambda: problem_of(content_of("06_free_roll.yaml")),
     "none redundant": lambda: problem(
         scara(locked_joints={"j3": 0.4}), start={"joints": START[:2]}
     ),
 }
 
 
+def courses_of(line_problem: Problem, count: int) -> Any:
+    """Joint paths of the first closed form."""
+    return ClosedFormLattice(decompositions_of(line_problem)[0]).joint_paths(count)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_courses_are_motions_of_the_robot(case):
-    given = CASES[case]()
-    robot, limits = given.robot, given.robot.limits
-    found = 0
-    for decomposition in decompositions_of(given):
+    line_problem = CASES[case]()
+    count = 0
+    for decomposition in decompositions_of(line_problem):
         joint_paths = ClosedFormLattice(decomposition).joint_paths(4)
         if isinstance(joint_paths, DeadEnd):
             continue
-        found += len(joint_paths)
+        count += len(joint_paths)
+        solver = decomposition.match.solver
         for joint_path in joint_paths:
-            targets = given.path.sample(joint_path.s).target
-            miss = given.task_map.difference(
-                given.task_map.values(joint_path.q), targets
-            )
-            assert np.abs(miss).max() < 1e-6
-            assert np.abs(np.diff(joint_path.q, axis=0)).max() < 0.9
-            assert np.all(joint_path.q >= limits.position_lower - 1e-9)
-            assert np.all(joint_path.q <= limits.position_upper + 1e-9)
-            still = np.zeros_like(joint_path.q)
-            assert np.all(
-                np.abs(dynamics.torque(robot, joint_path.q, still, still))
-                <= limits.torque
-            )
-            margins = decomposition.match.solver.branch_margins(
-                joint_path.q, joint_path.branch
-            )
+            check_joint_path(line_problem, joint_path, miss=1e-6, step=0.9)
+            margins = solver.branch_margins(joint_path.q, joint_path.branch)
             assert margins.min(initial=1.0) > 0.0
-            if given.start is not None:
-                np.testing.assert_allclose(joint_path.q[0], given.start, atol=1e-12)
-        stations = [joint_path.q for joint_path in joint_paths]
-        assert all(
-            np.abs(a - b).max() > 0.05
-            for i, a in enumerate(stations)
-            for b in stations[:i]
-        )
-    assert found >= 3 or case == "none redundant"
-    assert found
+            if line_problem.start is not None:
+                np.testing.assert_allclose(
+                    joint_path.q[0], line_problem.start, atol=1e-12
+                )
+        for first, second in itertools.combinations(joint_paths, 2):
+            assert np.abs(first.q - second.q).max() > 0.05
+    assert count >= (1 if case == "none redundant" else 3)
 
 
 def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
@@ -133,25 +132,25 @@ REASONS = {
 @pytest.mark.parametrize("case", REASONS)
 def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
-    given = problem(scara(**options), **changes)
+    line_problem = problem(scara(**options), **changes)
     ends = [
         lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0])
-        for decomposition in decompositions_of(given)
+        for decomposition in decompositions_of(line_problem)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)
-    of_all_postures = PostureLattice(given, []).joint_paths(4)
+    of_all_postures = PostureLattice(line_problem, []).joint_paths(4)
     assert isinstance(of_all_postures, DeadEnd)
     for furthest in (max(ends, key=lambda end: end.s), of_all_postures):
         assert 0.0 < furthest.s <= 1.0
         assert reason in str(furthest)
     with pytest.raises(PathError, match=message) as caught:
-        brachis.plan(given.robot, given.task, check_advice=False)
+        brachis.plan(line_problem.robot, line_problem.task, check_advice=False)
     assert caught.value.s_interval is not None
 
 
 def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
     """Half the path lies beyond what the arm reaches from the stretch of rail that is left to it."""
-    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    task = content_of(RAIL)
     task["robot"]["limits"]["position"] = {"rail": [-0.01, 0.01]}
     task["path"] = [{"line": {"by": [0.0, 1.9, 0.0]}}]
     with pytest.raises(
@@ -162,7 +161,7 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
 
 
 def test_advice_names_what_was_kept_low():
-    given = problem(
+    line_problem = problem(
         scara(),
         solver={"max_iterations": 1, "name": "uno"},
         redundant_joints=["j1"],
@@ -171,70 +170,33 @@ def test_advice_names_what_was_kept_low():
     with pytest.raises(
         PlanningError, match=r"Raise solver.max_iterations, which is 1$"
     ) as caught:
-        brachis.plan(given.robot, given.task)
+        brachis.plan(line_problem.robot, line_problem.task)
     assert "effort" not in str(caught.value)
-
-
-def rail_task(**changes: object) -> dict[str, object]:
-    return (
-        brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict() | changes
-    )
 
 
 @pytest.mark.parametrize("reach", [None, [-30.0, 30.0], [8.0, None]])
 def test_a_free_start_on_a_long_rail(reach):
     """The path begins 20 m along it."""
-    robot = robot_from_settings(brachis.load_task(rail_task()).robot)
-    task = rail_task(start="free", redundant_joints=["rail"])
-    placement = robot.tool_placement(
-        robot.posture([0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "start")
-    )
-    x, y, z = placement.translation
-    task["path_start"] = {
-        "position": [x, y + 20.0, z],
-        "quaternion_wxyz": _quaternion(placement.rotation),
-    }
-    task["path"] = [{"line": {"by": [0.0, 0.8, 0.0]}}]
+    task = content_of(RAIL)
+    robot = problem_of(task).robot
+    end = robot.posture([0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "start")
+    task |= back_from(end, robot, [0.0, -20.0, 0.0])
+    task |= {"path": [{"line": {"by": [0.0, 0.8, 0.0]}}], "redundant_joints": ["rail"]}
+    del task["end"]
     task["robot"]["limits"]["position"] = {"rail": reach}
-    given = Problem.of(
-        robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task)
-    )
-    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(2)
+    joint_paths = courses_of(problem_of(task), 2)
     assert not isinstance(joint_paths, DeadEnd)
     assert all(abs(joint_path.q[0, 0] - 20.0) < 3.0 for joint_path in joint_paths)
 
 
-def _quaternion(rotation: np.ndarray) -> list[float]:
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-    return [w, x, y, z]
-
-
 def test_both_branches_of_a_free_start():
-    line = [{"line": {"length": 0.6, "angle_deg": 90}}]
-    given = problem(
-        scara(),
-        start="free",
-        path_start=[math.sqrt(3.0), 0.0],
-        path=line,
-        redundant_joints=["j1"],
-    )
-    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(4)
+    joint_paths = courses_of(problem(scara(), **FREE), 4)
     assert {joint_path.branch for joint_path in joint_paths} == {0, 1}
 
 
 def test_a_free_start_that_no_torque_holds_says_so():
-    robot = scara({"torque": 1.0}, gravity=[0, -9.81, 0])
-    line = [{"line": {"length": 0.6, "angle_deg": 90}}]
-    given = problem(
-        robot,
-        start="free",
-        path_start=[math.sqrt(3.0), 0.0],
-        path=line,
-        redundant_joints=["j1"],
-    )
-    end = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
+    weak = scara({"torque": 1.0}, gravity=[0, -9.81, 0])
+    end = courses_of(problem(weak, **FREE), 1)
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
     assert "the torque limit of j1 cannot hold the arm against gravity" in end.cause
@@ -243,12 +205,11 @@ def test_a_free_start_that_no_torque_holds_says_so():
 @pytest.mark.parametrize(("turns", "joints"), [(4, ["j1"]), (30, ["j2"]), (30, ["j3"])])
 def test_small_circles_have_stations_enough(turns, joints):
     path = [{"circle": {"center": [0.0, 0.0], "turns": turns}}]
-    given = problem(
+    line_problem = problem(
         scara(), start={"joints": [0.5, -2.0, 1.7]}, path=path, redundant_joints=joints
     )
-    assert len(stations(given.path, given.task_map)) > 24 * turns / 2
-    (decomposition,) = decompositions_of(given)
-    assert not isinstance(ClosedFormLattice(decomposition).joint_paths(1), DeadEnd)
+    assert len(stations(line_problem.path, line_problem.task_map)) > 24 * turns / 2
+    assert not isinstance(courses_of(line_problem, 1), DeadEnd)
 
 
 def test_an_end_posture_without_redundancy_may_have_few_digits():
@@ -258,10 +219,10 @@ def test_an_end_posture_without_redundancy_may_have_few_digits():
         robot, problem(robot, start={"joints": [0.3, 0.9]}, path=line).task
     )
     end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
-    given = problem(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
-    assert not isinstance(
-        ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd
+    line_problem = problem(
+        robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end}
     )
+    assert not isinstance(courses_of(line_problem, 1), DeadEnd)
 
 
 def back_from(
@@ -273,7 +234,7 @@ def back_from(
         "start": "free",
         "path_start": {
             "position": (placement.translation - by).tolist(),
-            "quaternion_wxyz": _quaternion(placement.rotation),
+            "quaternion_xyzw": pin.Quaternion(placement.rotation).coeffs(),
         },
         "end": {"joints": end.tolist()},
         "path": [{"line": {"by": by}}],
@@ -295,26 +256,24 @@ def back_from(
 )
 def test_a_free_start_is_in_the_turn_that_leads_to_the_end_posture(turned):
     """Ranges of two turns: whichever turns the end is in, every choice of redundant joints finds its way back."""
-    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
-    robot = robot_from_settings(brachis.load_task(task).robot)
+    task = content_of("04_ur10_rail_weld.yaml")
+    robot = problem_of(task).robot
     end = np.array(task["start"]["joints"])
     for joint, turns in turned.items():
         end[robot.joint_names.index(joint)] += 2.0 * math.pi * turns
     task |= back_from(end, robot, [0.0, 0.4, 0.0])
-    found = 0
-    for decomposition in decompositions_of(Problem.of(robot, brachis.load_task(task))):
+    decompositions = decompositions_of(problem_of(task))
+    assert len(decompositions) == 4
+    for decomposition in decompositions:
         joint_paths = ClosedFormLattice(decomposition).joint_paths(2)
         assert not isinstance(joint_paths, DeadEnd)
-        assert all(
-            np.abs(joint_path.q[-1] - end).max() < 1e-9 for joint_path in joint_paths
-        )
-        found += 1
-    assert found == 4
+        for joint_path in joint_paths:
+            assert np.abs(joint_path.q[-1] - end).max() < 1e-9
 
 
 def test_a_motion_planned_one_way_is_found_the_other_way_round():
-    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
-    robot = robot_from_settings(brachis.load_task(task).robot)
+    task = content_of("04_ur10_rail_weld.yaml")
+    robot = problem_of(task).robot
     begin = np.array(task["start"]["joints"])
     begin[robot.joint_names.index("wrist_1_joint")] += 2.0 * math.pi
     task |= {
@@ -322,13 +281,13 @@ def test_a_motion_planned_one_way_is_found_the_other_way_round():
         "path": [{"line": {"by": [0.0, -0.4, 0.0]}}],
         "search": {"effort": "single"},
     }
-    there = brachis.plan(task | {"start": {"joints": begin.tolist()}})
+    forwards = brachis.plan(task | {"start": {"joints": begin.tolist()}})
     back = brachis.plan(
         task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]}
     )
-    assert there.verified
+    assert forwards.verified
     assert back.verified
-    assert back.t_end == pytest.approx(there.t_end, rel=2e-3)
+    assert back.t_end == pytest.approx(forwards.t_end, rel=2e-3)
 
 
 def test_a_dead_end_back_from_the_end_says_so():
@@ -336,14 +295,14 @@ def test_a_dead_end_back_from_the_end_says_so():
     end = np.array([0.5, -2.0, 2.0])
     x, y, _ = robot.tool_placement(end).translation
     path = [{"line": {"by": [-4.0, 0.0]}}]
-    given = problem(
+    line_problem = problem(
         robot,
         start="free",
         path_start=[x + 4.0, y],
         end={"joints": end.tolist()},
         path=path,
     )
-    dead = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
+    dead = courses_of(line_problem, 1)
     assert isinstance(dead, DeadEnd)
     assert dead.interval[0] == 0.0
     assert 0.0 < dead.interval[1] < 1.0

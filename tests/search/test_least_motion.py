@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from brachis.search import least_motion
 from brachis.task import task_with
 from brachis.trajectory import Trajectory
 
-ROOT = Path(__file__).parents[2]
 NOTEWORTHY = 0.01
 """A velocity above this part of its limit."""
 
@@ -32,51 +30,32 @@ def reversals(trajectory: Trajectory) -> list[int]:
 
 
 def rms(trajectory: Trajectory) -> np.ndarray:
-    return np.sqrt(
-        (trajectory.acceleration(np.linspace(0.0, trajectory.t_end, 4001)) ** 2).mean(
-            axis=0
-        )
-    )
+    t = np.linspace(0.0, trajectory.t_end, 4001)
+    return np.sqrt((trajectory.acceleration(t) ** 2).mean(axis=0))
 
 
-def free_roll() -> brachis.Task:
-    return task_with(brachis.examples.free_roll, effort="single", intervals=16)
+def plan(**search) -> brachis.Result:
+    """Plan the line of the paper's arm."""
+    return brachis.plan(brachis.examples.scara_line, effort="single", **search)
 
 
-def seven_joints() -> brachis.Task:
-    """The iiwa's flange along a line in space: four redundant joints."""
-    task = {
-        "brachis": 1,
-        "robot": {"urdf": str(ROOT / "robots/iiwa14/robot.urdf")},
-        "start": {"joints": [0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1]},
-        "task_space": "position",
-        "path": [{"line": {"by": [-0.1, 0.35, 0.2]}}],
-        "spline": {"intervals": 20},
-        "search": {"effort": "single"},
-    }
-    return brachis.load_task(task)
+TASKS = {
+    "free roll": task_with(brachis.examples.free_roll, effort="single", intervals=16),
+    # The iiwa's flange along a line in space: four redundant joints.
+    "seven joints": task_with(
+        robot={"urdf": "iiwa14"},
+        start=[0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1],
+        task_space="position",
+        path=brachis.Line(by=[-0.1, 0.35, 0.2]),
+        intervals=20,
+        effort="single",
+    ),
+}
 
 
-def scara(**search) -> dict:
-    return {
-        "brachis": 1,
-        "robot": {
-            "urdf": str(ROOT / "robots/scara3/robot.urdf"),
-            "gravity": [0, 0, 0],
-            "limits": {"torque": 10, "velocity": None},
-        },
-        "start": {"joints": [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
-        "redundant_joints": ["j3"],
-        "spline": {"intervals": 20},
-        "search": {"effort": "single", **search},
-    }
-
-
-@pytest.fixture(scope="module", params=[free_roll, seven_joints])
+@pytest.fixture(scope="module", params=TASKS)
 def result(request):
-    return brachis.plan(request.param())
+    return brachis.plan(TASKS[request.param])
 
 
 def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
@@ -95,42 +74,43 @@ def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
 
 
 def test_bottlenecks_are_those_of_the_fastest_motion(result):
-    assert (
-        result.candidate.refined.program.objective(result.candidate.refined.x)
-        == result.candidate.refined.t_end
-    )
-    assert result.candidate.refined.t_end == pytest.approx(
-        result.candidate.trajectory.t_end, rel=1e-9
-    )
-    fastest = dataclasses.replace(result, trajectory=result.candidate.trajectory)
-    ours, theirs = (
-        brachis.bottleneck.report(each).sensitivities for each in (result, fastest)
-    )
-    assert len(ours.limits) == len(theirs.limits) > 0
-    for entry in ours.limits:
-        other = theirs.of(entry.label.subject, entry.label.kind, entry.side)
-        assert other.derivative == pytest.approx(entry.derivative, rel=1e-6, abs=1e-9)
+    candidate = result.candidate
+    refined = candidate.refined
+    assert refined.program.objective(refined.x) == refined.t_end
+    assert refined.t_end == pytest.approx(candidate.trajectory.t_end, rel=1e-9)
+    fastest = dataclasses.replace(result, trajectory=candidate.trajectory)
+    compare_sensitivities(result, fastest, rel=1e-6, abs=1e-9)
+
+
+def compare_sensitivities(first, second, **near):
+    ours, theirs = (brachis.bottleneck.report(motion) for motion in (first, second))
+    limits = ours.sensitivities.limits
+    assert len(limits) == len(theirs.sensitivities.limits) > 0
+    for entry in limits:
+        label = entry.label
+        again = theirs.sensitivities.of(label.subject, label.kind, entry.side)
+        assert again.derivative == pytest.approx(entry.derivative, **near)
 
 
 def test_with_many_variables_only_a_slower_one_is_looked_for(monkeypatch):
     monkeypatch.setattr(least_motion, "_MANY", 20)
-    kept = brachis.plan(scara()).least_motion
-    assert kept.reports == ()
-    assert "variables" in kept.status
-    slower = brachis.plan(scara(slower=0.05))
+    fastest = plan().least_motion
+    assert fastest.reports == ()
+    assert "variables" in fastest.status
+    slower = plan(slower=0.05)
     assert slower.least_motion.reduction > 0.2
     assert slower.verified
 
 
 def test_it_can_be_switched_off():
-    result = brachis.plan(scara(least_motion=False))
+    result = plan(least_motion=False)
     assert result.least_motion is None
     assert result.trajectory is result.candidate.trajectory
     assert result.to_dict()["least_motion"] is None
 
 
 def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
-    result = brachis.plan(scara())
+    result = plan()
     assert result.trajectory is result.candidate.trajectory
     assert result.least_motion.reduction == result.least_motion.later == 0.0
     assert len(result.least_motion.reports) == 1
@@ -138,34 +118,17 @@ def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
 
 
 def test_a_slower_motion_is_calmer(tmp_path):
-    result = brachis.plan(scara(slower="1 %"))
+    result = plan(slower="1 %")
     assert result.verified
     assert 1.005 < result.t_end / result.candidate.t_end <= 1.01
     assert np.all(rms(result.trajectory) < 0.9 * rms(result.candidate.trajectory))
     result.trajectory.save(tmp_path / "result.npz")
-    again = brachis.bottleneck.report(
-        Trajectory.load(tmp_path / "result.npz")
-    ).sensitivities
-    for entry in brachis.bottleneck.report(result).sensitivities.limits:
-        found = again.of(entry.label.subject, entry.label.kind, entry.side)
-        assert found.derivative == pytest.approx(entry.derivative, rel=0.05, abs=1e-3)
+    again = Trajectory.load(tmp_path / "result.npz")
+    compare_sensitivities(result, again, rel=0.05, abs=1e-3)
 
 
 def test_without_time_or_a_verified_motion_the_fastest_stays():
-    task = brachis.load_task(scara(least_motion=False))
-    kept = []
-
-    def keep(candidate, *_) -> None:
-        kept.append(candidate)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("brachis.planner.find_least_motion", keep)
-        brachis.plan(
-            task.model_copy(
-                update={"search": task.search.model_copy(update={"least_motion": True})}
-            )
-        )
-    (fastest,) = kept
+    fastest = plan(least_motion=False).candidate
     over = least_motion.find_least_motion(fastest, Deadline(0.0), lambda _text: None)
     assert over.trajectory is fastest.trajectory
     assert over.status == "no time was left"
@@ -179,6 +142,6 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
 
 
 def test_without_refinement_nothing_is_verified_and_the_fastest_stays():
-    result = brachis.plan({**scara(), "refinement": {"max_rounds": 0}})
+    result = plan(refinement={"max_rounds": 0})
     assert not result.verified
     assert result.least_motion.status == "the fastest motion is not verified"

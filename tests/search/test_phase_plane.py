@@ -12,6 +12,7 @@ from brachis.limits.joint import AccelerationLimit, TorqueLimit, VelocityLimit
 from brachis.problem.problem import Problem
 from brachis.search import phase_plane
 from brachis.search.stations import spread_stations
+from brachis.task import task_with
 from brachis.timing import JointPath, PhasePlane
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
@@ -45,27 +46,16 @@ FORCE = 20.0
 
 def slide(content: dict, **limits: object) -> tuple[Problem, np.ndarray, np.ndarray]:
     """A task on one slide, and its joint path, (S,) and (S, n)."""
-    task = brachis.load_task(
-        {
-            "brachis": 1,
-            "task_space": ["x", "y"],
-            "start": {"joints": [0.0, 0.0]},
-            "path": [{"line": {"by": [LENGTH, 0.0]}}],
-            **content,
-        }
-    )
+    line = {"path": brachis.Line(by=[LENGTH, 0.0]), **content}
+    task = task_with(task_space=["x", "y"], start=[0.0, 0.0], **line)
     problem = Problem.of(gantry(**limits), task)
     s = spread_stations(problem)
     return problem, s, np.column_stack([LENGTH * s, np.zeros_like(s)])
 
 
 def with_stop(dwell: float) -> dict:
-    return {
-        "path": [
-            {"line": {"by": [0.4 * LENGTH, 0.0]}, "stop": True, "dwell": dwell},
-            {"line": {"by": [0.6 * LENGTH, 0.0]}},
-        ]
-    }
+    first = brachis.Line(by=[0.4 * LENGTH, 0.0], stop=True, dwell=dwell)
+    return {"path": first + brachis.Line(by=[0.6 * LENGTH, 0.0])}
 
 
 def acceleration_of(force: float) -> float:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.apps.plots import plot_candidates
@@ -50,11 +51,8 @@ BRANCH = {"branch": "elbow_positive"}
 """With a branch asked for, the closed forms of all choices of the redundant joint are searched, not charts."""
 EVERY_CHOICE = {"start": "free", "path_start": HERE, **BRANCH}
 TIMES = ("estimate", "t_end")
-
-
-@pytest.fixture(scope="module")
-def robot() -> brachis.Robot:
-    return scara()
+UNFINISHED = "the search that search.effort requires was not completed"
+ROBOT = scara()
 
 
 def task(**changes: Any) -> dict[str, Any]:
@@ -67,16 +65,14 @@ def task(**changes: Any) -> dict[str, Any]:
     } | changes
 
 
+def plan(**changes: Any) -> brachis.Result:
+    return brachis.plan(ROBOT, task(**changes))
+
+
 @pytest.fixture(scope="module")
-def usual(robot) -> brachis.Result:
+def usual() -> brachis.Result:
     """Of the task as it is."""
-    return brachis.plan(robot, task())
-
-
-@pytest.fixture(scope="module")
-def from_anywhere(robot) -> brachis.Result:
-    """Of a free start."""
-    return brachis.plan(robot, task(start="free", path_start=HERE))
+    return plan()
 
 
 def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndarray]:
@@ -88,122 +84,102 @@ def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndar
 
 
 @pytest.mark.parametrize(
-    ("asked", "choices"),
+    ("changes", "choices"),
     [
         ({}, {()}),
         (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}),
         ({"redundant_joints": ["j1"]}, {("j1",)}),
     ],
 )
-def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choices):
-    result = brachis.plan(robot, task(**asked)) if asked else usual
-    first = result.candidates[0]
+def test_every_candidate_is_listed_the_fastest_first(usual, changes, choices):
+    result = plan(**changes) if changes else usual
+    first, *slower = result.candidates
     assert first.verified
     assert first.t_end == result.t_end
     assert first.redundant_joints == result.trajectory.redundant_joints
     assert first.branch == result.trajectory.branch
-    others = {candidate.redundant_joints for candidate in result.candidates[1:]}
-    assert (
-        others <= choices if not asked else others | {first.redundant_joints} == choices
-    )
-    assert len(
-        {
-            (candidate.redundant_joints, candidate.origin)
-            for candidate in result.candidates
-        }
-    ) == len(result.candidates)
-    finished = [candidate for candidate in result.candidates if candidate.verified]
-    assert result.t_end == min(candidate.t_end for candidate in finished)
-    unfinished = [
-        candidate.estimate
+    if changes:
+        assert choices_of(result) == choices
+    else:
+        assert {candidate.redundant_joints for candidate in slower} <= choices
+    keys = {
+        (candidate.redundant_joints, candidate.origin)
         for candidate in result.candidates
-        if candidate.status in {RANKED, SLOW}
+    }
+    assert len(keys) == len(result.candidates)
+    finished = [
+        candidate.t_end for candidate in result.candidates if candidate.verified
+    ]
+    assert result.t_end == min(finished)
+    unfinished = [
+        candidate.estimate for candidate in slower if candidate.status in {RANKED, SLOW}
     ]
     assert unfinished
-    assert min(unfinished) >= first.estimate * (1.0 - 2e-3), (
-        "what was left unfinished could gain no more by its knots"
-    )
+    # What was left unfinished could gain no more by its knots.
+    assert min(unfinished) >= first.estimate * (1.0 - 2e-3)
     assert len(plot_candidates(result.candidates).axes) == 1
 
 
 @pytest.mark.usefixtures("wall_clock")
-@pytest.mark.parametrize("asked", [{}, BRANCH, {"spline": {"intervals": "auto"}}])
-def test_the_same_candidates_whatever_the_number_of_processes(robot, usual, asked):
-    one = brachis.plan(robot, task(search={"jobs": 1}, **asked)) if asked else usual
-    two = brachis.plan(robot, task(search={"jobs": 2}, **asked))
-    assert one.t_end == pytest.approx(two.t_end, rel=1e-6)
-    (first, times), (second, others) = without_times(one), without_times(two)
+@pytest.mark.parametrize("changes", [{}, BRANCH, {"spline": {"intervals": "auto"}}])
+def test_the_same_candidates_whatever_the_number_of_processes(usual, changes):
+    alone = plan(search={"jobs": 1}, **changes) if changes else usual
+    shared = plan(search={"jobs": 2}, **changes)
+    assert alone.t_end == pytest.approx(shared.t_end, rel=1e-6)
+    (first, times), (second, times_shared) = without_times(alone), without_times(shared)
     assert first == second
-    np.testing.assert_allclose(others, times, rtol=1e-6)
-    np.testing.assert_allclose(
-        one.trajectory.control_points, two.trajectory.control_points, atol=1e-5
+    assert_allclose(times_shared, times, rtol=1e-6)
+    assert_allclose(
+        alone.trajectory.control_points, shared.trajectory.control_points, atol=1e-5
     )
 
 
-def test_more_effort_is_never_slower(robot, usual):
-    fast = usual
-    single = brachis.plan(robot, task(search={"effort": "single"}))
-    thorough = brachis.plan(robot, task(search={"effort": "thorough"}))
+def test_more_effort_is_never_slower(usual):
+    single, thorough = (
+        plan(search={"effort": name}) for name in ("single", "thorough")
+    )
     assert len(single.candidates) == 1
-    assert len(single.candidates) < len(fast.candidates) < len(thorough.candidates)
-    assert thorough.t_end <= fast.t_end * (1.0 + 2e-4) <= single.t_end * (1.0 + 4e-4)
+    assert 1 < len(usual.candidates) < len(thorough.candidates)
+    assert thorough.t_end <= usual.t_end * (1.0 + 2e-4) <= single.t_end * (1.0 + 4e-4)
 
 
-def test_a_free_start_is_faster_and_on_the_path(robot, usual, from_anywhere):
-    free = from_anywhere
+def test_a_free_start_is_faster_and_on_the_path(usual):
+    free = plan(start="free", path_start=HERE)
     assert free.verified
     assert free.t_end < 0.9 * usual.t_end
-    begun = robot.tool_placement(free.trajectory.position(0.0)).translation[:2]
-    np.testing.assert_allclose(begun, HERE, atol=1e-9)
+    first = ROBOT.tool_placement(free.trajectory.q[0]).translation[:2]
+    np.testing.assert_allclose(first, HERE, atol=1e-9)
     assert {candidate.branch for candidate in free.candidates} == {CHART}
 
 
-def test_a_branch_can_be_asked_for(robot):
+def test_a_branch_can_be_asked_for():
+    free = {"start": "free", "path_start": HERE, "redundant_joints": ["j1"]}
     for label in ("elbow_positive", "elbow_negative"):
-        result = brachis.plan(
-            robot,
-            task(
-                start="free",
-                path_start=HERE,
-                branch=label,
-                redundant_joints=["j1"],
-                spline={"intervals": 8},
-            ),
-        )
+        result = plan(**free, branch=label, spline={"intervals": 8})
         assert result.trajectory.branch == label
         assert {candidate.branch for candidate in result.candidates} == {label}
     with pytest.raises(UnknownNameError, match="elbow_up"):
-        brachis.plan(
-            robot,
-            task(
-                start="free",
-                path_start=HERE,
-                branch="elbow_up",
-                redundant_joints=["j1"],
-            ),
-        )
+        plan(**free, branch="elbow_up")
 
 
-def test_a_free_start_needs_a_place_and_no_numeric_guess(robot):
+def test_a_free_start_needs_a_place_and_no_numeric_guess():
     with pytest.raises(TaskError, match=r"path_start: .* allowed: \[x, y\]"):
-        brachis.plan(robot, task(start="free"))
+        plan(start="free")
     with pytest.raises(TaskError, match=r"search\.guesses"):
-        brachis.plan(
-            robot, task(start="free", path_start=HERE, search={"guesses": "numeric"})
-        )
+        plan(start="free", path_start=HERE, search={"guesses": "numeric"})
 
 
-def test_numeric_guesses_stay_an_option(robot):
-    result = brachis.plan(robot, task(search={"guesses": "numeric"}))
+def test_numeric_guesses_stay_an_option():
+    result = plan(search={"guesses": "numeric"})
     assert result.verified
     assert all(
         candidate.origin.startswith("numeric") for candidate in result.candidates
     )
-    assert {candidate.redundant_joints for candidate in result.candidates} == {
-        ("j1",),
-        ("j2",),
-        ("j3",),
-    }
+    assert choices_of(result) == {("j1",), ("j2",), ("j3",)}
+
+
+def choices_of(result: brachis.Result) -> set[tuple[str, ...]]:
+    return {candidate.redundant_joints for candidate in result.candidates}
 
 
 class NoPosture:
@@ -217,64 +193,48 @@ class NoPosture:
 
 
 def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(
-    robot, monkeypatch
+    monkeypatch,
 ):
     monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
-    result = brachis.plan(robot, task())
+    result = plan()
     assert result.verified
-    assert {candidate.redundant_joints for candidate in result.candidates} == {
-        (),
-        ("j1",),
-        ("j2",),
-        ("j3",),
-    }
-    assert (
-        result.t_end <= 1.001 * brachis.plan(robot, task(redundant_joints=["j1"])).t_end
-    )
-    assert [
+    assert choices_of(result) == {(), ("j1",), ("j2",), ("j3",)}
+    assert result.t_end <= 1.001 * plan(redundant_joints=["j1"]).t_end
+    in_charts = [
         candidate.status for candidate in result.candidates if not candidate.branch
-    ] == ["from s = 0.5 on nothing"]
+    ]
+    assert in_charts == ["from s = 0.5 on nothing"]
 
 
 @pytest.mark.parametrize(
-    ("asked", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
+    ("changes", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
 )
 def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
-    robot, monkeypatch, asked, lattices
+    monkeypatch, changes, lattices
 ):
     monkeypatch.setattr(guesses, "ClosedFormLattice", NoPosture)
     monkeypatch.setattr(guesses, "PostureLattice", NoPosture)
-    result = brachis.plan(robot, task(**asked))
+    result = plan(**changes)
     assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
-    assert (
-        sum(
-            candidate.status == "from s = 0.5 on nothing"
-            for candidate in result.candidates
-        )
-        == lattices
-    )
+    statuses = [candidate.status for candidate in result.candidates]
+    assert statuses.count("from s = 0.5 on nothing") == lattices
 
 
 @pytest.mark.usefixtures("wall_clock")
-def test_a_real_ctrl_c_ends_worker_processes(robot):
+def test_a_real_ctrl_c_ends_worker_processes():
     """Pressed as soon as a motion is verified, while another process plans on."""
 
     def listener(text: str) -> None:
         if text.endswith(", verified"):
             os.kill(os.getpid(), signal.SIGINT)
 
-    asked = task(search={"effort": "exhaustive", "jobs": 2})
-    result = brachis.plan(robot, asked, listener=listener)
+    changes = task(search={"effort": "exhaustive", "jobs": 2})
+    result = brachis.plan(ROBOT, changes, listener=listener)
     assert result.verified
     assert result.interrupted
-    assert (
-        result.not_completed[-1]
-        == "the search that search.effort requires was not completed"
-    )
-    assert brachis.plan(robot, task(search={"jobs": 2})).verified, (
-        "a new search has processes again"
-    )
+    assert result.not_completed[-1] == UNFINISHED
+    assert plan(search={"jobs": 2}).verified, "a new search has processes again"
 
 
 @pytest.fixture
@@ -306,20 +266,18 @@ def splines_are_too_fast(monkeypatch):
 
 
 @pytest.mark.usefixtures("ctrl_c_before_refinement", "splines_are_too_fast")
-def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
-    robot, monkeypatch
-):
+def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(monkeypatch):
     monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
     with pytest.raises(
         KeyboardInterrupt,
         match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)",
     ):
-        brachis.plan(robot, task(spline={**FEW_POINTS, "intervals": 5}))
+        plan(spline={**FEW_POINTS, "intervals": 5})
 
 
 @pytest.mark.usefixtures("ctrl_c_before_refinement", "splines_are_too_fast")
-def test_ctrl_c_before_refinement_lengthens_the_best_motion(robot):
-    result = brachis.plan(robot, task(spline=FEW_POINTS))
+def test_ctrl_c_before_refinement_lengthens_the_best_motion():
+    result = plan(spline=FEW_POINTS)
     assert result.interrupted
     assert result.verified
     assert 1.1 < result.candidate.time_scaled <= 2.0
@@ -352,21 +310,18 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return Clock(monkeypatch)
 
 
-def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
+def test_the_time_limit_gives_the_best_motion_so_far(clock):
     calls = clock.jump(pipeline, "finish_candidate", at=1)
-    result = brachis.plan(robot, task(search={"effort": "exhaustive"}))
+    result = plan(search={"effort": "exhaustive"})
     assert len(calls) == 1
     assert result.verified
     assert result.interrupted
     assert result.to_dict()["undone"] == list(result.not_completed)
-    assert (
-        result.not_completed[-1]
-        == "the search that search.effort requires was not completed"
-    )
+    assert result.not_completed[-1] == UNFINISHED
 
 
 @pytest.mark.parametrize(
-    ("asked", "solved", "left"),
+    ("changes", "solved", "remark"),
     [
         ({}, 1, "of 2 candidates 1 not tried"),
         (BRANCH, 2, "of 5 candidates 3 not tried, 1 not finished"),
@@ -374,66 +329,66 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
 )
 @pytest.mark.usefixtures("splines_are_too_fast")
 def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
-    robot, clock, monkeypatch, asked, solved, left
+    clock, monkeypatch, changes, solved, remark
 ):
     monkeypatch.setattr(schedule, "_SIZE", 4)
     monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
     clock.jump(pipeline, "rank_candidate", at=solved)
-    result = brachis.plan(robot, task(spline=FEW_POINTS, **asked))
+    result = plan(spline=FEW_POINTS, **changes)
     assert result.interrupted
     assert not result.verified
     assert result.verification.worst_ratio > 1.0
-    tried = [each for each in result.candidates if each.status != NOT_TRIED]
+    tried = [
+        candidate for candidate in result.candidates if candidate.status != NOT_TRIED
+    ]
     assert len(tried) == solved
-    fastest = min(each.estimate for each in tried)
+    fastest = min(candidate.estimate for candidate in tried)
     assert result.t_end == pytest.approx(fastest, rel=0.1)
-    assert left in result.not_completed
+    assert remark in result.not_completed
 
 
-def test_time_is_kept_for_a_first_motion_while_nothing_is_verified(robot, clock):
+def test_time_is_kept_for_a_first_motion_while_nothing_is_verified(clock):
     clock.jump(portfolio.Search, "_rank", at=1, by=56.0)  # of 60 s
-    result = brachis.plan(robot, task())
+    result = plan()
     assert result.interrupted
     assert result.verified
     assert any("first motion alone" in text for text in result.not_completed)
 
 
-def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, clock):
+def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
     calls = clock.jump(PostureLattice, "_next", at=5)
     message = r"within the time limit of 60 s: the lattice of all postures was not searched completely; .*\. Raise"
     with pytest.raises(PlanningError, match=message):
-        brachis.plan(robot, task())
+        plan()
     assert len(calls) == 5
 
 
-def test_no_solve_begins_without_time_and_its_start_is_the_motion(robot, clock):
+def test_no_solve_begins_without_time_and_its_start_is_the_motion(clock):
     calls = clock.jump(over_time, "initial_guess", at=1)
     joints = {
         "task_space": "joints",
         "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
         "solver": {"name": "uno"},
     }
-    result = brachis.plan(robot, task(**joints))
+    result = plan(**joints)
     assert result.interrupted
     assert result.verified
     assert any("far from the fastest" in text for text in result.not_completed)
     assert len(calls) == 1
 
 
-def test_the_search_for_a_reason_ends_with_the_time(robot):
+def test_the_search_for_a_reason_ends_with_the_time():
     problem = Problem.of(
-        robot, load_task(task(path=[{"line": {"length": 3.0, "angle_deg": 0}}]))
+        ROBOT, load_task(task(path=[{"line": {"length": 3.0, "angle_deg": 0}}]))
     )
     decomposition = decompositions_of(problem, ())[0]
     assert "s = 0" in str(explain_reach(decomposition))
     assert "raise search.time_limit" in explain_reach(decomposition, Deadline(0.0))
 
 
-def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
-    robot, usual, clock
-):
+def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(usual, clock):
     clock.jump(PostureLattice, "_first_layer", at=2)
-    result = brachis.plan(robot, task(search={"effort": "thorough"}))
+    result = plan(search={"effort": "thorough"})
     assert result.verified
     assert result.interrupted
     assert (
@@ -443,19 +398,19 @@ def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
     assert len(result.candidates) == len(usual.candidates)
 
 
-def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
+def test_a_time_limit_that_is_too_short_says_what_was_left_undone(clock):
     clock.jump(schedule, "lattice_guesses", at=1)
     message = (
         r"within the time limit of 60 s: the lattice of j. \| j. was not searched completely; "
         r"of \d+ candidates \d+ not tried; .*\. Raise search\.time_limit"
     )
     with pytest.raises(PlanningError, match=message):
-        brachis.plan(robot, task(**EVERY_CHOICE))
+        plan(**EVERY_CHOICE)
 
 
-def test_starts_from_their_part_of_the_time_have_plans(robot, clock):
+def test_starts_from_their_part_of_the_time_have_plans(clock):
     clock.jump(schedule, "lattice_guesses", at=1, by=30.0)
-    result = brachis.plan(robot, task(**EVERY_CHOICE))
+    result = plan(**EVERY_CHOICE)
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
     assert any(undone.startswith("the lattice of") for undone in result.not_completed)
@@ -489,41 +444,33 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     )
 
 
-def test_within_other_workers_no_processes_start(robot):
+def test_within_other_workers_no_processes_start():
     joblib = pytest.importorskip("joblib")
     handler = signal.getsignal(signal.SIGINT)
-    asked = task(search={"jobs": 2}, redundant_joints=["j1"])
+    changes = task(search={"jobs": 2}, redundant_joints=["j1"])
     for backend in ("threading", "loky"):
-        times = joblib.Parallel(n_jobs=2, backend=backend)(
-            joblib.delayed(end_time)(robot, asked) for _ in range(2)
-        )
-        assert times[0] == pytest.approx(times[1], rel=1e-9)
+        work = [joblib.delayed(brachis.plan)(ROBOT, changes) for _ in range(2)]
+        first, second = joblib.Parallel(n_jobs=2, backend=backend)(work)
+        assert first.t_end == pytest.approx(second.t_end, rel=1e-9)
     assert signal.getsignal(signal.SIGINT) is handler
 
 
-def end_time(robot: brachis.Robot, asked: dict[str, Any]) -> float:
-    return brachis.plan(robot, asked).t_end
-
-
-def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monkeypatch):
-    ruled = usual
+def test_the_rule_that_leaves_plans_unfinished_loses_nothing(usual, monkeypatch):
     (fast,) = SEARCH_LEVELS["fast"]
-    monkeypatch.setitem(
-        SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),)
-    )
+    level = dataclasses.replace(fast, refined=100)
+    monkeypatch.setitem(SEARCH_LEVELS, "fast", (level,))
     never_enough = types.SimpleNamespace(GAIN=-100.0, END_TIME=tolerances.END_TIME)
     monkeypatch.setattr(portfolio, "tolerances", never_enough)
-    every = brachis.plan(robot, task())
-    finished = [
-        candidate for candidate in every.candidates if math.isfinite(candidate.t_end)
-    ]
-    assert len(finished) > sum(
-        math.isfinite(candidate.t_end) for candidate in ruled.candidates
+    every = plan()
+    few, finished = (
+        [candidate for candidate in result.candidates if math.isfinite(candidate.t_end)]
+        for result in (usual, every)
     )
+    assert len(finished) > len(few)
     assert all(
         candidate.t_end >= candidate.estimate * (1.0 - 1e-6) for candidate in finished
     )
-    assert ruled.t_end <= every.t_end * (1.0 + 2e-4)
+    assert usual.t_end <= every.t_end * (1.0 + 2e-4)
 
 
 def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
@@ -545,8 +492,8 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     monkeypatch.setattr(portfolio.Search, "_may_win", lambda *_: True)
     monkeypatch.setattr(pipeline, "adapt_mesh", note)
     monkeypatch.setattr(pipeline, "finish_candidate", against_faster)
-    asked = task(start="free", path_start=HERE, spline={"intervals": "auto"})
-    result = brachis.plan(robot, asked)
+    changes = task(start="free", path_start=HERE, spline={"intervals": "auto"})
+    result = brachis.plan(robot, changes)
     assert result.verified
     assert meshes == [0]
     first, *rest = tried
@@ -556,13 +503,13 @@ def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     assert all(math.isinf(each.adapted) for each in rest)
 
 
-def test_a_search_without_time_says_where_its_lattices_end(robot, clock):
-    tool = robot.tool_placement(START).translation
+def test_a_search_without_time_says_where_its_lattices_end(clock):
+    tool = ROBOT.tool_placement(START).translation
     post = brachis.Cylinder(0.1, 1.0, name="post", position=[tool[0] - 0.6, tool[1], 0])
     calls = clock.jump(schedule, "_guess_on_some_branches", at=1)
     with pytest.raises(PathError, match=r"post .*search\.time_limit") as refused:
         brachis.plan(
-            robot,
+            ROBOT,
             start=START,
             task_space=["x", "y"],
             path=[brachis.Line(by=[-1.2, 0.0])],

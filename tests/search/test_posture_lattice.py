@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.common.deadline import Deadline
@@ -18,6 +19,7 @@ from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.posture_lattice import PostureLattice
 from brachis.task import task_with
 from support.chains import planar_robot
+from support.joint_paths import check_joint_path
 from support.scara import START, problem, scara
 from support.screw_arms import seven_joints
 from support.spatial import START as RAIL_START
@@ -39,8 +41,8 @@ def line(
     )
 
 
-def joint_paths_of(given: Problem, **options: Any) -> Any:
-    return PostureLattice(given, [], **options).joint_paths(4)
+def joint_paths_of(line_problem: Problem, **options: Any) -> Any:
+    return PostureLattice(line_problem, [], **options).joint_paths(4)
 
 
 CASES = {
@@ -69,28 +71,14 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_joint_paths_are_motions_of_the_robot(case):
-    given = CASES[case]()
-    limits = given.robot.limits
-    joint_paths = joint_paths_of(given, nodes=40)
+    line_problem = CASES[case]()
+    joint_paths = joint_paths_of(line_problem, nodes=40)
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
-        q = joint_path.q
         np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
-        miss = given.task_map.difference(
-            given.task_map.values(q), given.path.sample(joint_path.s).target
-        )
-        assert np.abs(miss).max() < 1e-10
-        assert np.abs(np.diff(q, axis=0)).max() <= 0.8 + 1e-12
-        assert np.all(
-            (q >= limits.position_lower - 1e-9) & (q <= limits.position_upper + 1e-9)
-        )
-        still = np.zeros_like(q)
-        assert np.all(
-            np.abs(dynamics.torque(given.robot, q, still, still))
-            <= limits.torque + 1e-9
-        )
-        np.testing.assert_array_equal(q[0], given.start)
+        check_joint_path(line_problem, joint_path, miss=1e-10, step=0.8 + 1e-12)
+        np.testing.assert_array_equal(joint_path.q[0], line_problem.start)
 
 
 def test_gravity_and_ranges_turn_joint_paths_away():
@@ -113,17 +101,14 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
     start = [-0.919, -1.53, 2.225]
     robot = scara({"position": {"j1": [start[0] - 0.6, start[0] + 0.6]}})
     path = [{"line": {"length": 1.652, "angle_deg": 58.5}}]
-    given = problem(robot, start={"joints": start}, path=path)
-    (by_j3,) = decompositions_of(
-        problem(robot, start={"joints": start}, path=path, redundant_joints=["j3"])
-    )
+    keys = {"start": {"joints": start}, "path": path}
+    (by_j3,) = decompositions_of(problem(robot, **keys, redundant_joints=["j3"]))
     for finer in (1, 3):
-        end = ClosedFormLattice(
-            by_j3, cells_per_turn=72 * finer, density=float(finer)
-        ).joint_paths(4)
+        lattice = ClosedFormLattice(by_j3, cells_per_turn=72 * finer, density=finer)
+        end = lattice.joint_paths(4)
         assert isinstance(end, DeadEnd)
         assert 0.5 < end.s < 1.0
-    (first, *_) = joint_paths_of(given)
+    (first, *_) = joint_paths_of(problem(robot, **keys))
     assert first.q[0, 1] < 0.0 < first.q[-1, 1], "the elbow has changed its side"
 
 
@@ -131,16 +116,16 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
 def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_forms(
     angle,
 ):
-    given = problem(
+    line_problem = problem(
         scara(),
         start={"joints": START},
         path=[{"line": {"length": 1.0, "angle_deg": angle}}],
     )
     best = min(
         ClosedFormLattice(one).joint_paths(1)[0].length
-        for one in decompositions_of(given)
+        for one in decompositions_of(line_problem)
     )
-    assert joint_paths_of(given)[0].length < 1.15 * best
+    assert joint_paths_of(line_problem)[0].length < 1.15 * best
 
 
 def component(q: np.ndarray) -> int:
@@ -152,13 +137,13 @@ def component(q: np.ndarray) -> int:
     "known", [True, False], ids=["closed forms", "random postures"]
 )
 def test_a_free_start_finds_both_components_of_the_self_motion(known):
-    given = problem(
+    line_problem = problem(
         scara(),
         start="free",
         path_start=[0.5, 0.2],
         path=[{"line": {"by": [-0.3, 0.1]}}],
     )
-    decompositions = decompositions_of(given)
+    decompositions = decompositions_of(line_problem)
     expected = {
         component(joint_path.q[0])
         for one in decompositions
@@ -166,7 +151,7 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
     }
     assert expected == {-1, 1}
     joint_paths = PostureLattice(
-        given, decompositions if known else [], cells_per_turn=36
+        line_problem, decompositions if known else [], cells_per_turn=36
     ).joint_paths(6)
     for joint_path in joint_paths:
         assert len({component(q) for q in joint_path.q}) == 1
@@ -188,14 +173,14 @@ RANGE = {"position": {"j1": [START[0] - 7.0, START[0] + 13.0]}}
 def test_the_end_is_reached_in_its_own_turn(turns, reached):
     """Once round the base, so far from it that no other joint can turn in place of the first."""
     end = START + TURN * turns * np.eye(3)[0]
-    given = problem(
+    line_problem = problem(
         scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()}
     )
-    found = joint_paths_of(given, **COARSE)
-    assert isinstance(found, list) is reached
-    for joint_path in found if reached else []:
-        np.testing.assert_allclose(joint_path.q[-1], end, atol=1e-3)
-        np.testing.assert_array_equal(joint_path.q[0], START)
+    joint_paths = joint_paths_of(line_problem, **COARSE)
+    assert isinstance(joint_paths, list) is reached
+    for joint_path in joint_paths if reached else []:
+        assert_allclose(joint_path.q[-1], end, atol=1e-3)
+        assert_array_equal(joint_path.q[0], START)
 
 
 @pytest.mark.parametrize(("turns", "reached"), [(0, True), (2, True), (-1, False)])
@@ -204,25 +189,27 @@ def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
     robot = scara(RANGE)
     end = START + TURN * turns * np.eye(3)[0]
     path_start = robot.tool_placement(end).translation[:2].tolist()
-    given = problem(
+    line_problem = problem(
         robot,
         path=CIRCLE,
         start="free",
         path_start=path_start,
         end={"joints": end.tolist()},
     )
-    found = joint_paths_of(given, **COARSE)
-    assert isinstance(found, list) is reached
-    for joint_path in found if reached else []:
-        np.testing.assert_array_equal(joint_path.q[-1], end)
+    joint_paths = joint_paths_of(line_problem, **COARSE)
+    assert isinstance(joint_paths, list) is reached
+    for joint_path in joint_paths if reached else []:
+        assert_array_equal(joint_path.q[-1], end)
         assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(TURN, abs=1.6)
 
 
 LATTICES = {
-    "of all postures": lambda given: PostureLattice(
-        given, decompositions_of(given), density=0.2
+    "of all postures": lambda line_problem: PostureLattice(
+        line_problem, decompositions_of(line_problem), density=0.2
     ),
-    "of a closed form": lambda given: ClosedFormLattice(*decompositions_of(given)),
+    "of a closed form": lambda line_problem: ClosedFormLattice(
+        *decompositions_of(line_problem)
+    ),
 }
 
 
@@ -236,8 +223,8 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
 
     def end_of(turns):
         circle = [{"circle": {"center": [0.0, 0.0], "turns": turns * way}}]
-        given = problem(robot, start="free", path_start=here, path=circle)
-        return lattice(given).joint_paths(4)
+        line_problem = problem(robot, start="free", path_start=here, path=circle)
+        return lattice(line_problem).joint_paths(4)
 
     joint_paths = end_of(1.5)
     assert all(
@@ -251,20 +238,19 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
 
 
 def test_the_same_seed_gives_the_same_joint_paths():
-    given = CASES["r = 2, 4R"]()
-    first, again, other = (
+    line_problem = CASES["r = 2, 4R"]()
+    first, again, changed = (
         joint_paths_of(
-            dataclasses.replace(given, task=task_with(given.task, seed=seed)), nodes=60
+            dataclasses.replace(
+                line_problem, task=task_with(line_problem.task, seed=seed)
+            ),
+            nodes=60,
         )
         for seed in (3, 3, 4)
     )
-    assert len(first) == len(again)
-    for one, two in zip(first, again, strict=True):
-        np.testing.assert_allclose(one.q, two.q, atol=1e-9)
-    assert any(
-        np.abs(one.q - two.q).max() > 1e-6
-        for one, two in zip(first, other, strict=False)
-    )
+    gaps = [np.abs(a.q - b.q).max() for a, b in zip(first, again, strict=True)]
+    assert max(gaps) <= 1e-9
+    assert np.abs(first[0].q - changed[0].q).max() > 1e-6
 
 
 def test_no_layer_is_begun_after_the_deadline():
@@ -277,18 +263,17 @@ def test_no_layer_is_begun_after_the_deadline():
     [
         ([-0.45, 0.77, -1.3, -1.0], [-0.24, 0.14, -0.77, 0.43]),
         ([1.02, 0.68, -0.4, -0.15, -0.4], [0.22, -0.32, 0.07, -0.83, -0.8]),
-        ([-1.39, 1.0, -1.34, 0.98], [-2.24, 1.46, -1.74, 1.52]),
     ],
-    ids=["four joints", "five joints", "four joints, folded"],
+    ids=["four joints", "five joints"],
 )
 def test_a_given_end_is_reached_with_several_redundant_joints(start, end):
     """To wait, and to leap to the end at last, is no longer: but the leap would be too large."""
     robot = planar_robot("CCCCC"[: len(start)])
     tool = [robot.tool_placement(np.array(q)).translation[:2] for q in (start, end)]
     by = (tool[1] - tool[0]).tolist()
-    given = line(robot, start, by, end={"joints": end})
-    joint_paths = PostureLattice(given, [], nodes=60).joint_paths(4)
+    line_problem = line(robot, start, by, end={"joints": end})
+    joint_paths = PostureLattice(line_problem, [], nodes=60).joint_paths(4)
     assert isinstance(joint_paths, list)
     assert joint_paths
-    np.testing.assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)
+    assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)
     assert np.abs(np.diff(joint_paths[0].q, axis=0)).max() <= 0.8

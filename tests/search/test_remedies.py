@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -13,39 +12,32 @@ from brachis.errors import PlanningError, Remedy
 from brachis.robot.from_task import robot_for
 from brachis.search import remedies as module
 from brachis.search.hopeless import round_to_three_digits
-
-SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
+from brachis.task import task_with
 
 
 @pytest.fixture
 def task():
-    content = {
-        "brachis": 1,
-        "robot": {
-            "urdf": str(SCARA),
-            "limits": {"torque": 10.0},
-            "payload": {"mass": 8.0},
-        },
-        "start": {"joints": [0.5, -2.1, 2.1]},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"by": [0.0, 1.0]}}],
-        "boundary": {"end_speed": 0.9},
-    }
-    return brachis.load_task(content)
+    return task_with(
+        robot={"urdf": "scara3"},
+        limits={"torque": 10.0},
+        payload={"mass": 8.0},
+        start=[0.5, -2.1, 2.1],
+        task_space=["x", "y"],
+        path=brachis.Line(by=[0.0, 1.0]),
+        end_speed=0.9,
+    )
 
 
 def hint(task, remedies, is_planned, *, seconds=60.0) -> str:
     """Return the hint where `is_planned` says of a changed task, a deadline and a number of batches what is planned."""
     error = PlanningError("no motion", hint="Try another path").with_remedies(*remedies)
-    robot = robot_for(None, task.robot)
+
+    def replaced(_robot, changed, _families, _limits, *rest):
+        return is_planned(changed, *rest)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            module,
-            "is_planned",
-            lambda _robot, changed, _families, _limits, *rest: is_planned(
-                changed, *rest
-            ),
-        )
+        patch.setattr(module, "is_planned", replaced)
+        robot = robot_for(None, task.robot)
         module.try_remedies(error, robot, task, [], [], Deadline.after(seconds))
     assert str(error).endswith(error.hint)
     return error.hint
@@ -143,20 +135,15 @@ def test_a_payload_is_no_advice_where_the_posture_alone_is_wrong(more):
 @pytest.mark.parametrize("way", ["plan", "plan_many", "sweep"])
 def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
     trials = []
-    monkeypatch.setattr(
-        "brachis.search.remedies.is_planned", lambda *_: bool(trials.append(1))
+    monkeypatch.setattr(module, "is_planned", lambda *_: bool(trials.append(1)))
+    task = task_with(
+        robot={"urdf": "scara3"},
+        gravity=[0.0, -9.81, 0.0],
+        limits={"torque": [200.0, 300.0, 300.0]},
+        start=[0.5, -2.1, 2.1],
+        task_space=["x", "y"],
+        path=brachis.Line(by=[0.0, 0.5]),
     )
-    task = {
-        "brachis": 1,
-        "robot": {
-            "urdf": str(SCARA),
-            "gravity": [0.0, -9.81, 0.0],
-            "limits": {"torque": [200.0, 300.0, 300.0]},
-        },
-        "start": {"joints": [0.5, -2.1, 2.1]},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"by": [0.0, 0.5]}}],
-    }
     if way == "plan":
         with pytest.raises(brachis.errors.StartError) as caught:
             brachis.plan(task)
@@ -165,7 +152,7 @@ def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
         (error,) = brachis.plan_many([task])
         message = str(error)
     else:
-        sweep = {"sweep": 1, "task": task, "rows": [{"spline.degree": 3}]}
+        sweep = {"sweep": 1, "task": task.to_dict(), "rows": [{"spline.degree": 3}]}
         (row,) = brachis.sweep(sweep, tmp_path / "out", jobs=1).rows()
         message = row["message"]
     assert "Raise robot.limits.torque.j1 (how far is not known)" in message

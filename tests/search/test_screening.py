@@ -7,14 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from brachis import examples
+from brachis import Line, examples
 from brachis.common.deadline import NEVER, Deadline
 from brachis.optimise.retiming import COARSE, ROUGH
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
 from brachis.search import guesses as module
 from brachis.search import screening
-from brachis.task import load_task
+from brachis.task import load_task, task_with
 from support.scara import scara
 
 MOST = 2
@@ -27,14 +27,11 @@ def quiet(_text: str) -> None:
 @pytest.fixture(scope="module")
 def guesses():
     """Guesses of a task with a free start posture, as the lattice gives them."""
-    task = load_task(
-        {
-            "brachis": 1,
-            "start": "free",
-            "path_start": [1.2, 0.4],
-            "task_space": ["x", "y"],
-            "path": [{"line": {"by": [-1.2, 0.9]}}],
-        }
+    task = task_with(
+        start="free",
+        path_start=[1.2, 0.4],
+        task_space=["x", "y"],
+        path=Line(by=[-1.2, 0.9]),
     )
     problem = Problem.of(scara(), task)
     (level,) = module.SEARCH_LEVELS["fast"]
@@ -44,10 +41,9 @@ def guesses():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "screen", lambda guesses, *_others: guesses)
         patch.setattr(module, "random_joint_paths", lambda *_arguments: [])
-        found = module.chart_guesses(problem, decompositions_of(problem), many)
-    assert isinstance(found, list)
-    assert len(found) > MOST
-    return found[:12]
+        every = module.chart_guesses(problem, decompositions_of(problem), many)
+    assert len(every) > MOST
+    return every[:12]
 
 
 def test_the_fastest_that_differ_pass(guesses):

@@ -11,6 +11,8 @@ from brachis.robot.from_task import robot_for
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_ANSWER, DeadEnd, reaches
 from brachis.search.posture_lattice import PostureLattice
+from brachis.task import task_with
+from support.effort import QUICK
 
 TURNS = [
     ("tx90l_rail", [0.6, -0.2, 0.5], [180, 0, 0], [0, 0.4, 0], [0, 0, 1], 120.0, 0.01),
@@ -21,29 +23,26 @@ TURNS = [
 """Robot, beginning, direction of the line with its length, axis and angle of the turn, and the length it takes, m."""
 
 
-def task(robot, position, turned, line, axis, angle, length, **search):
+def task(robot, position, turned, line, axis, angle, length):
     line = np.array(line)
     share = length / np.linalg.norm(line)
     parts = ((0.5 - 0.5 * share, 10.0), (share, angle), (0.5 - 0.5 * share, 10.0))
     segments = [
         {
-            "line": {"by": (part * line).tolist()},
+            "line": {"by": part * line},
             "orientation": {"rotate": {"axis": axis, "angle_deg": turn}},
             "blend": 0.2 * length,
         }
         for part, turn in parts
     ]
     del segments[-1]["blend"]
-    return brachis.load_task(
-        {
-            "brachis": 1,
-            "robot": {"urdf": robot},
-            "start": "free",
-            "path_start": {"position": position, "rpy_deg": turned},
-            "task_space": "pose",
-            "path": segments,
-            "search": {"effort": "single", "least_motion": False, **search},
-        }
+    return task_with(
+        robot={"urdf": robot},
+        start="free",
+        path_start={"position": position, "rpy_deg": turned},
+        task_space="pose",
+        path=segments,
+        **QUICK,
     )
 
 

@@ -1,5 +1,6 @@
 """Waypoints from CSV files: what a task makes of them, and what every mistake is told."""
 
+import itertools
 import json
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from brachis.errors import TaskError
 from brachis.path import build_path
 from brachis.robot.task_map.protocol import POSE_ROWS
-from brachis.task import load_task
+from brachis.task import load_task, task_with
 from brachis.task.segments import SplineSegment, SplineThrough
 from support.poses import pose
 
@@ -33,17 +34,23 @@ def write(header, rows, name="poses.csv"):
     Path(name).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def task(space="pose", **keys):
-    segment = {"csv": {"file": "poses.csv"} | keys}
-    return load_task(
-        {"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": [segment]}
-    )
+def task(space="pose", beside=None, **keys):
+    segment = {"csv": {"file": "poses.csv"} | keys, **(beside or {})}
+    return task_with(start=[0], task_space=space, path=[segment])
 
 
-def spline_of(one):
-    (segment,) = one.path
-    assert isinstance(segment, SplineSegment)
+def spline_of(task):
+    (segment,) = task.path
     return segment.spline
+
+
+def turns_of(spline):
+    """The orientations at the start and at all waypoints."""
+    return [spline.starts_oriented, *(spline.orientations or ())]
+
+
+def tuples(rows):
+    return tuple(map(tuple, rows.tolist()))
 
 
 def path_of(one, position, turn):
@@ -53,43 +60,27 @@ def path_of(one, position, turn):
 def test_quaternions():
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
     spline = spline_of(task())
-    assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
-    given = [one.quaternion_wxyz for one in spline.orientations or ()]
-    assert_allclose(given, QUATERNIONS[1:], atol=1e-15)
-    assert spline.starts_at == tuple(POINTS[0].tolist())
-    assert spline.starts_oriented is not None
-    assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
+    assert (spline.starts_at, *spline.through) == tuples(POINTS)
+    quaternions = [turn.quaternion_wxyz for turn in turns_of(spline)]
+    assert_allclose(quaternions, QUATERNIONS, atol=1e-15)
     assert not spline.relative
 
 
 def test_rotation_vectors_in_any_order_of_columns():
     write("rz,ry,rx,z,y,x", np.hstack([POINTS, TURNS.as_rotvec()])[:, ::-1])
     spline = spline_of(task("pose_free_roll", orientation="rotation_vector"))
-    assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
-    assert spline.starts_oriented is not None
+    assert spline.through == tuples(POINTS[1:])
     assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
 
 
 def test_positions_alone_leave_the_orientation_to_the_segment():
     write("x,y,z", POINTS)
-    segment = {"csv": {"file": "poses.csv"}, "orientation": "tangent", "blend": 0.01}
-    line = {"line": {"by": [0.1, 0, 0]}}
-    made = load_task(
-        {
-            "brachis": 1,
-            "start": {"joints": [0]},
-            "task_space": "pose",
-            "path": [segment, line],
-        }
-    )
-    through = tuple(map(tuple, POINTS[1:].tolist()))
-    spline = SplineThrough(through=through, starts_at=tuple(POINTS[0].tolist()))
-    (report,) = made.fits
-    spline = spline.model_copy(update={"fit": report})
-    assert (report.source, report.points, report.profile) == ("poses.csv", 4, ())
-    assert made.path[0] == SplineSegment(
-        spline=spline, orientation="tangent", blend=0.01
-    )
+    made = task(beside={"orientation": "tangent"})
+    (fit,) = made.fits
+    assert (fit.source, fit.points, fit.profile) == ("poses.csv", 4, ())
+    first, *through = tuples(POINTS)
+    spline = SplineThrough(through=through, starts_at=first, fit=fit)
+    assert made.path == (SplineSegment(spline=spline, orientation="tangent"),)
     path_of(made, POINTS[0], TURNS[0])
 
 
@@ -117,9 +108,7 @@ def test_the_file_is_relative_to_the_task_file():
     write("x,y,z", POINTS, "tasks/poses.csv")
     text = "{brachis: 1, robot: {urdf: a}, start: {joints: [0]}, task_space: pose, path: [{csv: {file: poses.csv}}]}"
     Path("tasks/task.yaml").write_text(text, encoding="utf-8")
-    assert spline_of(load_task("tasks/task.yaml")).through == tuple(
-        map(tuple, POINTS[1:].tolist())
-    )
+    assert spline_of(load_task("tasks/task.yaml")).through == tuples(POINTS[1:])
     Path("tasks/poses.csv").unlink()
     with pytest.raises(TaskError) as caught:
         load_task("tasks/task.yaml")
@@ -137,10 +126,9 @@ def test_what_spreadsheets_write_is_read():
 
 def test_poses_on_the_spot():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS[[0, 0, 0, 0]], TURNS.as_rotvec()]))
-    sample = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0]).sample(
-        [0.0, 1.0]
-    )
-    assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
+    path = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0])
+    last = path.sample([1.0]).target[0]
+    assert_allclose(last, pose(POINTS[0], TURNS[-1]), atol=1e-12)
 
 
 MISTAKES = [
@@ -269,21 +257,10 @@ def test_unreadable_files():
 
 def test_one_word_on_the_orientation():
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    segment = {
-        "csv": {"file": "poses.csv", "orientation": "rotation_vector"},
-        "orientation": "fixed",
-    }
     with pytest.raises(
         TaskError, match=r"path\[0\].orientation: the points already have orientations"
     ):
-        load_task(
-            {
-                "brachis": 1,
-                "start": {"joints": [0]},
-                "task_space": "pose",
-                "path": [segment],
-            }
-        )
+        task(orientation="rotation_vector", beside={"orientation": "fixed"})
 
 
 EULER = {
@@ -300,13 +277,9 @@ def test_angles_of_the_makers_are_read(convention):
     columns, axes = EULER[convention]
     header = "x,y,z," + ",".join(f"{name}_deg" for name in columns.split(","))
     write(header, np.hstack([POINTS, TURNS.as_euler(axes, degrees=True)]))
-    spline = spline_of(task(orientation=convention))
-    turns = [
-        one.quaternion_wxyz
-        for one in (spline.starts_oriented, *(spline.orientations or ()))
-        if one is not None
-    ]
-    assert_allclose(turns, QUATERNIONS, atol=1e-12)
+    turns = turns_of(spline_of(task(orientation=convention)))
+    quaternions = [turn.quaternion_wxyz for turn in turns]
+    assert_allclose(quaternions, QUATERNIONS, atol=1e-12)
 
 
 def test_the_tools_axis_leaves_the_roll_open():
@@ -314,14 +287,12 @@ def test_the_tools_axis_leaves_the_roll_open():
     axes = TURNS.apply([0.0, 0.0, 1.0])
     write("x,y,z,i,j,k", np.hstack([POINTS, axes]))
     spline = spline_of(task("pose_free_roll"))
-    assert spline.starts_oriented is not None
-    turns = [
-        one.rotation for one in (spline.starts_oriented, *(spline.orientations or ()))
-    ]
-    for turn, axis in zip(turns, axes, strict=True):
-        assert_allclose(turn.apply([0.0, 0.0, 1.0]), axis, atol=1e-12)
-    for one, other, axis in zip(turns, turns[1:], axes, strict=False):
-        assert (other * one.inv()).as_rotvec() @ axis == pytest.approx(0.0, abs=1e-12)
+    turns = [turn.rotation for turn in turns_of(spline)]
+    tool_axes = [turn.apply([0.0, 0.0, 1.0]) for turn in turns]
+    assert_allclose(tool_axes, axes, atol=1e-12)
+    for (before, after), axis in zip(itertools.pairwise(turns), axes, strict=False):
+        roll = (after * before.inv()).as_rotvec() @ axis
+        assert roll == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(
         TaskError, match=r"i, j, k give the tool's axis, .*allowed: .*pose_free_roll"
     ):
@@ -344,7 +315,6 @@ def test_the_error_names_wrong_axes(rows, message):
 def test_a_tool_that_points_down_may_stay_so():
     write("x,y,z,i,j,k", np.hstack([POINTS, np.tile([0.0, 0.0, -1.0], (4, 1))]))
     spline = spline_of(task("pose_free_roll"))
-    assert spline.starts_oriented is not None
     down = spline.starts_oriented.rotation.apply([0.0, 0.0, 1.0])
     assert_allclose(down, [0.0, 0.0, -1.0], atol=1e-12)
     assert set(spline.orientations or ()) == {spline.starts_oriented}
@@ -360,7 +330,6 @@ def test_quaternions_of_numbered_columns():
     given = spline_of(task(orientation="quaternion_wxyz")).starts_oriented
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, TURNS.as_quat()]))
     assert given == spline_of(task(orientation="quaternion_xyzw")).starts_oriented
-    assert given is not None
     assert_allclose(given.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
 
 

@@ -12,7 +12,7 @@ from brachis import robots
 from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_for, robot_from_settings
-from brachis.task import RobotSettings, load_task, read_limits
+from brachis.task import RobotSettings, load_task, read_limits, task_with
 
 ROOT = Path(__file__).parents[2]
 FILE = {
@@ -27,30 +27,33 @@ FILE = {
 def load_beside(tmp_path):
     """Load a task whose robot part is given, beside a limits file."""
 
-    def load(robot, **changes):
-        (tmp_path / "limits.yaml").write_text(
-            yaml.safe_dump(FILE | changes), encoding="utf-8"
-        )
-        task = {
-            "brachis": 1,
-            "robot": {
-                "urdf": str(ROOT / "robots/scara3/robot.urdf"),
-                "limits_file": "limits.yaml",
-                **robot,
-            },
-            "start": {"joints": [0.5, -2.0, 2.0]},
-            "task_space": ["x", "y"],
-            "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
-        }
+    def load(robot=None, **changes):
+        (tmp_path / "limits.yaml").write_text(yaml.safe_dump(FILE | changes))
+        beside = {"urdf": "scara3", "limits_file": "limits.yaml"}
+        line = brachis.Line(length=0.5, angle_deg=90)
+        task = task_with(start=[0.5, -2.0, 2.0], task_space=["x", "y"], path=line)
+        content = {**task.to_dict(), "robot": beside | (robot or {})}
         path = tmp_path / "task.yaml"
-        path.write_text(yaml.safe_dump(task), encoding="utf-8")
+        path.write_text(yaml.safe_dump(content))
         return load_task(path)
 
     return load
 
 
+@pytest.fixture
+def robot_beside(load_beside, tmp_path):
+    """Build the robot of a task beside a limits file with this text."""
+
+    def build(text, **robot):
+        (tmp_path / "joint_limits.yaml").write_text(text)
+        task = load_beside({"limits_file": "joint_limits.yaml", **robot})
+        return robot_from_settings(task.robot)
+
+    return build
+
+
 def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(load_beside):
-    limits = load_beside({}).robot.limits
+    limits = load_beside().robot.limits
     assert limits.torque == {"j1": 5.0, "j2": 6.0, "j3": (-7.0, 8.0)}
     assert limits.acceleration == {"j1": 20.0, "j2": 20.0, "j3": 20.0}
     assert limits.velocity == {"j2": 2.0}
@@ -71,7 +74,7 @@ def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(load_be
 
 
 def test_a_loaded_task_needs_the_file_no_more(load_beside):
-    task = load_beside({})
+    task = load_beside()
     assert task.robot.limits_file is None
     assert load_task(task.to_dict()) == task
 
@@ -111,7 +114,7 @@ def test_a_program_reads_the_file_too(tmp_path):
 )
 def test_the_error_names_the_key_of_a_wrong_file(load_beside, changes, message):
     with pytest.raises(InputError, match=message):
-        load_beside({}, **yaml.safe_load(changes))
+        load_beside(None, **yaml.safe_load(changes))
 
 
 def test_files_that_are_none(tmp_path, load_beside):
@@ -128,7 +131,7 @@ def test_files_that_are_none(tmp_path, load_beside):
 
 
 def test_the_error_names_joints_that_the_robot_does_not_have(load_beside):
-    task = load_beside({}, joints=["a1", "j2", "j3"], limits={"torque": 5})
+    task = load_beside(None, joints=["a1", "j2", "j3"], limits={"torque": 5})
     with pytest.raises(UnknownNameError, match="'a1'"):
         robot_from_settings(task.robot)
 
@@ -139,7 +142,7 @@ def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(load_beside
         "total_power": 70,
         "torque_speed": {"j2": [[0, 20], [2, 10]]},
     }
-    assert load_beside({}, limits=limits).robot.limits.total_power == 70.0
+    assert load_beside(None, limits=limits).robot.limits.total_power == 70.0
     robot = robot_from_settings(
         load_beside({"limits": {"total_power": 50}}, limits=limits).robot
     )
@@ -219,20 +222,16 @@ def test_a_file_of_moveit_is_read(load_beside, tmp_path):
 @pytest.mark.parametrize(
     "names", [SHORT, tuple(name.removesuffix("_joint") + "_joint" for name in SHORT)]
 )
-def test_a_file_of_universal_robots_is_read(load_beside, tmp_path, names):
-    (tmp_path / "ur.yaml").write_text(UR.format(*names), encoding="utf-8")
-    ur = {"urdf": str(ROOT / "robots/ur10_rail/robot.urdf"), "limits_file": "ur.yaml"}
-    robot = robot_from_settings(
-        load_beside({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot
-    )
-    assert_array_equal(robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6])
-    assert_array_equal(robot.limits.torque[1:], [150.0] * 5 + [28.0])
-    assert_array_equal(robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0]))
-    assert (
-        robot_from_settings(load_beside({**ur, "locked_joints": {"rail": 0.0}}).robot).n
-        == 6
-    )
-    robot = robot_from_settings(load_beside(ur).robot)
+def test_a_file_of_universal_robots_is_read(robot_beside, names):
+    text = UR.format(*names)
+    limits = {"velocity": {"rail": 0.7}}
+    limits = robot_beside(text, urdf="ur10_rail", limits=limits).limits
+    assert_array_equal(limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6])
+    assert_array_equal(limits.torque[1:], [150.0] * 5 + [28.0])
+    assert_array_equal(limits.position_upper[[1, 3]], np.radians([360.0, 180.0]))
+    locked = {"locked_joints": {"rail": 0.0}}
+    assert robot_beside(text, urdf="ur10_rail", **locked).n == 6
+    robot = robot_beside(text, urdf="ur10_rail")
     assert robot.limits.velocity[0] == robot.urdf_limits[0].velocity
 
 
@@ -274,15 +273,10 @@ def test_a_file_of_universal_robots_is_read(load_beside, tmp_path, names):
     ],
     ids=str,
 )
-def test_a_wrong_file_of_moveit_is_refused_with_its_key(
-    load_beside, tmp_path, changes, words
-):
+def test_a_wrong_file_of_moveit_is_refused_with_its_key(robot_beside, changes, words):
     assert changes[0] in MOVEIT
-    (tmp_path / "joint_limits.yaml").write_text(
-        MOVEIT.replace(*changes), encoding="utf-8"
-    )
     with pytest.raises(InputError) as caught:
-        load_beside({"limits_file": "joint_limits.yaml"})
+        robot_beside(MOVEIT.replace(*changes))
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
@@ -318,14 +312,9 @@ def test_a_task_may_limit_joints_that_stand_still_of_a_robot_that_has_limits():
     [{"urdf": "a\0b"}, {"urdf": "."}, {"tool_frame": [1]}, {"locked_joints": 5}],
     ids=str,
 )
-def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(
-    load_beside, tmp_path, wrong
-):
-    (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
+def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(robot_beside, wrong):
     with pytest.raises(InputError):
-        robot_from_settings(
-            load_beside({"limits_file": "joint_limits.yaml", **wrong}).robot
-        )
+        robot_beside(MOVEIT, **wrong)
 
 
 def test_a_task_is_not_a_limits_file(load_beside):
@@ -337,16 +326,13 @@ def test_a_task_is_not_a_limits_file(load_beside):
 
 
 def test_joints_that_a_file_of_moveit_leaves_out_have_the_limits_of_the_urdf(
-    load_beside, tmp_path
+    robot_beside,
 ):
     text = "joint_limits:\n  j2: {max_velocity: 5}\n"
-    (tmp_path / "joint_limits.yaml").write_text(text, encoding="utf-8")
-    robot = robot_from_settings(load_beside({"limits_file": "joint_limits.yaml"}).robot)
-    ours, _, theirs = robot.urdf_limits
-    expected = [ours.velocity, 5.0, theirs.velocity]
+    robot = robot_beside(text)
+    first, _, last = robot.urdf_limits
+    expected = [first.velocity, 5.0, last.velocity]
     assert_array_equal(robot.limits.velocity, expected)
-    more = text + "".join(f"  {name}: {{max_velocity: 5}}\n" for name in ("j7", "j9"))
-    (tmp_path / "joint_limits.yaml").write_text(more, encoding="utf-8")
-    task = load_beside({"limits_file": "joint_limits.yaml"})
+    unknown = "".join(f"  {name}: {{max_velocity: 5}}\n" for name in ("j7", "j9"))
     with pytest.raises(UnknownNameError, match="no joint named 'j7' or 'j9'"):
-        robot_from_settings(task.robot)
+        robot_beside(text + unknown)

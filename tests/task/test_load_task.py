@@ -51,14 +51,14 @@ refinement: {tolerance: 1.0e-4, density: 10, max_rounds: 10}
 
 
 def minimal(**changes):
-    task = {
-        "brachis": 1,
-        "start": {"joints": [0.1, 0.2, 0.3]},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
-        "redundant_joints": ["j3"],
-    }
-    return task | changes
+    task = """
+    brachis: 1
+    start: {joints: [0.1, 0.2, 0.3]}
+    task_space: [x, y]
+    path: [{line: {length: 1.0, angle_deg: 90}}]
+    redundant_joints: [j3]
+    """
+    return yaml.safe_load(task) | changes
 
 
 def written(folder, text):
@@ -82,23 +82,15 @@ def complete(tmp_path):
 
 
 def test_a_complete_file_is_read(complete, tmp_path):
-    assert complete.robot.urdf == str(
-        tmp_path.parent / "robots" / "scara3" / "robot.urdf"
-    )
-    assert complete.robot.limits.torque == {"j1": 10.0, "j2": None}
-    assert complete.robot.limits.position == {"j1": (-1.0, 1.0), "j2": None}
-    assert complete.robot.friction.viscous == (0.1, 0.2, 0.0)
-    assert complete.path[0].blend == 0.1
-    assert complete.path[1].shape == LineBy(by=(1.0, 2.0))
-    assert [segment.kind for segment in complete.path] == [
-        "line",
-        "line",
-        "line",
-        "arc",
-        "arc",
-        "circle",
-        "spline",
-    ]
+    robot, path = complete.robot, complete.path
+    assert robot.urdf == str(tmp_path.parent / "robots/scara3/robot.urdf")
+    assert robot.limits.torque == {"j1": 10.0, "j2": None}
+    assert robot.limits.position == {"j1": (-1.0, 1.0), "j2": None}
+    assert robot.friction.viscous == (0.1, 0.2, 0.0)
+    assert path[0].blend == 0.1
+    assert path[1].shape == LineBy(by=(1.0, 2.0))
+    kinds = "line line line arc arc circle spline"
+    assert [segment.kind for segment in path] == kinds.split()
     assert complete.solver.tolerance == 1e-6  # YAML 1.1 would read the string '1e-6'
 
 
@@ -225,10 +217,6 @@ MISTAKES = [
         r"robot.limits.torque: .*found '10' \(a string\).*a number > 0",
     ),
     (
-        "robot: {limits: {torque: true}}",
-        r"robot.limits.torque: .*found true \(a boolean\)",
-    ),
-    (
         "robot: {limits: {torque: 0}}",
         "robot.limits.torque: out of range; found 0; allowed: > 0",
     ),
@@ -264,13 +252,11 @@ MISTAKES = [
         "robot: {limits: {scale: {torque: 0}}}",
         "robot.limits.scale.torque: out of range.*> 0",
     ),
-    ("robot: {gravity: [0, 0]}", r"robot.gravity\[2\]: the list is too short"),
     (
         "robot: {gravity: [0, 0, .inf]}",
         r"robot.gravity\[2\]: not a finite number; found inf",
     ),
     ("search: {slower: 150 %}", "search.slower: out of range; found 1.5.*<= 1"),
-    ("search: {slower: 1.5}", "search.slower: out of range; found 1.5; allowed: <= 1"),
     (
         "search: {slower: 0.1, least_motion: false}",
         "search.slower: a slower motion is possible only with least_motion: true.*least_motion: true",
@@ -282,10 +268,6 @@ MISTAKES = [
     (
         "robot: {friction: {viscous: -1}}",
         "robot.friction.viscous: out of range; found -1; allowed: >= 0",
-    ),
-    (
-        "robot: {friction: {coulomb_velocity: 0}}",
-        "coulomb_velocity: out of range; found 0; allowed: > 0",
     ),
     ("robot: 3", "robot: wrong type; found 3; allowed: a mapping"),
     ("start: {joints: []}", "start.joints: too few items.*at least 1"),
@@ -306,7 +288,6 @@ MISTAKES = [
         r"task_space\[1\]: not one of the allowed values; found 'w'.*'yaw'",
     ),
     ("task_space: poze", r"found 'poze'.*Did you mean 'pose'\?"),
-    ("task_space: pose_free_rol", r"Did you mean 'pose_free_roll'\?"),
     ("search: {effort: fas}", r"found 'fas'.*Did you mean 'fast'\?"),
     ("task_space: poses", "task_space: .*found 'poses'.*pose_free_roll"),
     ("path: []", "path: too few items"),
@@ -325,10 +306,6 @@ MISTAKES = [
     (
         "path: [{arc: {via: [1], center: [1]}}]",
         r"path\[0\].arc: an arc needs exactly one of its forms",
-    ),
-    (
-        "path: [{line: {to: ['1', 0]}}]",
-        r"path\[0\].line.to\[0\]: wrong type; found '1' \(a string\)",
     ),
     ("path: [{line: {length: 1}}]", r"path\[0\].line.angle_deg: this key is required"),
     (
@@ -386,10 +363,6 @@ MISTAKES = [
         "spline.intervals: knots: free needs a number of intervals.*12, or knots: uniform",
     ),
     (
-        "spline: {intervals: auto, knots: free}",
-        "spline.intervals: knots: free needs a number of intervals.*12, or knots: uniform",
-    ),
-    (
         "spline: {intervals: 3}",
         "spline.intervals: out of range; found 3; allowed: >= 4",
     ),
@@ -414,7 +387,6 @@ MISTAKES = [
         "robot.limits.torque_rate.*'urdf'",
     ),
     ("solver: {name: ''}", "solver.name: the string is empty"),
-    ("solver: {time_limit: 0}", "solver.time_limit: out of range"),
     (
         "refinement: {density: 9}",
         "refinement.density: out of range; found 9; allowed: >= 10",
@@ -453,19 +425,13 @@ def test_an_array_of_mistakes_does_not_fill_the_screen():
 
 
 def test_all_mistakes_are_in_one_message(tmp_path):
-    text = (
-        COMPLETE.replace("0.9", ".nan")
-        .replace("to: [1, 2]", "to: [1, x]")
-        .replace("uno", "3")
-    )
-    file = written(tmp_path, text)
-    lines = str(error_of(file)).splitlines()
-    assert lines[0] == f"{file}: 3 mistakes"
+    text = COMPLETE.replace("0.9", ".nan").replace("to: [1, 2]", "to: [1, x]")
+    file = written(tmp_path, text.replace("uno", "3"))
+    first, *lines = str(error_of(file)).splitlines()
+    assert first == f"{file}: 3 mistakes"
     keys = ["robot.limits.scale.torque", "path[0].line.to[1]", "solver.name"]
-    assert [
-        line.startswith(f"  {file}: {key}: ")
-        for line, key in zip(lines[1:], keys, strict=True)
-    ] == [True] * 3
+    for line, key in zip(lines, keys, strict=True):
+        assert line.startswith(f"  {file}: {key}: ")
 
 
 LAUGHS = "a0: &a0 [1]\n" + "".join(

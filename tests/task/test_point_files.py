@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.errors import TaskError
 from brachis.path import build_path
-from brachis.task import load_task
+from brachis.task import load_task, task_with
 from brachis.task.segments import BSplineSegment, SplineSegment
 from support.seams import bent, wave
 
@@ -24,52 +25,42 @@ def write(rows, header="x_mm,y_mm,z_mm", name="seam.csv"):
     np.savetxt(name, rows, fmt="%.9f", header=header, delimiter=",", comments="")
 
 
-def task(
-    name="seam.csv",
-    space="position",
-    beside=None,
-    **keys,
-):
-    segment = {
-        "csv": {"file": name, "tolerance": {"position": "0.1 mm"}, **keys},
-        **(beside or {}),
-    }
-    return load_task(
-        {"brachis": 1, "start": "free", "task_space": space, "path": [segment]}
-    )
+def task(name="seam.csv", space="position", beside=None, **keys):
+    csv = {"file": name, "tolerance": {"position": "0.1 mm"}, **keys}
+    segments = [{"csv": csv, **(beside or {})}]
+    return task_with(start="free", task_space=space, path=segments)
 
 
 def test_a_file_becomes_a_curve_that_needs_it_no_more():
     write(1e3 * wave(2_000, 0.01 * MM))
     made = task()
-    (segment,) = made.path
-    assert isinstance(segment, BSplineSegment)
+    (segment,), (fit,) = made.path, made.fits
     assert made.path_start == segment.bspline.control_points[0]
-    (fit,) = made.fits
     assert (fit.source, fit.points, fit.corners) == ("seam.csv", 2_000, ())
     assert 0.0 < fit.position_error <= 0.1 * MM
     assert fit.told[0] == "length in mm, as the header says"
     assert fit.told[1].startswith("positions that scatter by 0.01")
     Path("seam.csv").unlink()
-    assert load_task(json.loads(json.dumps(made.to_dict(), allow_nan=False))) == made
+    assert_comes_back(made)
     assert str(fit).startswith("seam.csv: 2000 points along 1007.4 mm, ")
     assert "no corners; length in mm" in str(fit)
+
+
+def assert_comes_back(task):
+    assert load_task(json.loads(json.dumps(task.to_dict(), allow_nan=False))) == task
 
 
 def test_corners_become_blends():
     write(1e3 * bent(900, 0.005 * MM)[0])
     made = task()
-    assert [segment.blend is None for segment in made.path] == [False, False, True]
-    assert [corner.blend for corner in made.fits[0].corners] == [
-        segment.blend for segment in made.path[:-1]
-    ]
-    assert f"2 corners blended: {made.fits[0].corners[0]}, " in str(made.fits[0])
-    assert " deg at row 30" in str(made.fits[0].corners[0])
-    wider = task(tolerance={"position": "0.1 mm", "corner": "1 mm"})
-    assert all(
-        one.blend < other.blend
-        for one, other in zip(made.fits[0].corners, wider.fits[0].corners, strict=True)
-    )
+    (fit,) = made.fits
+    blends = [corner.blend for corner in fit.corners]
+    assert [segment.blend for segment in made.path] == [*blends, None]
+    assert f"2 corners blended: {fit.corners[0]}, " in str(fit)
+    assert " deg at row 30" in str(fit.corners[0])
+    (wider,) = task(tolerance={"position": "0.1 mm", "corner": "1 mm"}).fits
+    for corner, blend in zip(wider.corners, blends, strict=True):
+        assert corner.blend > blend
 
 
 def sharp(*, turn_back=False):
@@ -86,22 +77,18 @@ def test_the_tool_stops_at_corners(tolerance, turn_back):
     rows = sharp(turn_back=turn_back)
     write(rows)
     made = task(corner="stop", tolerance=tolerance)
-    assert load_task(json.loads(json.dumps(made.to_dict(), allow_nan=False))) == made
-    assert [(part.stop, part.blend) for part in made.path] == [
-        (True, None),
-        (False, None),
-    ]
+    assert_comes_back(made)
+    assert [segment.stop for segment in made.path] == [True, False]
+    assert {segment.blend for segment in made.path} == {None}
     (fit,) = made.fits
-    assert [corner.blend for corner in fit.corners] == [0.0]
-    assert fit.corners[0].row == 42
-    assert fit.corners[0].distance == pytest.approx(0.2, abs=1e-6)
+    (corner,) = fit.corners
+    assert (corner.blend, corner.row) == (0.0, 42)
+    assert corner.distance == pytest.approx(0.2, abs=1e-6)
     angle = 180 if turn_back else 90
     assert f"1 corner at which the tool stops: {angle} deg at row 42" in str(fit)
     path = build_path(made.path, rows[0] * MM, ["x", "y", "z"])
-    (stop,) = path.stops
-    np.testing.assert_allclose(
-        path.sample([stop]).target[0], rows[40] * MM, atol=1e-9 if tolerance else 1e-12
-    )
+    (place,) = path.sample(path.stops).target
+    assert_allclose(place, rows[40] * MM, atol=1e-9 if tolerance else 1e-12)
 
 
 def test_the_path_passes_the_first_point_after_a_corner():
@@ -123,20 +110,11 @@ def test_a_turn_back_without_a_stop_is_an_error():
 
 def test_the_end_of_a_file_may_be_a_stop():
     write(sharp())
-    csv = {"file": "seam.csv", "tolerance": {"position": "0.1 mm"}, "corner": "stop"}
-    made = load_task(
-        {
-            "brachis": 1,
-            "start": "free",
-            "task_space": "position",
-            "path": [{"csv": csv, "dwell": 0.5}, {"line": {"by": [0.0, 0.0, 0.1]}}],
-        }
-    )
-    assert [(part.stop, part.dwell) for part in made.path] == [
-        (True, 0.0),
-        (True, 0.5),
-        (False, 0.0),
-    ]
+    seam = {"csv": {"file": "seam.csv", "corner": "stop"}, "dwell": 0.5}
+    up = {"line": {"by": [0.0, 0.0, 0.1]}}
+    path = task_with(start="free", task_space="position", path=[seam, up]).path
+    assert [segment.stop for segment in path] == [True, True, False]
+    assert [segment.dwell for segment in path] == [0.0, 0.5, 0.0]
 
 
 def test_a_curve_keeps_feed_rates():
@@ -159,28 +137,14 @@ def test_gcode_is_known_by_its_suffix():
 
 
 def test_rough_files_are_named_as_such():
-    write(wave(2_000), "x,y,z", "smooth.csv")
-    segment = {"csv": {"file": "rough.csv"}}
-    Path("rough.csv").write_text(
-        "\n".join(
-            [
-                "x,y,z",
-                *(",".join(f"{value:.6f}" for value in row) for row in wave(2_000)),
-            ]
-        ),
-        encoding="utf-8",
-    )
+    np.savetxt("rough.csv", wave(2_000), "%.6f", ",", header="x,y,z", comments="")
     with pytest.raises(
         TaskError,
         match=r"rough.csv: the points are too rough .*rounded to 1e-06 m at 0.\d+ mm spacing",
     ):
-        load_task(
-            {"brachis": 1, "start": "free", "task_space": "position", "path": [segment]}
-        )
-    assert (
-        task("rough.csv", tolerance={"position": "0.01 mm"}).fits[0].position_error
-        <= 0.01 * MM
-    )
+        task("rough.csv", tolerance=None)
+    (fit,) = task("rough.csv", tolerance={"position": "0.01 mm"}).fits
+    assert fit.position_error <= 0.01 * MM
 
 
 WRONG = [
@@ -219,17 +183,20 @@ def test_a_turn_cannot_go_on_over_corners():
         task(space="pose", beside=turn, relative=False)
 
 
-def test_the_error_names_a_bad_row():
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            np.nan,
+            r"seam.csv: line 323: the value of column y_mm is not a finite number; found 'nan'",
+        ),
+        (40.0, r"seam.csv: line 323: the point is an outlier"),
+    ],
+    ids=str,
+)
+def test_the_error_names_a_bad_row(change, message):
     rows = 1e3 * wave(500)
-    rows[321, 1] = np.nan
+    rows[321, 1] += change
     write(rows)
-    with pytest.raises(
-        TaskError,
-        match=r"seam.csv: line 323: the value of column y_mm is not a finite number; found 'nan'",
-    ):
-        task()
-    rows = 1e3 * wave(500)
-    rows[321, 1] += 40.0
-    write(rows)
-    with pytest.raises(TaskError, match=r"seam.csv: line 323: the point is an outlier"):
+    with pytest.raises(TaskError, match=message):
         task()

@@ -4,16 +4,15 @@ import pytest
 import yaml
 
 from brachis.errors import TaskError
-from brachis.task import load_task
+from brachis.task import load_task, task_with
 
 UP = {"line": {"by": [0.0, 0.1]}}
 
 
-def task(**keys):
-    path = [{"line": {"by": [0.1, 0.0]}, **keys}, UP]
-    return load_task(
-        {"brachis": 1, "start": {"joints": [0]}, "task_space": ["x", "y"], "path": path}
-    )
+def task(last=None, **keys):
+    right = {"line": {"by": [0.1, 0.0]}, **keys}
+    path = [right, UP | (last or {})]
+    return task_with(start=[0], task_space=["x", "y"], path=path)
 
 
 def test_a_dwell_is_a_stop():
@@ -49,18 +48,9 @@ def test_what_is_no_stop_is_refused_with_its_key(keys, where, said):
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize("keys", [{"stop": True}, {"dwell": 1.0}])
+@pytest.mark.parametrize("keys", [{"stop": True}, {"dwell": 1.0}], ids=str)
 def test_the_last_segment_ends_the_motion_anyway(keys):
-    path = [UP, {**UP, **keys}]
-    written = next(iter(keys))
-    with pytest.raises(
-        TaskError, match=rf"path\[1\].{written}: the last .*boundary.end_speed"
-    ):
-        load_task(
-            {
-                "brachis": 1,
-                "start": {"joints": [0]},
-                "task_space": ["x", "y"],
-                "path": path,
-            }
-        )
+    (key,) = keys
+    message = rf"path\[1\].{key}: the last .*boundary.end_speed"
+    with pytest.raises(TaskError, match=message):
+        task(last=keys)

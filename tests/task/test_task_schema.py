@@ -11,32 +11,24 @@ jsonschema = pytest.importorskip("jsonschema")
 
 
 def task(**changes):
-    segments = [
-        {"line": {"to": [1, 2]}, "blend": 0.1},
-        {"line": {"length": 1.0, "angle_deg": 90}},
-        {"arc": {"center": [1, 2], "angle_deg": 90, "yaw": "tangent"}},
-        {"arc": {"via": [1, 2], "to": [3, 4]}},
-        {"circle": {"center": [1, 2], "turns": -2}},
-        {"spline": {"through": [[1, 2], [3, 4]]}},
-    ]
-    limits = {
-        "torque": {"j1": 10, "j2": None},
-        "velocity": None,
-        "acceleration": 2,
-        "position": [[-1, 1]],
-    }
-    return {
-        "brachis": 1,
-        "robot": {
-            "urdf": "robot.urdf",
-            "limits": limits,
-            "friction": {"viscous": [0, 1]},
-        },
-        "start": {"joints": {"j1": 0.5}},
-        "end": "free",
-        "task_space": ["x", "y"],
-        "path": segments,
-    } | changes
+    content = """
+    brachis: 1
+    robot:
+      urdf: robot.urdf
+      limits: {torque: {j1: 10, j2: null}, velocity: null, acceleration: 2, position: [[-1, 1]]}
+      friction: {viscous: [0, 1]}
+    start: {joints: {j1: 0.5}}
+    end: free
+    task_space: [x, y]
+    path:
+    - {line: {to: [1, 2]}, blend: 0.1}
+    - line: {length: 1.0, angle_deg: 90}
+    - arc: {center: [1, 2], angle_deg: 90, yaw: tangent}
+    - arc: {via: [1, 2], to: [3, 4]}
+    - circle: {center: [1, 2], turns: -2}
+    - spline: {through: [[1, 2], [3, 4]]}
+    """
+    return yaml.safe_load(content) | changes
 
 
 @pytest.fixture(scope="module")
@@ -45,21 +37,6 @@ def validator():
     cls = jsonschema.validators.validator_for(schema)
     cls.check_schema(schema)
     return cls(schema)
-
-
-DYNAMICS = {
-    "urdf": "robot.urdf",
-    "payload": {"mass": 2, "inertia": {"ixx": 1, "iyy": 1, "izz": 1}},
-    "tool_offset": {"xyz": [0, 0, 0.1]},
-    "mounting": "wall",
-    "speed_override": "50 %",
-    "friction": {
-        "viscous": None,
-        "coulomb": "urdf",
-        "rotor_inertia": 1e-4,
-        "gear_ratio": {"j1": 100},
-    },
-}
 
 
 @pytest.mark.parametrize(

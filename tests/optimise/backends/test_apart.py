@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.optimise.backends import (
     SolverOptions,
@@ -54,14 +55,14 @@ def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch
     monkeypatch.setattr(child_process, "ENTRIES", 10)
     near = solve(progress=lambda *call: calls["here"].append(call), name=name)
     assert calls["here"]
-    np.testing.assert_allclose(
+    assert_allclose(
         calls["apart"], calls["here"], atol=1e-6
     )  # another process may have other BLAS threads
     for entry in dataclasses.fields(far):
         if entry.name != "wall_time":
             there, here = getattr(far, entry.name), getattr(near, entry.name)
             if np.asarray(here).dtype.kind == "f":
-                np.testing.assert_allclose(there, here, atol=1e-6)
+                assert_allclose(there, here, atol=1e-6)
             else:
                 assert there == here
 
@@ -88,7 +89,7 @@ def test_a_small_problem_that_is_silent_for_long_ends(monkeypatch):
     report = solve(SolverOptions(apart=True))
     assert report.status is SolveStatus.STALLED
     assert report.message == "ended: a subproblem took too long"
-    np.testing.assert_array_equal(report.x, START)
+    assert_array_equal(report.x, START)
     assert not own_children()
 
 
@@ -97,7 +98,7 @@ def test_a_solver_that_does_not_come_back_ends_with_its_time(monkeypatch):
     report = solve(SolverOptions(time_limit=0.1))
     assert report.status is SolveStatus.TIME_LIMIT
     assert report.message == "ended: it did not finish in time"
-    np.testing.assert_array_equal(report.x, START)
+    assert_array_equal(report.x, START)
     assert report.violation == 0.0, "the start is feasible, and stays"
     assert not own_children()
 
@@ -116,7 +117,7 @@ def test_what_a_solve_had_found_before_it_was_ended_is_its_answer(monkeypatch):
     report = solve(SolverOptions(time_limit=0.3))
     assert report.status is SolveStatus.TIME_LIMIT
     assert disc().objective(better) < disc().objective(START)
-    np.testing.assert_array_equal(report.x, better)
+    assert_array_equal(report.x, better)
     assert report.objective == disc().objective(better)
     assert not own_children()
 

@@ -12,6 +12,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import UnknownNameError
@@ -31,6 +32,8 @@ from support.solvers import INSTALLED
 
 ROOT = Path(__file__).parents[3]
 OPTIONS = SolverOptions()
+STARTS = ([4.9, 1.2], [1.5, 1.3], [2.0, 2.6], [1.2, 1.05], [1.2, 0.3])
+"""Within the disc, from where trial points leave it."""
 
 
 @pytest.fixture(params=INSTALLED)
@@ -40,14 +43,16 @@ def name(request):
 
 def solve(name, problem, x, options=OPTIONS, progress=None):
     (backend,) = solvers_for(name)
-    return backend.solve(problem, np.array(x, dtype=float), options, progress)
+    start = np.array(x, dtype=float)
+    report = backend.solve(problem, start, options, progress)
+    np.testing.assert_array_equal(start, x)
+    return report
 
 
 @pytest.mark.parametrize(
     ("make", "start", "optimum", "multipliers"),
     [
         (disc, [4.0, 0.5], [1.0, 1.0], [-0.25]),
-        (disc, [9.0, 9.0], [1.0, 1.0], [-0.25]),
         (corner, [0.0, 0.0], [3.0, 1.0], [1.0 / 3.0, 2.0 / 3.0]),
         (under_hyperbola, [1.0, 3.0], [4.0, 0.5], [0.25]),
         (nearest_in_disc, [3.0, 0.5], [4.2, 2.6], [-0.75]),
@@ -59,12 +64,12 @@ def test_known_optima(name, make, start, optimum, multipliers):
     assert report.status is SolveStatus.OPTIMAL
     assert report.status.usable
     assert report.solver == name
-    np.testing.assert_allclose(report.x, optimum, atol=1e-4)
+    assert_allclose(report.x, optimum, atol=1e-4)
     assert report.objective == problem.objective(report.x)
     assert report.violation == residual(problem, report.x) <= 1e-5
     assert report.iterations >= 1
     assert report.wall_time > 0.0
-    np.testing.assert_allclose(report.multipliers, multipliers, atol=1e-4)
+    assert_allclose(report.multipliers, multipliers, atol=1e-4)
 
 
 def test_large_bounds_are_held_as_exactly_as_others(name):
@@ -81,32 +86,26 @@ def test_large_bounds_are_held_as_exactly_as_others(name):
     report = solve(name, problem, [100.0, 200.0])
     assert report.status.usable
     assert report.violation <= 1e-5
-    np.testing.assert_allclose(report.x, [120.0, 220.0], atol=1e-3)
+    assert_allclose(report.x, [120.0, 220.0], atol=1e-3)
 
 
 # At (2, 1) the objective stands still while the row comes true.
 def test_optimal_means_that_first_order_conditions_hold(name):
     report = solve(name, under_hyperbola(), [1.0, 1.0])
     if report.status is SolveStatus.OPTIMAL:
-        np.testing.assert_allclose(report.x, [4.0, 0.5], atol=1e-4)
+        assert_allclose(report.x, [4.0, 0.5], atol=1e-4)
     else:
         assert report.status is SolveStatus.ACCEPTABLE
-
-
-def test_start_is_not_overwritten(name):
-    start = np.array([4.0, 0.5])
-    solvers_for(name)[0].solve(disc(), start, OPTIONS, None)
-    np.testing.assert_array_equal(start, [4.0, 0.5])
 
 
 @pytest.mark.parametrize("edge", [0.99, 0.9])
 def test_backs_off_from_points_without_values(name, edge):
     refusals = 0
-    for start in ([4.9, 1.2], [1.5, 1.3], [2.0, 2.6], [1.2, 1.05], [1.2, 0.3]):
+    for start in STARTS:
         problem = disc(reachable=lambda x: x[0] > edge)
         report = solve(name, problem, start)
         assert report.status.usable
-        np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-3)
+        assert_allclose(report.x, [1.0, 1.0], atol=1e-3)
         refusals += problem.refusals
     assert refusals, "no trial point was beyond the edge: the test shows nothing"
 
@@ -228,9 +227,7 @@ def test_registry(is_installed, interior, monkeypatch):
     ("problem", "x", "expected"),
     [
         (disc(), [3.0, 1.0], 0.0),
-        (disc(), [1.0, 1.0], 0.0),
         (disc(), [0.0, 1.0], 5.0),
-        (disc(), [60.0, 1.0], 57.0**2 - 4.0),
         (disc(), [-51.0, 1.0], 54.0**2 - 4.0),
         (disc(), [np.nan, 1.0], np.inf),
         (disc(reachable=lambda _x: False), [3.0, 1.0], np.inf),
@@ -250,10 +247,10 @@ def test_backs_off_from_points_whose_rows_are_not_finite(name, bad):
         seen.append(x[0] < 0.9)
         return np.array([bad if seen[-1] else (x[0] - 3.0) ** 2 + (x[1] - 1.0) ** 2])
 
-    for start in ([4.9, 1.2], [1.5, 1.3], [2.0, 2.6], [1.2, 1.05], [1.2, 0.3]):
+    for start in STARTS:
         report = solve(name, dataclasses.replace(disc(), row_values=rows), start)
         assert report.status.usable
-        np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-3)
+        assert_allclose(report.x, [1.0, 1.0], atol=1e-3)
     assert any(seen), "no trial point was bad: the test shows nothing"
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.optimise.backends import Curvature, SolverOptions, solvers_for
 from brachis.optimise.backends.secant import SecantHessian
@@ -56,7 +57,7 @@ def solve(known: float | None):
 def test_the_optimum_on_an_ellipsoid_is_found_in_few_iterations(known):
     report = solve(known)
     assert report.status.usable
-    np.testing.assert_allclose(COSTS @ report.x, COSTS @ OPTIMUM, rtol=1e-7)
+    assert_allclose(COSTS @ report.x, COSTS @ OPTIMUM, rtol=1e-7)
     assert report.iterations < 0.5 * solve(None).iterations
 
 
@@ -73,9 +74,9 @@ def test_steps_teach_the_missing_curvature():
         step = rng.normal(size=SIZE)
         x = x + step
         found = hessian(x, 1.0, multipliers)
-    np.testing.assert_allclose(found @ step, exact @ step, rtol=1e-9)
+    assert_allclose(found @ step, exact @ step, rtol=1e-9)
     # A restoration teaches nothing.
-    np.testing.assert_allclose(hessian(x + step, 0.0, multipliers), found, rtol=1e-12)
+    assert_allclose(hessian(x + step, 0.0, multipliers), found, rtol=1e-12)
 
 
 def test_no_eigenvalue_is_negative():
@@ -91,10 +92,10 @@ def test_without_multipliers_the_last_ones_count():
     problem = ellipsoid(1.0)
     hessian = SecantHessian(problem, problem.curvature(None))
     none = np.zeros(1)
-    np.testing.assert_allclose(hessian(np.zeros(SIZE), 1.0, none), 2.0 * SQUARES)
+    assert_allclose(hessian(np.zeros(SIZE), 1.0, none), 2.0 * SQUARES)
     hessian(np.ones(SIZE), 1.0, np.array([-3.0]))
     again = hessian(np.ones(SIZE), 1.0, none)
-    np.testing.assert_allclose(again, 6.0 * SQUARES, rtol=1e-9)
+    assert_allclose(again, 6.0 * SQUARES, rtol=1e-9)
 
 
 def test_in_a_restoration_the_objective_keeps_some_curvature():
@@ -103,7 +104,7 @@ def test_in_a_restoration_the_objective_keeps_some_curvature():
     hessian = SecantHessian(problem, known)
     for factor, part in ((1.0, 1.0), (0.0, 0.01)):
         found = hessian(np.zeros(SIZE), factor, np.zeros(1))
-        np.testing.assert_allclose(found, part * SQUARES, atol=1e-12)
+        assert_allclose(found, part * SQUARES, atol=1e-12)
 
 
 def test_what_one_solve_learnt_the_next_one_knows():
@@ -112,7 +113,7 @@ def test_what_one_solve_learnt_the_next_one_knows():
     multipliers = np.array([-1.0])
     hessian = SecantHessian.of(problem, np.zeros(SIZE), learnt)
     found = hessian(np.zeros(SIZE), 1.0, multipliers)
-    np.testing.assert_allclose(found, 2.0 * SQUARES, atol=1e-12)
+    assert_allclose(found, 2.0 * SQUARES, atol=1e-12)
 
 
 def test_what_a_hessian_raises_comes_out():

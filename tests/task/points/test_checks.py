@@ -21,7 +21,8 @@ MM = 1e-3
 
 
 def spikes(position):
-    refuse_spikes(points(position), scatter_of(points(position)), 0.05 * MM)
+    seam = points(position)
+    refuse_spikes(seam, scatter_of(seam), 0.05 * MM)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.02])

@@ -3,22 +3,12 @@
 The full count, 60, is ``benchmarks/winding_paths.py``.
 """
 
-import importlib
-from pathlib import Path
-
 import pytest
-
-BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
-
-
-@pytest.fixture
-def winding_paths(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    return importlib.import_module("winding_paths")
 
 
 @pytest.mark.parametrize("seed", [1, 5, 14, 20, 23, 28, 30, 37, 54])
-def test_winding_paths_are_fitted_with_few_knots(winding_paths, seed):
+def test_winding_paths_are_fitted_with_few_knots(bench, seed):
+    winding_paths = bench("winding_paths")
     path = winding_paths.winding_path(seed, most_points=2_000)
     curves, intervals = winding_paths.fit(path)
     of_points, of_curve = winding_paths.deviations(path, curves, sides=2_000, count=500)
@@ -28,9 +18,8 @@ def test_winding_paths_are_fitted_with_few_knots(winding_paths, seed):
     assert intervals <= 12 * path.turns
 
 
-def test_a_raster_with_round_turns_takes_knots_where_it_bends(
-    winding_paths,
-):
+def test_a_raster_with_round_turns_takes_knots_where_it_bends(bench):
+    winding_paths = bench("winding_paths")
     path = winding_paths.winding_path(45, most_points=2_000)
     assert path.kind == "raster"
     curves, intervals = winding_paths.fit(path)
