@@ -43,6 +43,23 @@ def test_the_same_curves(degree, old, new, seed):
     np.testing.assert_allclose(after, before, atol=1e-13)
 
 
+@pytest.mark.parametrize("degree", range(2, 8))
+def test_very_short_intervals_leave_the_curves_as_they_are(degree):
+    rng = np.random.default_rng(degree)
+    for _ in range(50):
+        lengths = 10.0 ** rng.uniform(-4.0, 0.0, 6)
+        breaks = np.append(0.0, np.cumsum(lengths) / lengths.sum())
+        breaks[-1] = 1.0
+        finer = np.union1d(breaks, rng.uniform(0.0, 1.0, 3))
+        knots, fine_knots = (clamped_knots(degree, ends) for ends in (breaks, finer))
+        points = rng.normal(size=(2, len(breaks) - 1 + degree))
+        inserted = insert_knots(points, knots, fine_knots, degree)
+        t = rng.uniform(0.0, 1.0, 100)
+        before = BSpline(knots, points.T, degree)(t)
+        after = BSpline(fine_knots, inserted.T, degree)(t)
+        np.testing.assert_allclose(after, before, atol=1e-8)
+
+
 @pytest.mark.parametrize("degree", range(2, 7))
 def test_basis_derivatives_are_differences(degree):
     padded = np.pad(LENGTHS, degree - 1)

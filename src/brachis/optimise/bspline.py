@@ -194,6 +194,9 @@ def insert_knots(
     (c, N' + d) ndarray
     """
     new = np.arange(len(finer) - degree - 1)
-    interval = np.searchsorted(knots, finer[new], side="right") - 1
+    # A polynomial far from its own interval would lose all digits: the middle knot's interval is the nearest.
+    middle = finer[new + (degree + 1) // 2]
+    interval = np.searchsorted(knots, middle, side="right") - 1
+    interval = np.clip(interval, degree, len(knots) - degree - 2)
     arguments = [finer[new + level] for level in range(1, degree + 1)]
     return blossom(knots, control_points.T, interval, arguments).T
