@@ -35,7 +35,7 @@ from brachis.optimise.retiming import ROUGH
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
 from brachis.search import guesses, pipeline, screening
-from brachis.search.joint_path import LatticePath, sampling_box
+from brachis.search.joint_path import PosturePath, sampling_box
 from brachis.search.over_path import CHARTS
 from brachis.search.stages import Marks, RankedCandidate
 from brachis.search.stations import spread_stations
@@ -120,7 +120,7 @@ def plan(content: Any, effort: str, seconds: float) -> tuple[float, float]:
     return t_end, processor_time() - began
 
 
-def random_joint_paths(problem: Problem, rng: np.random.Generator) -> list[LatticePath]:
+def random_joint_paths(problem: Problem, rng: np.random.Generator) -> list[PosturePath]:
     """Carry random postures along the path, each leaning to a side of its own; no more than RESTARTS."""
     newton = Newton(problem.task_map)
     s = spread_stations(problem, 97)
@@ -144,7 +144,7 @@ def random_joint_paths(problem: Problem, rng: np.random.Generator) -> list[Latti
     q = np.swapaxes(postures, 0, 1)
     is_within = (q >= limits.position_lower) & (q <= limits.position_upper)
     good = np.flatnonzero(np.isfinite(q).all(axis=(1, 2)) & is_within.all(axis=(1, 2)))
-    return [LatticePath(problem, s, q[k], 0.0) for k in good]
+    return [PosturePath(problem, s, q[k], 0.0) for k in good]
 
 
 def restart(content: Any) -> tuple[float, list[float]]:

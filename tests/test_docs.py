@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 import brachis
+from support.scripts import load_script
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -21,10 +22,7 @@ MOST_BYTES = 1_000_000
 
 @pytest.fixture(scope="module")
 def pages():
-    spec = importlib.util.spec_from_file_location("make_pages", DOCS / "make_pages.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("docs/make_pages.py")
 
 
 def test_generated_pages_are_up_to_date(pages):

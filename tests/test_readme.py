@@ -19,6 +19,7 @@ import yaml
 import brachis
 from brachis.task import check_robot_settings
 from support.command_line import code_of, interrupts_kept
+from support.scripts import load_script
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -38,13 +39,6 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(
         rf"^```{language}\n(.*?)^```", page.read_text(), flags=re.DOTALL | re.MULTILINE
     )
-
-
-def load(path: Path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 PAGES = [
@@ -109,19 +103,19 @@ def look(command: list[str | Path]) -> None:
 
 
 def test_task_commands_exist():
-    tasks = load(ROOT / "tasks.py")
+    tasks = load_script("tasks.py")
     for task in re.findall(r"python3 tasks\.py (\w+)", README):
         assert task in tasks.COMMANDS
 
 
 def test_example_01_python(capsys):
-    result = load(ROOT / "examples/01_scara_line.py").main()
+    result = load_script("examples/01_scara_line.py").main()
     assert result.verified
     assert "end time 2.47" in capsys.readouterr().out
 
 
 def test_example_02(monkeypatch):
-    module = load(ROOT / "examples/02_scara_table.py")
+    module = load_script("examples/02_scara_table.py")
     monkeypatch.setattr(module, "ANGLES_DEG", (90,))  # one of the lines, for time
     results = module.plan_all()
     assert len(results) == 3
@@ -171,7 +165,7 @@ def test_the_robot_part_of_a_page_is_one(clone):
 
 
 def test_example_03(monkeypatch):
-    module = load(ROOT / "examples/03_tx90l_rail_line.py")
+    module = load_script("examples/03_tx90l_rail_line.py")
     monkeypatch.setattr(module, "JOINTS", ("rail",))  # one of the lines, for time
     results = module.plan_all()
     assert len(results) == 3
@@ -193,7 +187,7 @@ def test_example_04():
 
 
 def test_example_05(monkeypatch):
-    module = load(ROOT / "examples/05_panda_circle.py")
+    module = load_script("examples/05_panda_circle.py")
     monkeypatch.setattr(
         module, "JOINTS", module.JOINTS[:2]
     )  # of both families, for time
@@ -210,14 +204,14 @@ def test_example_06(monkeypatch):
     # Which of equally fast motions it is does not matter here.
     fastest = functools.partial(brachis.plan, least_motion=False)
     monkeypatch.setattr(brachis, "plan", fastest)
-    results = load(ROOT / "examples/06_free_roll.py").main()
+    results = load_script("examples/06_free_roll.py").main()
     assert all(result.verified for result in results.values())
     assert results["free roll"].t_end < results["fixed"].t_end
     assert results["free roll"].trajectory.joint_names[-1] == "tool_roll"
 
 
 def test_example_07(monkeypatch):
-    module = load(ROOT / "examples/07_find_the_fastest.py")
+    module = load_script("examples/07_find_the_fastest.py")
     monkeypatch.setattr(module, "ANGLES_DEG", (45, 180))  # some of the lines, for time
     results = module.plan_all()
     assert all(result.verified for result in results.values())
@@ -236,7 +230,7 @@ def test_example_07(monkeypatch):
 
 def test_example_08(tmp_path):
     figure = tmp_path / "fit.png"
-    result = load(ROOT / "examples/08_cam_seam.py").main(str(figure))
+    result = load_script("examples/08_cam_seam.py").main(str(figure))
     (fit,) = result.fits
     assert result.verified
     assert fit.points == 20_000
@@ -246,7 +240,7 @@ def test_example_08(tmp_path):
 
 
 def test_example_09():
-    results = load(ROOT / "examples/09_payload_friction_jerk.py").main()
+    results = load_script("examples/09_payload_friction_jerk.py").main()
     assert all(result.verified for result in results.values())
     times = [result.t_end for result in results.values()]
     assert times == sorted(times)
@@ -254,7 +248,7 @@ def test_example_09():
 
 
 def test_example_10():
-    module = load(ROOT / "examples/10_periodic_circle.py")
+    module = load_script("examples/10_periodic_circle.py")
     results = module.main()
     assert all(result.verified for result in results.values())
     page = (DOCS / "phases.md").read_text()
@@ -267,7 +261,7 @@ def test_example_10():
 
 def test_example_11():
     pytest.importorskip("toppra")
-    result, least = load(ROOT / "examples/11_from_toppra.py").main()
+    result, least = load_script("examples/11_from_toppra.py").main()
     assert result.verified
     assert result.verification.worst_ratio <= 1 + 1e-4
     assert result.t_end == pytest.approx(least, rel=2e-3)
@@ -282,7 +276,7 @@ def test_example_11():
 
 
 def test_example_12(tmp_path):
-    found = load(ROOT / "examples/12_today.py").main(tmp_path / "today.png")
+    found = load_script("examples/12_today.py").main(tmp_path / "today.png")
     assert found.result.verified
     page = (ROOT / "docs/today.md").read_text()
     printed = re.search(
@@ -322,12 +316,12 @@ def test_examples_of_cells(name, changes):
 
 
 def test_published_figure_lies_between_16_and_17_intervals():
-    benchmark = load(ROOT / "studies/published_figure.py")
+    benchmark = load_script("studies/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)
 
 
 def test_task_reference_is_up_to_date():
-    reference = load(ROOT / "docs/make_task_reference.py")
+    reference = load_script("docs/make_task_reference.py")
     assert reference.PAGE.read_text() == reference.page(), (
         "run python docs/make_task_reference.py"
     )
@@ -376,5 +370,5 @@ def test_what_the_commands_need_is_installed_by_what_the_readme_says():
         "no command of the README needs these"
     )
     assert asked <= set(extras)
-    assert load(ROOT / "tasks.py").INSTALL["demo"] == ".[all]"
+    assert load_script("tasks.py").INSTALL["demo"] == ".[all]"
     assert 'pip install ".[all]"' in README

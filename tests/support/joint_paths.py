@@ -6,11 +6,11 @@ import numpy as np
 
 from brachis.problem.problem import Problem
 from brachis.robot import dynamics
-from brachis.search.joint_path import LatticePath
+from brachis.search.joint_path import PosturePath
 
 
 def check_joint_path(
-    problem: Problem, joint_path: LatticePath, *, miss: float, step: float
+    problem: Problem, joint_path: PosturePath, *, miss: float, step: float
 ) -> None:
     """Check that it is on the path, continuous, within the ranges, and of postures that the torques hold."""
     q, limits = joint_path.q, problem.robot.limits

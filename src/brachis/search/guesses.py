@@ -30,7 +30,7 @@ from brachis.search.joint_path import (
     NO_CHART,
     NO_TIME,
     DeadEnd,
-    LatticePath,
+    PosturePath,
     sampling_box,
 )
 from brachis.search.lattice import LARGEST_STEP
@@ -173,7 +173,7 @@ def _take_guesses(
     return dead_end
 
 
-def _smooth(joint_path: LatticePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _smooth(joint_path: PosturePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; at last linear interpolation."""
     s = joint_path.s
     # More finely than at the lattice's stations.
@@ -189,7 +189,7 @@ def _smooth(joint_path: LatticePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def _guess_on_branch(
-    decomposition: Decomposition, joint_path: LatticePath, origin: str
+    decomposition: Decomposition, joint_path: PosturePath, origin: str
 ) -> InitialGuess:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
@@ -332,7 +332,7 @@ def chart_guesses(
 
 def random_joint_paths(
     problem: Problem, count: int, deadline: Deadline = NEVER
-) -> list[LatticePath]:
+) -> list[PosturePath]:
     """Carry random postures, or a given one, along the path; each drifts to a side at random.
 
     Parameters
@@ -345,7 +345,7 @@ def random_joint_paths(
 
     Returns
     -------
-    list of LatticePath
+    list of PosturePath
         From and to the given ends, within the ranges; limits at rest may be exceeded by 20 %.
     """
     rng = np.random.default_rng(problem.task.search.seed)
@@ -381,7 +381,7 @@ def random_joint_paths(
         remaining -= length
     posture_limits = [limit for limit in problem.limits if limit.at_rest == "posture"]
     allowed = (
-        LatticePath(problem, s, postures[::step], np.inf)
+        PosturePath(problem, s, postures[::step], np.inf)
         for postures in paths
         if all(limit.holds_at_rest(postures, _NEARLY).all() for limit in posture_limits)
     )
@@ -389,7 +389,7 @@ def random_joint_paths(
 
 
 def guess_in_chart(
-    newton: Newton, joint_path: LatticePath, origin: str
+    newton: Newton, joint_path: PosturePath, origin: str
 ) -> InitialGuess | None:
     """Smooth a joint path, lay a chart around it, and estimate its time; None if no chart can follow it."""
     problem = joint_path.problem

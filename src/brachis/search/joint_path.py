@@ -26,7 +26,7 @@ _TRIES = 1000
 
 
 @dataclass(frozen=True)
-class LatticePath:
+class PosturePath:
     """Postures along the path.
 
     Attributes
@@ -84,7 +84,7 @@ class DeadEnd:
         return f"{place} {self.cause}"
 
 
-def distinct(joint_paths: Sequence[LatticePath], count: int) -> list[int]:
+def distinct(joint_paths: Sequence[PosturePath], count: int) -> list[int]:
     """Choose up to `count` joint paths: the shortest one, and others far from those chosen.
 
     The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
@@ -92,7 +92,7 @@ def distinct(joint_paths: Sequence[LatticePath], count: int) -> list[int]:
 
     Parameters
     ----------
-    joint_paths : sequence of LatticePath
+    joint_paths : sequence of PosturePath
         The shortest one first, at least one.
     count : int
 

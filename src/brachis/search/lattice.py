@@ -40,7 +40,7 @@ from brachis.search.joint_path import (
     NO_TIME,
     OTHER_BRANCH,
     DeadEnd,
-    LatticePath,
+    PosturePath,
     distinct,
     least_excess,
     leaving_range,
@@ -219,7 +219,7 @@ class Lattice(ABC):
     def _at_end(self, last: Layer) -> np.ndarray:
         """Tell which nodes of the last layer, (K,) bool, meet the given end posture."""
 
-    def joint_paths(self, count: int) -> list[LatticePath] | DeadEnd:
+    def joint_paths(self, count: int) -> list[PosturePath] | DeadEnd:
         """Find joint paths along the path.
 
         Parameters
@@ -229,7 +229,7 @@ class Lattice(ABC):
 
         Returns
         -------
-        list of LatticePath or DeadEnd
+        list of PosturePath or DeadEnd
             Distinct ones, the shortest first, or where the lattice ends.
         """
         rng = np.random.default_rng(self.problem.task.search.seed)
@@ -264,7 +264,7 @@ class Lattice(ABC):
         in_order = np.array(traced if self._backwards else traced[::-1])
         q = in_order.swapaxes(0, 1) + TURN * self._turn_of(last)[:, None]
         joint_paths = [
-            LatticePath(self.problem, self.s, postures, float(length), int(branch))
+            PosturePath(self.problem, self.s, postures, float(length), int(branch))
             for postures, length, branch in zip(
                 q, last.length, last.branch, strict=True
             )
@@ -405,8 +405,8 @@ class Lattice(ABC):
         return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
 
     def _choose(
-        self, joint_paths: list[LatticePath], _ends: Layer, count: int
-    ) -> list[LatticePath]:
+        self, joint_paths: list[PosturePath], _ends: Layer, count: int
+    ) -> list[PosturePath]:
         """Choose up to `count` of the joint paths, which end at these nodes: some that differ."""
         return [joint_paths[i] for i in distinct(joint_paths, count)]
 

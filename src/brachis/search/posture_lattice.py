@@ -24,7 +24,7 @@ from brachis.kinematics import Newton, moving_most, solve_each
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN
 from brachis.search.closed_form_lattice import Cells, cell_sizes, solve_all
-from brachis.search.joint_path import LatticePath, distinct, sampling_box
+from brachis.search.joint_path import PosturePath, distinct, sampling_box
 from brachis.search.lattice import (
     LARGEST_STEP,
     Edges,
@@ -83,8 +83,8 @@ class PostureLattice(Lattice):
         return np.abs(last.q - self.problem.end).max(axis=1) < _SAME
 
     def _choose(
-        self, joint_paths: list[LatticePath], ends: Layer, count: int
-    ) -> list[LatticePath]:
+        self, joint_paths: list[PosturePath], ends: Layer, count: int
+    ) -> list[PosturePath]:
         """Choose joint paths no longer than those to nodes around, then some that differ, and name their seeds.
 
         Of several redundant joints the nodes are samples, which have no such minima.

@@ -124,15 +124,20 @@ def test_a_motion_is_verified_against_an_included_robot(run, error_of, saved):
 
 def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
     (tmp_path / "empty.csv").touch()  # as mktemp makes it
-    for _ in range(2):
-        for words, name in (
-            (("export", saved / "result.npz", "--dt", 0.1), "motion.csv"),
-            (("export", saved / "result.npz", "--dt", 0.1), "empty.csv"),
-            (("plot", saved / "result.npz", "--kind", "torques"), "figure.svg"),
-            (("schema",), "schema.json"),
-            (("compose", saved / "robot.urdf", *RAIL), "cell.urdf"),
-        ):
-            run(*words, "--out", tmp_path / name)
+    for words, name in (
+        (("export", saved / "result.npz", "--dt", 0.1), "motion.csv"),
+        (("export", saved / "result.npz", "--dt", 0.1), "empty.csv"),
+        (("plot", saved / "result.npz", "--kind", "torques"), "figure.svg"),
+        (("schema",), "schema.json"),
+        (("compose", saved / "robot.urdf", *RAIL), "cell.urdf"),
+    ):
+        file = tmp_path / name
+        run(*words, "--out", file)
+        written = file.read_bytes()
+        assert written
+        file.write_bytes(written + b"older")
+        run(*words, "--out", file)
+        assert not file.read_bytes().endswith(b"older")
 
 
 def run_writing_to(stream, *arguments):
