@@ -434,7 +434,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
         task(
             redundant_joints=["j1"],
             spline={"intervals": 100, "degree": 4},
-            search={"time_limit": 5.0},
+            search={"time_limit": 12.0},
         ),
     )
     assert result.verified
