@@ -14,7 +14,8 @@ A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that 
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
 What comes out     Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
-Recorded motions   import_motion, from a CSV file; compare it with a plan along its path: Comparison
+Recorded motions   import_motion, from a CSV file; compare it with a plan along its path: Comparison; compare_run: Tracking
+To a controller    Result.export, export, plan_for_controller, verify_run, Profile, load_profile, profile_names
 To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
 What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning
 To extend it       ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
@@ -41,7 +42,14 @@ if TYPE_CHECKING:
     from brachis.apps import report as report
     from brachis.apps.bottleneck import BottleneckReport as BottleneckReport
     from brachis.apps.comparison import Comparison as Comparison
+    from brachis.apps.comparison import Tracking as Tracking
     from brachis.apps.comparison import compare as compare
+    from brachis.apps.comparison import compare_run as compare_run
+    from brachis.apps.controller import Profile as Profile
+    from brachis.apps.controller import load_profile as load_profile
+    from brachis.apps.controller import profile_names as profile_names
+    from brachis.apps.controller import verify_run as verify_run
+    from brachis.apps.controller_plan import plan_for_controller as plan_for_controller
     from brachis.apps.recording import import_motion as import_motion
     from brachis.apps.sweeps import SweepResult as SweepResult
     from brachis.apps.sweeps import sweep as sweep
@@ -98,7 +106,9 @@ _MODULES = {
 }
 _NAMES = {
     "apps.bottleneck": "BottleneckReport",
-    "apps.comparison": "Comparison compare",
+    "apps.comparison": "Comparison Tracking compare compare_run",
+    "apps.controller": "Profile load_profile profile_names verify_run",
+    "apps.controller_plan": "plan_for_controller",
     "apps.recording": "import_motion",
     "apps.sweeps": "SweepResult sweep",
     "apps.view": "view",

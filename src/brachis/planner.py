@@ -149,7 +149,7 @@ def plan(
         report_progress(listener, progress) as report,
     ):
         began = time.perf_counter()
-        robot, loaded_task = _read(robot_or_task, task, keywords)
+        robot, loaded_task = read_arguments(robot_or_task, task, keywords)
         known = None if start_from is None else motion_of(start_from, "start_from")
         loaded = time.perf_counter()
         deadline = Deadline.after(loaded_task.search.time_limit - (loaded - began))
@@ -243,7 +243,7 @@ def _find_smoother(
     return smoothest
 
 
-def _read(
+def read_arguments(
     first: RobotOrTask, task: Source | None, keywords: TaskKeywords
 ) -> tuple[Robot, Task]:
     """Return the robot, and the task with all that the robot was made with."""
@@ -319,7 +319,7 @@ def transcribe(
     True
     """
     ik.check_families(families)
-    robot, loaded_task = _read(robot_or_task, task, keywords)
+    robot, loaded_task = read_arguments(robot_or_task, task, keywords)
     problem = Problem.of(robot, loaded_task, own_limits)
     start = first_guess(problem, decompositions_of(problem, families))
     return TaskProgram(start), start.family

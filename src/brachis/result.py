@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from brachis.errors import NotInstalledError, check_names
 from brachis.search.planned import PlannedMotion
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from brachis.apps.bottleneck import BottleneckReport
+    from brachis.apps.controller import Profile, RunReport
+    from brachis.apps.export.programs import ProgramReport
     from brachis.apps.report import Report
     from brachis.apps.view import Viewer
 
@@ -108,6 +110,42 @@ class Result(PlannedMotion):
         if path is not None:
             page.save(path)
         return page
+
+    def export(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        profile: Profile | str | None = None,
+        **options: Any,
+    ) -> RunReport | ProgramReport | None:
+        """Write the motion for another program, or for a controller.
+
+        Parameters
+        ----------
+        path : path
+            File to write; its suffix sets the format.
+        profile : Profile, str or path, optional
+            Controller that the file is for; see `brachis.load_profile`.
+        **options
+            Of `brachis.export.write`, or with a profile of `brachis.export.write_for_controller`.
+
+        Returns
+        -------
+        RunReport, ProgramReport or None
+            With a profile: what the controller makes of the motion.
+
+        Raises
+        ------
+        InputError
+            See there.
+        """
+        from brachis.apps import export
+
+        motion = self.trajectory
+        if profile is not None:
+            return export.write_for_controller(motion, path, profile, **options)
+        export.write(motion, path, **options)
+        return None
 
     def bottleneck(
         self, *, check: bool = False, reference: bool = False

@@ -100,7 +100,10 @@ def verify_trajectory(
     )
     # Part by part, for placements of all joints take much memory.
     surveys = [
-        (_path_errors(motion, states), find_margins(motion, states))
+        (
+            path_errors(motion, states.q, states.s, states.joints),
+            find_margins(motion, states),
+        )
         for states in motion.states.split()
     ]
     errors, margins = zip(*surveys, strict=True)
@@ -135,13 +138,28 @@ def verify_trajectory(
     )
 
 
-def _path_errors(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
-    """Return the tool's distance, m, or largest angle of an axis, rad, from the path at the saved s(t), (K,)."""
+def path_errors(
+    motion: CheckedMotion,
+    q: np.ndarray,
+    s: np.ndarray,
+    joints: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the tool's distance, m, or largest angle of an axis, rad, (K,), from the path at path coordinates.
+
+    Parameters
+    ----------
+    motion : CheckedMotion
+    q : (K, n) ndarray
+        rad or m.
+    s : (K,) ndarray
+    joints : tuple
+        The `joint_placements` in these postures.
+    """
     task_map = motion.task_map
-    targets = motion.path.derivatives(np.clip(states.s, 0.0, 1.0), 0)[0]
+    targets = motion.path.derivatives(np.clip(s, 0.0, 1.0), 0)[0]
     if isinstance(task_map, JointSpace):
-        return np.linalg.norm(states.q - targets, axis=1)
-    positions, rotations = tool_placements(motion.robot, states.q, states.joints)
+        return np.linalg.norm(q - targets, axis=1)
+    positions, rotations = tool_placements(motion.robot, q, joints)
     axes = list(task_map.axes)
     distances = np.linalg.norm(positions[:, axes] - targets[:, : len(axes)], axis=1)
     if not task_map.angles:

@@ -170,11 +170,11 @@ def write_one(
     write: Writer,
     inputs: Iterable[Path | None] = (),
     beginning: bytes = b"",
-) -> None:
-    """Write one file, unless it would take the place of what `check_output` protects."""
+) -> Any:
+    """Write one file, unless it would take the place of what `check_output` protects; return what writing returns."""
     check_output(out, inputs, beginning)
     with end_cleanly():
-        write(out)
+        return write(out)
 
 
 def write_text(text: str, path: Path) -> None:

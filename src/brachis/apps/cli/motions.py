@@ -6,6 +6,7 @@ import json as json_library
 import math
 import os
 import sys
+import warnings
 import webbrowser
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,7 @@ from brachis.apps.cli.app import (
     Verbosity,
     get_verbosity,
     motion_file,
+    refuse_options,
     urdf_of,
 )
 from brachis.apps.cli.folder import (
@@ -35,6 +37,7 @@ from brachis.apps.cli.output import (
     print_error,
     print_json,
     print_lines,
+    print_run,
     print_verification,
     show_progress,
 )
@@ -86,6 +89,13 @@ def export(
     last: str | None = None,
     joints: str | None = None,
     slower: float = 1.0,
+    degrees: Annotated[bool, Option("--degrees")] = False,
+    mm: Annotated[bool, Option("--mm")] = False,
+    profile: str | None = None,
+    moves: str = "joint",
+    tolerance: float = 1e-3,
+    time_tolerance: float = 0.01,
+    json: Json = False,
 ) -> None:
     """Sample a saved motion for a controller, or animate it.
 
@@ -105,14 +115,49 @@ def export(
         Joints to write, in this order: j1,j2,... Default: all.
     slower : float, optional
         How many times slower an animation shows the motion.
+    degrees : bool, optional
+        Write angles in degrees.
+    mm : bool, optional
+        Write lengths in mm.
+    profile : str, optional
+        Controller that the file is for: ros2_control, franka_1khz, ur_servoj_500hz, kuka_rsi_4ms, abb_egm_4ms,
+        fanuc_stream_8ms, staubli_val3, or a YAML file of your own. It sets axes, units and period, and the motion is
+        verified as the controller runs it. The suffix of its programs, such as .src, writes a program of positions.
+    moves : str, optional
+        In programs of positions: joint or linear.
+    tolerance : float, optional
+        Of programs: largest distance of the tool from the path, m and rad.
+    time_tolerance : float, optional
+        Of programs: largest difference in time, s.
 
     Examples
     --------
+    brachis export out/result.npz --out out/motion.csv --profile kuka_rsi_4ms
     brachis export out/result.npz --out out/motion.csv --dt 0.004
     brachis export out/result.npz --out out/motion.gif --dt 0.1
     """
     formats = brachis.export
     result, trajectory = _load(result)
+    if profile is not None:
+        stated = {"--joints": joints, "--last": last}
+        stated |= {"--degrees": degrees or None, "--mm": mm or None}
+        refuse_options(stated, "a profile", "files without one")
+        write_run = partial(
+            formats.write_for_controller,
+            trajectory,
+            profile=profile,
+            form=form,
+            dt=dt,
+            moves=moves,
+            tolerance=tolerance,
+            time_tolerance=time_tolerance,
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", formats.RunWarning)  # printed below
+            report = write_one(out, write_run, _inputs(result, trajectory))
+        code = print_run(report, json=json)
+        print_lines(f"wrote {out}")
+        raise typer.Exit(code)
     settings = formats.format_of(out, form)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
 
@@ -124,6 +169,8 @@ def export(
         last=last,
         joints=names,
         slower=slower,
+        degrees=degrees,
+        mm=mm,
     )
     write_one(out, write, _inputs(result, trajectory))
     period = settings.dt if dt is None else dt

@@ -23,6 +23,8 @@ from brachis.common import interrupts
 from brachis.errors import BrachisWarning, InputError
 
 if TYPE_CHECKING:
+    from brachis.apps.controller import RunReport
+    from brachis.apps.export import ProgramReport
     from brachis.verify import Verification
 
 _BEGAN = time.perf_counter()
@@ -126,6 +128,24 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
     print_lines(
         *(f"{margin.name}: {margin.in_words()}" for margin in verification.margins)
     )
+
+
+def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
+    """Print what a controller makes of a motion; return the exit code."""
+    from brachis.apps.controller import RunReport
+
+    if json:
+        print_json(report.to_dict())
+    if not isinstance(report, RunReport):
+        print_lines(str(report))
+        return 0
+    print_lines(f"as {report.controller} runs it, every {1e3 * report.period:g} ms:")
+    print_verification(report.verification, degrees=False)
+    if report.passed:
+        return 0
+    reasons = ("the motion breaks limits as it is run", *report.failures)
+    print_error("\n".join([*reasons, *report.remedies]))
+    return 1
 
 
 def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:

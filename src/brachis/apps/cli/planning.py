@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -34,6 +34,7 @@ from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
     print_json,
     print_lines,
+    print_run,
     print_table,
     print_verification,
     show_progress,
@@ -41,6 +42,9 @@ from brachis.apps.cli.output import (
 )
 from brachis.common.progress import Listener
 from brachis.common.words import write_count
+
+if TYPE_CHECKING:
+    from brachis.apps.controller import RunReport
 
 _PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
@@ -52,6 +56,7 @@ def plan(
     urdf: Path | None = None,
     changes: Changes = None,
     view: Annotated[bool, Option("--view")] = False,
+    profile: str | None = None,
     strict: bool | None = None,
     figures: bool = True,
     degrees: Degrees = False,
@@ -68,6 +73,9 @@ def plan(
         points. If the verification fails, the names begin with unverified.
     view : bool, optional
         Show the motion in the browser, until Ctrl-C.
+    profile : str, optional
+        Controller that runs the motion; see brachis export. Its limits are added to the task's, and the motion is
+        planned such that it passes as the controller runs it.
 
     Examples
     --------
@@ -79,10 +87,12 @@ def plan(
     if view:
         require_viser()
     with output_folder(out, _PLANNED, (task, urdf)), show_progress() as listener:
-        result = _plan_task(task, urdf, changes, strict, listener)
+        result, run = _plan_task(task, urdf, changes, strict, listener, profile)
     plots = brachis.plots
     trajectory = result.trajectory
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
+    if run is not None:
+        data["run"] = run.to_dict()
     drawings: dict[str, Drawing] = {
         "overview.png": lambda: plots.plot_overview(trajectory),
         "candidates.png": lambda: plots.plot_candidates(result.candidates),
@@ -100,6 +110,8 @@ def plan(
         show=lambda: _print_plan(result, data, degrees=degrees),
         result=result,
     )
+    if run is not None and not json:
+        code = max(code, print_run(run, json=False))
     if view:
         shown = data["candidates"]
         show(Viewer(trajectory, shown, verified=result.verified, degrees=degrees))
@@ -112,15 +124,20 @@ def _plan_task(
     changes: Sequence[str] | None,
     strict: bool | None,
     listener: Listener,
-) -> brachis.Result:
-    """Load a task and plan it."""
+    profile: str | None = None,
+) -> tuple[brachis.Result, RunReport | None]:
+    """Load a task and plan it, for a controller if there is a profile."""
     from brachis.task import name_task_file
 
     keys = read_changes(changes, strict=strict)
     changed = load_changed_task(task, keys)
     # With a URDF of its own, the robot is not that of the task file.
     with name_task_file(None if urdf else task, keys):
-        return brachis.plan(urdf and str(urdf), changed, listener=listener)
+        robot = urdf and str(urdf)
+        if profile is None:
+            return brachis.plan(robot, changed, listener=listener), None
+        plan_for = brachis.plan_for_controller
+        return plan_for(profile, robot, changed, listener=listener)
 
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
@@ -209,7 +226,7 @@ def bottleneck(
             verification = brachis.verify_trajectory(trajectory)
             data = describe_motion(trajectory, verification)
         else:
-            result = _plan_task(task, urdf, changes, strict, listener)
+            result, _ = _plan_task(task, urdf, changes, strict, listener)
             trajectory = result.trajectory
             data = result.to_dict()
         report = brachis.bottleneck.report(

@@ -9,14 +9,17 @@ import typer
 from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json, task_space_of
+from brachis.apps.cli.app import Degrees, Json, motion_file, task_space_of
 from brachis.apps.cli.folder import Drawing, finish, output_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
     print_lines,
+    print_table,
     print_verification,
     show_progress,
 )
+
+from brachis.errors import InputError
 
 _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
 """The recorded motion, the plan, the figures and the drawing."""
@@ -88,7 +91,9 @@ def import_(
 
 def compare(
     csv: RecordedFile,
-    robot: RobotFile,
+    robot: Annotated[Path | None, Option()] = None,
+    plan: Annotated[Path | None, Option(metavar="RESULT")] = None,
+    profile: str | None = None,
     keep_end: Annotated[bool, Option("--keep-end")] = False,
     out: Path | None = None,
     task_space: str | None = None,
@@ -100,10 +105,14 @@ def compare(
     figures: bool = True,
     json: Json = False,
 ) -> None:
-    """Compare a recorded motion with a plan along its path.
+    """Compare a recorded motion with a plan along its path, or a run with its plan.
 
     Parameters
     ----------
+    plan : path, optional
+        Result file (npz), or its folder, of the plan that was run: shows where the machine differed. Needs --profile.
+    profile : str, optional
+        Controller whose axes and units the file has; see brachis export.
     keep_end : bool, optional
         End in the recorded end posture, not in any posture with the tool there.
     out : path, optional
@@ -112,7 +121,22 @@ def compare(
     Examples
     --------
     brachis compare out/motion.csv --robot task.yaml
+    brachis compare out/run.csv --plan out/result.npz --profile kuka_rsi_4ms
     """
+    if plan is not None and profile is not None:
+        units = {"angle": angle, "length": length, "time": time}
+        tracking = brachis.compare_run(csv, motion_file(plan), profile, units=units)
+        if json:
+            print_json(tracking.to_dict())
+        else:
+            print_table("run and plan", ("", ""), tracking.summary().items())
+        return
+    if robot is None:
+        raise InputError(
+            "the robot or the plan is missing",
+            where="--robot",
+            allowed="--robot FILE, or --plan RESULT with --profile NAME",
+        )
     from brachis.apps.comparison import plot_both_motions
 
     with output_folder(out, _FILES, (csv, robot)), show_progress() as listener:

@@ -134,6 +134,8 @@ def write(
     last: str | None = None,
     joints: Sequence[str] | None = None,
     slower: float = 1.0,
+    degrees: bool = False,
+    mm: bool = False,
 ) -> None:
     """Write a motion in one of the `FORMATS`.
 
@@ -156,6 +158,8 @@ def write(
         moves and is left out is warned of, and named in the file.
     slower : float, optional
         How many times slower an animation shows the motion.
+    degrees, mm : bool, optional
+        Write angles in degrees, or lengths in mm.
 
     Raises
     ------
@@ -189,6 +193,7 @@ def write(
             allowed=f"1, or {', '.join(animations)}",
         )
     else:
-        content = rows_of(motion, period, last or chosen.last, joints)
+        rows = rows_of(motion, period, last or chosen.last, joints)
+        content = rows.in_units(degrees=degrees, mm=mm)
     with atomic_write(path, chosen.beginning) as stream:
         chosen.writer(content, stream)

@@ -10,6 +10,7 @@ from types import ModuleType
 
 import numpy as np
 
+from brachis.apps.controller import FACTORS
 from brachis.errors import (
     BrachisWarning,
     InputError,
@@ -17,6 +18,10 @@ from brachis.errors import (
     check_names,
 )
 from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory.samples import COLUMNS
+
+_PER = {"q": "", "qd": "/s", "qdd": "/s^2", "tau": None}
+"""What follows the unit of the position in the units of a table's columns; torques are in SI units."""
 
 
 class LeftOutWarning(BrachisWarning):
@@ -30,15 +35,17 @@ class JointRows:
     Attributes
     ----------
     joints : tuple of str
-        Names, in the order of the columns.
+        Names of the joints, or of the controller's axes, in the order of the columns.
     units : tuple of str
-        Of their positions, ``rad`` or ``m``.
+        Of their positions: ``rad`` or ``m``, ``deg`` or ``mm``.
     left_out : tuple of str
         A sentence for every joint that moves and is not among `joints`.
     t_end, dt : float
         End time and period, s.
     samples : Samples
-        The motion of these joints, and of the tool.
+        The motion of these joints, in their units, and of the tool.
+    quantities : tuple of str
+        What a table shows of the joints: prefixes of `COLUMNS`.
     """
 
     joints: tuple[str, ...]
@@ -47,10 +54,36 @@ class JointRows:
     t_end: float
     dt: float
     samples: Samples
+    quantities: tuple[str, ...] = tuple(COLUMNS)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the columns, (K,), of a table by name: ``t``, then those of every joint."""
-        return {"t": self.samples.t, **self.samples.joint_columns(self.joints)}
+        """Return the columns, (K,), of a table by name: ``t``, then those of every joint; units but SI are named."""
+        columns = {"t": self.samples.t}
+        for prefix, quantity in self.samples.columns.items():
+            if prefix not in self.quantities:
+                continue
+            per = _PER[prefix]
+            table = getattr(self.samples, quantity).T
+            for joint, unit, values in zip(self.joints, self.units, table, strict=True):
+                is_si = unit in ("rad", "m") or per is None
+                shown = "" if is_si else f" [{unit}{per}]"
+                columns[f"{prefix}_{joint}{shown}"] = values
+        return columns
+
+
+    def in_units(self, *, degrees: bool, mm: bool) -> JointRows:
+        """Return the rows with angles in degrees, or lengths in mm."""
+        shown = {"rad": "deg" if degrees else "rad", "m": "mm" if mm else "m"}
+        units = tuple(shown[unit] for unit in self.units)
+        factors = np.array([FACTORS[unit] for unit in units])
+        samples = self.samples
+        changed = replace(
+            samples,
+            q=samples.q * factors,
+            qdot=samples.qdot * factors,
+            qddot=samples.qddot * factors,
+        )
+        return replace(self, units=units, samples=changed)
 
 
 def rows_of(

@@ -123,7 +123,7 @@ _SCHEMA: Final = """\
     },
     "position_units": {
       "description": "Unit of every joint's position.",
-      "items": {"enum": ["rad", "m"], "type": "string"},
+      "items": {"enum": ["rad", "m", "deg", "mm"], "type": "string"},
       "minItems": 1,
       "title": "Position Units",
       "type": "array"

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -23,10 +23,12 @@ _UNITS: Final = {
     "s": ("time", TIMES),
     "rad": ("angle", ANGLES),
     "m": ("length", LENGTHS),
+    "Nm": ("torque", {"Nm": 1.0, "N": 1.0}),
 }
 """What each SI unit measures, and the units of a file with their factors."""
 _TIME_COLUMNS = ("t", "time", "timestamp")
 _JOINT_COLUMNS: Final = {
+    "tau": "tau_{0} torque_{0} effort_{0} {0}_tau {0}_torque {0}_effort",
     "qddot": "qdd_{0} ddq_{0} a_{0} acc_{0} acceleration_{0} {0}_acc {0}_acceleration",
     "qdot": "qd_{0} dq_{0} v_{0} vel_{0} velocity_{0} {0}_vel {0}_velocity",
     "q": "{0} q_{0} pos_{0} position_{0} {0}_pos {0}_position",
@@ -37,6 +39,7 @@ _QUANTITIES: Final = {
     "q": ("position", ""),
     "qdot": ("velocity", "/s"),
     "qddot": ("acceleration", "/s^2"),
+    "tau": ("torque", ""),
 }
 """Each quantity in words, and what follows its unit of time, angle or length."""
 _UNIT_WORDS = "|".join({**TIMES, **ANGLES, **LENGTHS})
@@ -186,6 +189,18 @@ def _read_column(
     return values * factors[unit], stated, rounding
 
 
+class HasJoints(Protocol):
+    """A robot, or the axes of a controller."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+
+    @property
+    def position_units(self) -> tuple[str, ...]:
+        """``rad`` or ``m`` of each joint."""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Positions of a robot's joints at K times.
@@ -198,6 +213,8 @@ class Recording:
         rad or m.
     qdot, qddot : (K, n) ndarray or None
         If the file has them; rad/s or m/s, rad/s^2 or m/s^2.
+    tau : (K, n) ndarray or None
+        Torques, if the file has them; Nm or N.
     rounding : (n,) ndarray
         Half of the last digit of every joint's positions, rad or m; 0 if the file has all digits.
     units : tuple of str
@@ -212,6 +229,7 @@ class Recording:
     q: np.ndarray
     qdot: np.ndarray | None
     qddot: np.ndarray | None
+    tau: np.ndarray | None
     rounding: np.ndarray
     units: tuple[str, ...]
     source: str
@@ -219,7 +237,7 @@ class Recording:
 
 
 def read_recording(
-    path: str | os.PathLike[str], robot: Robot, units: Mapping[str, str]
+    path: str | os.PathLike[str], robot: HasJoints, units: Mapping[str, str]
 ) -> Recording:
     """Read a CSV file of time and joint positions, and of velocities and accelerations if it has them.
 
@@ -228,7 +246,7 @@ def read_recording(
     Parameters
     ----------
     path : path
-    robot : Robot
+    robot : Robot or ControllerAxes
         Its joints name the columns.
     units : mapping
         Units of ``angle``, ``length`` and ``time`` in columns whose header states none.
@@ -246,7 +264,9 @@ def read_recording(
     columns = _find_columns(table.header, joints, table.where)
     bases = {"": "s", **dict(zip(joints, robot.position_units, strict=True))}
     read = {
-        (kind, joint): _read_column(table, column, kind, bases[joint], units)
+        (kind, joint): _read_column(
+            table, column, kind, "Nm" if kind == "tau" else bases[joint], units
+        )
         for (kind, joint), column in columns.items()
     }
     t, time_unit, _ = read["t", ""]
@@ -254,12 +274,12 @@ def read_recording(
     _, position_units, digits = zip(*positions, strict=True)
     rounding = np.array(digits)
     states = {}
-    for kind in ("q", "qdot", "qddot"):
+    for kind in ("q", "qdot", "qddot", "tau"):
         if (kind, joints[0]) in read:
             states[kind] = np.column_stack([read[kind, joint][0] for joint in joints])
     q = states["q"]
     _check_times(t, table, source)
-    if "angle" not in units:
+    if "angle" not in units and isinstance(robot, Robot):
         _check_angles(q, robot, source)
     stated = ", ".join(dict.fromkeys((time_unit, *position_units)))
     notes = [*table.notes, f"units: {stated}"]
@@ -274,6 +294,7 @@ def read_recording(
         moved["q"],
         moved.get("qdot"),
         moved.get("qddot"),
+        moved.get("tau"),
         rounding,
         robot.position_units,
         str(source),

@@ -1,0 +1,191 @@
+"""A recording of a run, in the units of a controller, beside the plan that it ran."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.apps.controller import FACTORS, Profile, axes_for, load_profile
+from brachis.apps.recording.recording import check_units, read_recording
+from brachis.common.summary import Summary
+from brachis.errors import InputError
+from brachis.trajectory import MotionSource, motion_of
+
+
+@dataclass(frozen=True, repr=False)
+class AxisTracking:
+    """How far one joint was from the plan.
+
+    Attributes
+    ----------
+    joint, axis : str
+        Names in the URDF and in the controller.
+    largest, rms : float
+        Largest and root-mean-square error, rad or m.
+    time : float
+        Of the largest error, s of the plan.
+    unit : str
+        ``rad`` or ``m``.
+    torque : float or None
+        Largest difference of the torque, Nm or N; None if it was not recorded.
+    """
+
+    joint: str
+    axis: str
+    largest: float
+    rms: float
+    time: float
+    unit: str
+    torque: float | None
+
+
+@dataclass(frozen=True, repr=False)
+class Tracking(Summary):
+    """Where a machine differed from the plan that it ran.
+
+    Attributes
+    ----------
+    axes : tuple of AxisTracking
+    delay : float
+        By which the run follows the plan best, s; the errors are those that remain.
+    t_end, t_end_planned : float
+        Durations of the motion in the recording and in the plan, s.
+    tool : float
+        Largest distance of the tool from its place in the plan, m.
+    tool_time : float
+        When, s of the plan.
+    """
+
+    axes: tuple[AxisTracking, ...]
+    delay: float
+    t_end: float
+    t_end_planned: float
+    tool: float
+    tool_time: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {**vars(self), "axes": [vars(axis) for axis in self.axes]}
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown."""
+        rows = {
+            f"{axis.joint} ({axis.axis})": f"{axis.largest:.3g} {axis.unit} at {axis.time:.4g} s, "
+            f"root mean square {axis.rms:.3g} {axis.unit}"
+            + ("" if axis.torque is None else f", torque {axis.torque:.3g} off")
+            for axis in self.axes
+        }
+        return {
+            "duration": f"{self.t_end:.4f} s, planned {self.t_end_planned:.4f} s",
+            "delay": f"{self.delay:.4f} s",
+            "tool": f"{self.tool:.3g} m off at {self.tool_time:.4g} s",
+            **rows,
+        }
+
+
+def compare_run(
+    recorded: str | os.PathLike[str],
+    planned: MotionSource,
+    profile: Profile | str,
+    *,
+    units: Mapping[str, str | None] | None = None,
+) -> Tracking:
+    """Compare a recording of a run with the plan.
+
+    Parameters
+    ----------
+    recorded : path
+        CSV file: time, a column for each axis (``A1``, ``q_A1 [deg]``, ...), and torques (``tau_A1``) if known.
+    planned : Trajectory, Result or path
+        The motion that was run.
+    profile : Profile, str or path
+        Names and units of the axes.
+    units : mapping, optional
+        Units that differ from the profile's, as for `import_motion`.
+
+    Raises
+    ------
+    TaskError
+        The file is not understood; the message names line and column.
+    InputError
+        The profile does not fit the robot, or the run has nothing to do with the plan.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = result.export(f"{folder}/run.csv", profile="kuka_rsi_4ms")
+    ...     tracking = brachis.compare_run(f"{folder}/run.csv", result, "kuka_rsi_4ms")
+    >>> tracking.tool < 1e-6
+    True
+    """
+    from scipy.optimize import minimize_scalar
+
+    motion = motion_of(planned, "planned")
+    profile = load_profile(profile)
+    axes = axes_for(motion, profile)
+    stated = {"angle": profile.arm.angle, "length": profile.arm.length}
+    recording = read_recording(recorded, axes, stated | check_units(units or {}))
+    factors = np.array([FACTORS[unit] for unit in axes.units])
+    q = axes.decode(recording.q * factors)
+    t = recording.t
+
+    def plan_at(delay: float) -> np.ndarray:
+        """Return the times of the plan, (K,), s, with a delay of the run."""
+        return np.clip(t - delay, 0.0, motion.t_end)
+
+    def miss(delay: float) -> float:
+        """Return the mean square of the joints' errors."""
+        errors = q - motion.position(plan_at(delay))[:, axes.index]
+        return float(np.mean(errors**2))
+
+    longest = 0.5 * max(t[-1], motion.t_end)
+    coarse = np.linspace(-longest, longest, 401)
+    near = coarse[np.argmin([miss(delay) for delay in coarse])]
+    step = coarse[1] - coarse[0]
+    bounds = (near - step, near + step)
+    delay = minimize_scalar(miss, bounds=bounds, options={"xatol": 1e-9}).x
+    plan_times = plan_at(delay)
+    planned_q = motion.position(plan_times)
+    run_q = planned_q.copy()
+    run_q[:, axes.index] = q
+    errors = np.abs(q - planned_q[:, axes.index])
+    if errors.max() > 1.0:
+        joint = axes.joints[int(np.argmax(errors.max(axis=0)))]
+        raise InputError(
+            "this is not a run of the plan",
+            where=str(recorded),
+            found=f"{joint} is {errors.max():.3g} rad or m away from the plan",
+            allowed="less than 1 rad or m; check profile and units",
+        )
+    torques = None
+    if recording.tau is not None and motion.robot.has_masses:
+        planned_tau = motion.torque(plan_times)[:, axes.index]
+        torques = np.abs(recording.tau - planned_tau).max(axis=0)
+    robot = motion.robot
+    places = [
+        robot.tool_placements(robot.of_real_joints(postures))[0]
+        for postures in (run_q, planned_q)
+    ]
+    away = np.linalg.norm(places[0] - places[1], axis=1)
+    rows = tuple(
+        AxisTracking(
+            joint,
+            axes.names[i],
+            float(errors[:, i].max()),
+            float(np.sqrt(np.mean(errors[:, i] ** 2))),
+            float(plan_times[np.argmax(errors[:, i])]),
+            axes.position_units[i],
+            None if torques is None else float(torques[i]),
+        )
+        for i, joint in enumerate(axes.joints)
+    )
+    worst = int(np.argmax(away))
+    tool = (float(away[worst]), float(plan_times[worst]))
+    return Tracking(rows, float(delay), float(t[-1]), motion.t_end, *tool)

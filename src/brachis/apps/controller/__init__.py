@@ -1,0 +1,34 @@
+"""Controllers: in which units they take a motion, how they move between samples, and which limits they check.
+
+Examples
+--------
+>>> from brachis.apps.controller import load_profile
+>>> load_profile("kuka_rsi_4ms").period
+0.004
+"""
+
+from brachis.apps.controller.axes import FACTORS, ControllerAxes, bind_axes
+from brachis.apps.controller.limits import robot_with_profile, without_scale
+from brachis.apps.controller.profile import (
+    Language,
+    Profile,
+    load_profile,
+    profile_names,
+)
+from brachis.apps.controller.run import RunReport, axes_for, check_period, verify_run
+
+__all__ = [
+    "FACTORS",
+    "ControllerAxes",
+    "Language",
+    "Profile",
+    "RunReport",
+    "axes_for",
+    "bind_axes",
+    "check_period",
+    "load_profile",
+    "profile_names",
+    "robot_with_profile",
+    "verify_run",
+    "without_scale",
+]

@@ -1,0 +1,162 @@
+"""Axes of a controller, bound to the joints of a robot: positions in the controller's units and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+import numpy as np
+
+from brachis.apps.controller.profile import Axis, AxisGroup, Profile
+from brachis.errors import InputError, check_names
+from brachis.robot import Robot
+
+FACTORS = {"rad": 1.0, "deg": 180.0 / np.pi, "m": 1.0, "mm": 1e3}
+"""Units of axes, and their factors on rad or m."""
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerAxes:
+    """The m axes of a controller and the joints that they move.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the axes.
+    units : tuple of str
+        ``rad``, ``deg``, ``m`` or ``mm``.
+    external : tuple of bool
+        Whether an axis is external.
+    joints : tuple of str
+        Joints of the robot.
+    index : (m,) int ndarray
+        Numbers of the joints in the robot's chain.
+    zero : (m,) ndarray
+        Positions of the joints where uncoupled axes are at 0, rad or m.
+    matrix : (m, m) ndarray
+        Values of the axes are ``matrix @ (q - zero)``, in their units.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    external: tuple[bool, ...]
+    joints: tuple[str, ...]
+    index: np.ndarray
+    zero: np.ndarray
+    matrix: np.ndarray
+
+    def encode(self, q: np.ndarray) -> np.ndarray:
+        """Return the values of the axes, (K, m), in postures (K, n), rad or m."""
+        return (q[:, self.index] - self.zero) @ self.matrix.T
+
+    def encode_rates(self, rates: np.ndarray) -> np.ndarray:
+        """Return velocities or accelerations of the axes, (K, m), from those of the joints, (K, n)."""
+        return rates[:, self.index] @ self.matrix.T
+
+    def decode(self, values: np.ndarray) -> np.ndarray:
+        """Return the positions of the axes' joints, (K, m), rad or m, from values of the axes, (K, m)."""
+        return np.linalg.solve(self.matrix, values.T).T + self.zero
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the axes, as those of a recording's columns."""
+        return self.names
+
+    @property
+    def position_units(self) -> tuple[str, ...]:
+        """SI units of the axes."""
+        return tuple("m" if unit in ("m", "mm") else "rad" for unit in self.units)
+
+
+def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
+    """Bind the axes of a profile to a robot's joints.
+
+    Raises
+    ------
+    UnknownNameError
+        An axis names a joint that the robot does not have, or a coupling an axis that does not exist.
+    InputError
+        A joint has two axes, the arm's axes are not in the order of the chain, or a group has too few names.
+    """
+    names = robot.urdf_joints
+    units = dict(zip(names, robot.position_units, strict=False))
+    axes = profile.axes or _axes_of_joints(names, units)
+    joints = [axis.joint for axis in axes]
+    check_names("joint", joints, names, "profile.axes")
+    for joint in joints:
+        if joints.count(joint) > 1:
+            raise InputError(
+                f"joint {joint!r} has two axes",
+                where="profile.axes",
+                allowed="one axis for each joint",
+            )
+    arm = [axis.joint for axis in axes if not axis.external]
+    in_order = [name for name in names if name in arm]
+    if arm != in_order:
+        raise InputError(
+            "the arm's axes are not in the order of the chain",
+            where="profile.axes",
+            found=", ".join(arm),
+            allowed=", ".join(in_order),
+        )
+    axis_names = [*_name_axes(axes, profile)]
+    axis_units = [
+        profile_unit(profile.external if axis.external else profile.arm, units[joint])
+        for axis, joint in zip(axes, joints, strict=True)
+    ]
+    coupling = np.eye(len(axes))
+    for name, others in profile.coupled.items():
+        check_names("axis", [name, *others], axis_names, "profile.coupled")
+        for other, factor in others.items():
+            coupling[axis_names.index(name), axis_names.index(other)] += factor
+    scales = [
+        axis.sign * FACTORS[unit] for axis, unit in zip(axes, axis_units, strict=True)
+    ]
+    return ControllerAxes(
+        tuple(axis_names),
+        tuple(axis_units),
+        tuple(axis.external for axis in axes),
+        tuple(joints),
+        np.array([names.index(joint) for joint in joints]),
+        np.array([axis.zero for axis in axes]),
+        coupling @ np.diag(scales),
+    )
+
+
+def profile_unit(group: AxisGroup, unit: str) -> str:
+    """Return a group's unit of axes whose joints have the SI unit ``rad`` or ``m``."""
+    return group.angle if unit == "rad" else group.length
+
+
+def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, ...]:
+    """Return an axis for each joint, the arm's first; sliding joints before the first turning one are external."""
+    slides = list(takewhile(lambda name: units[name] == "m", names))
+    arm = [name for name in names if name not in slides]
+    if not arm:
+        return tuple(Axis(joint=name) for name in slides)
+    external = [Axis(joint=name, external=True) for name in slides]
+    return (*(Axis(joint=name) for name in arm), *external)
+
+
+def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
+    """Return the axes' names: their own, else the next ones of their groups, else the joints'."""
+    groups = {False: profile.arm, True: profile.external}
+    counts = {False: 0, True: 0}
+    names = []
+    for axis in axes:
+        group = groups[axis.external]
+        number = counts[axis.external]
+        counts[axis.external] += 1
+        if group.names and number >= len(group.names):
+            kind = "external axes" if axis.external else "axes of the arm"
+            found = sum(other.external == axis.external for other in axes)
+            raise InputError(
+                f"the profile has too few names for {kind}",
+                where="profile",
+                found=f"{found} joints",
+                allowed=", ".join(group.names),
+                hint="Name the axes in a profile of your own: extends, and axes",
+            )
+        names.append(axis.name or (group.names[number] if group.names else axis.joint))
+    return names

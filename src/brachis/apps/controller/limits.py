@@ -1,0 +1,53 @@
+"""Limits of a controller as limits of a robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from brachis.apps.controller.axes import ControllerAxes, bind_axes
+from brachis.apps.controller.profile import Profile, load_profile
+from brachis.robot import Robot
+from brachis.robot.from_task import robot_from_settings
+from brachis.robot.limits import MAGNITUDES, to_spec
+from brachis.task import LIMIT_KINDS, Source, Task, load_task
+from brachis.task.limit_models import FROM_URDF, map_by_joint
+
+
+def robot_with_profile(
+    robot: Robot, profile: Profile, axes: ControllerAxes
+) -> Robot:
+    """Return a robot with the stricter ones of its limits and a profile's.
+
+    Raises
+    ------
+    InputError
+        A list of the profile has another length than the arm has axes, or the limits do not fit the robot.
+    """
+    arm = [
+        joint
+        for joint, is_external in zip(axes.joints, axes.external, strict=True)
+        if not is_external
+    ]
+    changes: dict[str, Any] = {}
+    for kind in MAGNITUDES:
+        stated = getattr(profile.limits, kind)
+        by_joint = map_by_joint(f"profile.limits.{kind}", stated, arm, None)
+        ends = robot.limits.both_ways(kind)
+        for joint, value in by_joint.items():
+            if value == FROM_URDF:
+                continue
+            own = np.array(value if isinstance(value, tuple) else (-value, value))
+            lower, upper = ends[:, robot.joint_names.index(joint)]
+            pair = (max(lower, own[0]), min(upper, own[1]))
+            is_pair = LIMIT_KINDS[kind].form == "pair"
+            changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
+    return robot.with_limits(**changes) if changes else robot
+
+
+def without_scale(robot: Robot) -> Robot:
+    """Return a robot without the factors in ``robot.limits.scale``."""
+    factors = robot.settings.limits.scale.model_dump(exclude_defaults=True)
+    inverse = {kind: 1.0 / factor for kind, factor in factors.items()}
+    return robot.with_limits(scale=inverse) if inverse else robot

@@ -1,0 +1,191 @@
+"""Profiles of controllers, from YAML files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field
+
+from brachis.common.files import check_kind, is_file, read_text
+from brachis.errors import TaskError, check_names
+from brachis.task import LimitSpec
+from brachis.task.fields import (
+    CheckedModel,
+    Count,
+    Flag,
+    Mistake,
+    Model,
+    Name,
+    NonEmpty,
+    Number,
+    Positive,
+    Version,
+    merge,
+)
+from brachis.task.limit_kinds import LimitScale
+from brachis.task.messages import validate
+from brachis.task.yaml_reader import read_yaml
+
+_FOLDER: Final = Path(__file__).with_name("profiles")
+_LARGEST = 100_000
+"""Bytes of a profile."""
+
+AngleUnit = Literal["rad", "deg"]
+LengthUnit = Literal["m", "mm"]
+
+
+class Axis(Model):
+    """One axis of the controller, and the joint of the URDF that it moves."""
+
+    joint: Name
+    """Joint of the URDF."""
+    name: Name | None = None
+    """Name of the axis. Default: the next name of its group."""
+    sign: Literal[-1, 1] = 1
+    """-1: the axis turns against the joint."""
+    zero: Number = 0.0
+    """Position of the joint where the axis is at 0, rad (m)."""
+    external: Flag = False
+    """Whether it is an external axis, such as a rail, and not one of the arm's."""
+
+
+class AxisGroup(Model):
+    """Names and units of the arm's axes, or of the external ones."""
+
+    names: tuple[Name, ...] = ()
+    """Names of the axes, in order. Default: those of the joints."""
+    angle: AngleUnit = "rad"
+    """Unit of turning axes."""
+    length: LengthUnit = "m"
+    """Unit of sliding axes."""
+
+
+class Language(Model):
+    """The language of a controller's programs of positions."""
+
+    suffix: Annotated[Name, Field(pattern=r"^\.[a-z0-9]+$")]
+    """Suffix of its files."""
+    external_axes: Flag = True
+    """Whether a position may have external axes."""
+    template: Name
+    """Template of Jinja for a program. It may use: name, of the motion; robot and title, of the robot and the
+    controller; report.positions, report.place (m, rad) and report.time (s); t_end (s); is_linear; axes.names, axes.units
+    and axes.external; steps, a list of positions with values (in the units of the axes), duration (s) and speed (m/s)
+    from the position before, percent of the largest joint velocities, zone (m; 0: the arm stops) and event."""
+
+
+class Profile(CheckedModel):
+    """How a controller takes a motion, and what it makes of it."""
+
+    brachis_profile: Version
+    """Version of the format."""
+    title: Name
+    """Name of the controller and its interface."""
+    sources: NonEmpty[Name]
+    """Where the figures come from."""
+    unknown: tuple[Name, ...] = ()
+    """What is not documented in public."""
+    period: Positive
+    """Time between samples, s."""
+    fixed_period: Flag = True
+    """Whether the controller takes no other period."""
+    interpolation: Literal["hold", "linear", "cubic", "quintic"]
+    """Motion between samples: the last position is held; straight lines of the joints; polynomials through positions
+    and velocities (cubic), and accelerations (quintic)."""
+    formats: NonEmpty[Name] = ("csv",)
+    """Names of export formats that the controller takes."""
+    columns: NonEmpty[Literal["q", "qd", "qdd", "tau"]] = ("q",)
+    """Quantities in tables: positions, velocities, accelerations, torques."""
+    arm: AxisGroup = AxisGroup()
+    """Axes of the arm."""
+    external: AxisGroup = AxisGroup()
+    """External axes."""
+    axes: tuple[Axis, ...] = ()
+    """All axes, in the controller's order. Default: the arm's joints in chain order, then external axes: the sliding
+    joints before the first turning one."""
+    coupled: dict[Name, dict[Name, Number]] = {}
+    """Values of other axes that are added to an axis, times a factor: J3: {J2: 1} where J3 is measured from the
+    horizontal."""
+    program: Language | None = None
+    """Language of programs of positions."""
+    limits: LimitSpec = Field(default_factory=LimitSpec)
+    """Limits that the controller checks, as in robot.limits. A list is in the order of the arm's axes."""
+    differences: Flag = True
+    """Whether the controller checks differences of successive samples."""
+    rest: Literal["velocity", "full"] = "velocity"
+    """What must be zero at both ends: the velocity alone, or the acceleration too."""
+    decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
+    """Decimals of positions in the file. Default: all digits."""
+    last: Literal["exact", "hold"] = "hold"
+    """Time of the last sample; see brachis export."""
+    path_tolerance: Positive = 1e-4
+    """Largest deviation of the tool from the path, m and rad."""
+    events: dict[Name, Name] = {}
+    """Instructions at the beginning and end of sections with a process speed: {process_on: ..., process_off: ...}."""
+
+    def _mistakes(self) -> Iterator[Mistake]:
+        if self.limits.scale != LimitScale():
+            yield (
+                "limits.scale",
+                "a profile cannot contain factors on limits",
+                "robot.limits.scale in the task",
+            )
+        for name in self.events:
+            if name not in EVENTS:
+                yield "events", "there is no event of this name", ", ".join(EVENTS)
+
+
+EVENTS: Final = ("process_on", "process_off")
+"""Events of a motion."""
+
+
+def profile_names() -> list[str]:
+    """Return the names of the profiles that come with brachis."""
+    return sorted(path.stem for path in _FOLDER.glob("*.yaml"))
+
+
+def load_profile(source: str | os.PathLike[str] | Profile) -> Profile:
+    """Load a profile.
+
+    Parameters
+    ----------
+    source : str, path or Profile
+        Name of an included profile, or a YAML file. A file may begin with ``extends: NAME`` and state only what differs
+        from the profile NAME.
+
+    Raises
+    ------
+    UnknownNameError
+        No included profile has this name.
+    TaskError
+        The file is missing or wrong; the message names its key.
+
+    Examples
+    --------
+    >>> from brachis.apps.controller import load_profile
+    >>> load_profile("franka_1khz").limits.jerk[0]
+    7500.0
+    """
+    if isinstance(source, Profile):
+        return source
+    path = Path(source)
+    if not path.suffix and not is_file(path):
+        check_names("profile", [str(source)], profile_names(), "profile")
+        path = _FOLDER / f"{source}.yaml"
+    return validate(Profile, _read(path, "profile"), str(path))
+
+
+def _read(path: Path, where: str) -> Any:
+    """Read the keys of a profile, with those of the profile that it extends."""
+    check_kind(path, "a profile", TaskError)
+    text = read_text(path, where=where, folder=Path.cwd(), largest=_LARGEST)
+    content = read_yaml(text, str(path))
+    if not isinstance(content, dict) or "extends" not in content:
+        return content
+    name = content["extends"]
+    check_names("profile", [str(name)], profile_names(), f"{path}: extends")
+    changes = {key: value for key, value in content.items() if key != "extends"}
+    return merge(_read(_FOLDER / f"{name}.yaml", where), changes)

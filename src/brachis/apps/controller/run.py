@@ -1,0 +1,420 @@
+"""The motion as a controller will run it: sampled, rounded, interpolated as the profile says, and verified again.
+
+Between samples of positions alone (``hold``, ``linear``) the drives decide what happens. The limits are then checked at
+the samples, with differences of successive samples in place of derivatives, as controllers do; the tool is checked on
+the straight joint lines between samples too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from brachis.apps.controller.axes import ControllerAxes, bind_axes
+from brachis.apps.controller.limits import robot_with_profile, without_scale
+from brachis.apps.controller.profile import Profile, load_profile
+from brachis.common.arrays import spread
+from brachis.common.summary import Summary
+from brachis.errors import InputError
+from brachis.path import path_of
+from brachis.robot import Robot, bind, dynamics
+from brachis.robot.custom_limits import LimitModel
+from brachis.trajectory import (
+    MotionSource,
+    Samples,
+    Trajectory,
+    join_splines,
+    motion_of,
+)
+from brachis.verify import Check, Verification, VerifyOptions
+from brachis.verify.limits import check_limits
+from brachis.verify.mechanics import joint_placements
+from brachis.verify.motion import CheckedMotion, MotionStates
+from brachis.verify.verify import path_errors
+
+_STILL = 1e-9
+"""A joint that moves less than this stands still, rad or m."""
+_CHORD_STEPS = 4
+"""Steps on a straight joint line between two samples."""
+_SAMPLED = ("hold", "linear")
+"""Interpolations of which only the samples are known."""
+_DERIVATIVES = ("velocity", "acceleration", "jerk", "torque_rate")
+"""Kinds of limits that differences of samples are compared with."""
+_SLOWER = (1.001, 1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0)
+"""Factors on the duration that are tried when a run fails."""
+_SHORTER = (2, 4, 8)
+"""Fractions of the period that are tried when a run fails."""
+
+
+@dataclass(frozen=True, repr=False)
+class RunReport(Summary):
+    """What a controller will make of a motion.
+
+    Attributes
+    ----------
+    controller : str
+        Name of the controller and its interface.
+    period : float
+        s.
+    verification : Verification
+        Limits of the task and of the profile, the path, and the ends.
+    remedies : tuple of str
+        What would let the run pass, each verified; empty if it passes.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> brachis.verify_run(result, "ros2_control", period=0.001).period
+    0.001
+    """
+
+    controller: str
+    period: float
+    verification: Verification
+    remedies: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return self.verification.passed
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What failed, in words."""
+        checks = self.verification.checks
+        failed = (check for check in checks if not check.passed)
+        return tuple(f"{check.name}: {check.in_words()}" for check in failed)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        data = {**vars(self), "verification": self.verification.to_dict()}
+        return {"passed": self.passed, **data}
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown: every check with its worst value."""
+        return {
+            "controller": f"{self.controller}, every {1e3 * self.period:g} ms",
+            **self.verification.summary(),
+            "remedies": "; ".join(self.remedies) or "none needed",
+        }
+
+
+def verify_run(
+    trajectory: MotionSource,
+    profile: Profile | str,
+    *,
+    period: float | None = None,
+    own_limits: Sequence[LimitModel] = (),
+) -> RunReport:
+    """Verify a motion as a controller will run it.
+
+    Factors in ``robot.limits.scale`` are margins for what the controller adds to the plan: the run is checked against
+    the limits without them.
+
+    Parameters
+    ----------
+    trajectory : Trajectory, Result or path
+    profile : Profile, str or path
+        See `load_profile`.
+    period : float, optional
+        Time between samples, s. The profile's unless given.
+    own_limits : sequence of LimitModel, optional
+        Limits of the user's own with which the motion was planned.
+
+    Returns
+    -------
+    RunReport
+        A run that fails raises nothing; `failures` says what fails, and `remedies` what would do.
+
+    Raises
+    ------
+    InputError
+        The profile does not fit the robot, a joint that moves has no axis, or the controller takes no other period.
+    """
+    motion = motion_of(trajectory)
+    profile = load_profile(profile)
+    axes = axes_for(motion, profile)
+    period = check_period(profile, period)
+    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
+    run = _Run(motion, profile, axes, robot, tuple(own_limits))
+    verification = run.verify(period)
+    remedies = () if verification.passed else tuple(_find_remedies(run, period))
+    return RunReport(profile.title, period, verification, remedies)
+
+
+def check_period(profile: Profile, period: float | None) -> float:
+    """Return the period, s, that a controller is given; the profile's unless it is stated.
+
+    Raises
+    ------
+    InputError
+        The controller takes no other period than its own.
+    """
+    if period is None or period == profile.period:
+        return profile.period
+    if profile.fixed_period:
+        raise InputError(
+            "the controller takes no other period",
+            where="dt",
+            found=f"{period:g} s",
+            allowed=f"{profile.period:g} s ({profile.title})",
+        )
+    return period
+
+
+def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
+    """Return the axes of a profile for a motion's robot.
+
+    Raises
+    ------
+    InputError
+        The profile does not fit the robot, or a joint that moves has no axis.
+    """
+    axes = bind_axes(profile, trajectory.robot)
+    names = trajectory.robot.urdf_joints
+    travel = np.ptp(trajectory.q[:, : len(names)], axis=0)
+    missing = [
+        name
+        for name, way in zip(names, travel, strict=True)
+        if way > _STILL and name not in axes.joints
+    ]
+    if missing:
+        raise InputError(
+            "a joint that moves has no axis in the profile",
+            where="profile.axes",
+            found=", ".join(missing),
+            allowed="an axis for every joint that moves; external: true for a rail or a positioner",
+        )
+    return axes
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A motion, and how it is run."""
+
+    motion: Trajectory
+    profile: Profile
+    axes: ControllerAxes
+    robot: Robot
+    own_limits: tuple[LimitModel, ...]
+
+    def verify(self, period: float) -> Verification:
+        """Verify the run with a period, s."""
+        samples = self.motion.sample(period, last=self.profile.last)
+        q = samples.q.copy()
+        if self.profile.decimals is not None:
+            values = np.round(self.axes.encode(q), self.profile.decimals)
+            q[:, self.axes.index] = self.axes.decode(values)
+        run = interpolate(self.motion, samples, q, self.profile.interpolation)
+        task = run.task
+        robot, task_map = bind(self.robot, task.task_space, task.tolerances)
+        path = path_of(task_map, task)
+        options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
+        allowed = 1.0 + options.ratio_tolerance
+        is_sampled = self.profile.interpolation in _SAMPLED
+        differences = (
+            _check_differences(robot, run, allowed)
+            if is_sampled or self.profile.differences
+            else ()
+        )
+        if is_sampled:
+            free = np.full(robot.n, np.inf)
+            limits = robot.limits.with_magnitudes(**dict.fromkeys(_DERIVATIVES, free))
+            robot = replace(robot, limits=limits)
+        kind = _SampledMotion if is_sampled else CheckedMotion
+        checked = kind(run, robot, task_map, path, options)
+        ratios = [*check_limits(checked, self.own_limits), *differences]
+        path_check = _check_path(checked, self.profile)
+        checks = (path_check, *ratios, *_check_rest(run, self.profile))
+        worst = max((check.value for check in ratios), default=0.0)
+        return Verification(checks, len(checked.states.t), worst, path_check.value)
+
+
+class _SampledMotion(CheckedMotion):
+    """A motion that is known at its nodes only."""
+
+    @cached_property
+    def states(self) -> MotionStates:
+        """The motion at its nodes."""
+        last = len(self.pieces.lengths) - 1
+        index = np.append(np.arange(last + 1), last)
+        u = np.zeros(last + 2)
+        u[-1] = 1.0
+        return MotionStates(self.pieces, index, u)
+
+
+def interpolate(
+    motion: Trajectory, samples: Samples, q: np.ndarray, interpolation: str
+) -> Trajectory:
+    """Return the motion between samples.
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The plan.
+    samples : Samples
+        At K times.
+    q : (K, n) ndarray
+        Positions that the controller is given, rad or m.
+    interpolation : {"hold", "linear", "cubic", "quintic"}
+
+    Returns
+    -------
+    Trajectory
+        Its path coordinate is the plan's; it waits at the end until the last sample.
+    """
+    t = samples.t
+    h = np.diff(t)[:, None]
+    slopes = np.diff(q, axis=0) / h
+    qdot = samples.qdot
+    after = samples.qddot
+    before = samples.qddot
+    if interpolation == "cubic":
+        after = np.zeros_like(q)
+        before = np.zeros_like(q)
+        after[:-1] = (6.0 * slopes - 4.0 * qdot[:-1] - 2.0 * qdot[1:]) / h
+        before[1:] = (2.0 * qdot[:-1] + 4.0 * qdot[1:] - 6.0 * slopes) / h
+        after[-1] = before[-1]
+        before[0] = after[0]
+    elif interpolation != "quintic":
+        qdot, after = _central_differences(t, q, samples.qdot[[0, -1]])
+        before = after
+    splines = motion.phase_splines
+    wait = t[-1] - motion.t_end
+    if wait > _STILL:
+        splines = (*splines, splines[-1].wait(wait))
+    knots, control_points = join_splines(splines)
+    ends = np.cumsum([spline.t_end for spline in splines])
+    ends[-1] = t[-1]
+    return replace(
+        motion,
+        times=t,
+        q=q,
+        qdot=qdot,
+        qddot=after,
+        qddot_before=before,
+        knots=knots,
+        control_points=control_points,
+        phase_ends=ends,
+    )
+
+
+def _central_differences(
+    t: np.ndarray, q: np.ndarray, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return velocities and accelerations, (K, n), at samples; `ends`, (2, n), are the velocities at both ends."""
+    h = np.diff(t)[:, None]
+    slopes = np.diff(q, axis=0) / h
+    qdot = np.empty_like(q)
+    qdot[1:-1] = (h[1:] * slopes[:-1] + h[:-1] * slopes[1:]) / (h[1:] + h[:-1])
+    qdot[[0, -1]] = ends
+    qddot = np.empty_like(q)
+    qddot[1:-1] = 2.0 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
+    qddot[0] = 2.0 * (slopes[0] - qdot[0]) / h[0]
+    qddot[-1] = 2.0 * (qdot[-1] - slopes[-1]) / h[-1]
+    return qdot, qddot
+
+
+def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
+    """Check the distance of the tool from the path, on straight joint lines between samples where there is no other."""
+    t = motion.states.t
+    q = motion.states.q
+    if isinstance(motion, _SampledMotion):
+        t = spread(motion.trajectory.times, _CHORD_STEPS)
+        nodes = motion.trajectory.times
+        q = np.column_stack([np.interp(t, nodes, joint) for joint in q.T])
+    s = motion.trajectory.path_spline(t).clip(0.0, 1.0)
+    miss = motion.task_map.difference(
+        motion.task_map.values(q), motion.path.sample(s).target
+    )
+    along = motion.path.sample(s).xi
+    # A tool that is early or late on the path is not off the path.
+    shift = np.einsum("kc,kc->k", miss, along) / np.einsum("kc,kc->k", along, along)
+    errors = path_errors(motion, q, s + shift, joint_placements(motion.robot, q))
+    worst = int(np.argmax(errors))
+    recovered = motion.trajectory.recovered
+    allowed = profile.path_tolerance + (recovered.tolerance if recovered else 0.0)
+    return Check("path error", errors[worst], allowed, "m, rad", time=t[worst])
+
+
+def _check_differences(
+    robot: Robot, run: Trajectory, allowed: float
+) -> Iterator[Check]:
+    """Check the differences of successive samples, divided by the period, as controllers do."""
+    period = run.times[1]
+    quantities = {
+        "velocity": (run.q, 1),
+        "acceleration": (run.q, 2),
+        "jerk": (run.q, 3),
+    }
+    if robot.has_masses:
+        torques = dynamics.torque(robot, run.q, run.qdot, run.qddot)
+        quantities["torque_rate"] = (torques, 1)
+    for kind, (values, order) in quantities.items():
+        lower, upper = robot.limits.both_ways(kind)
+        if not np.isfinite(upper).any():
+            continue
+        held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
+        rates = np.diff(held, order, axis=0) / period**order
+        ratios = np.maximum(rates / upper, rates / lower)
+        row, joint = map(int, np.unravel_index(np.argmax(ratios), ratios.shape))
+        time = run.times[min(max(row - order + 2, 0), len(run.times) - 1)]
+        name = f"{kind.replace('_', ' ')} by differences"
+        subject = robot.joint_names[joint]
+        ratio = ratios[row, joint]
+        yield Check(name, ratio, allowed, "-", subject, time, of_limit=True)
+
+
+def _check_rest(run: Trajectory, profile: Profile) -> Iterator[Check]:
+    """Check that the plan begins and ends as the controller requires."""
+    if profile.rest != "full":
+        return
+    ends = np.abs(run.qddot[[0, -1]])
+    joint = int(np.argmax(ends.max(axis=0)))
+    scale = 1e-3 * max(np.abs(run.qddot).max(), 1.0)
+    yield Check(
+        "acceleration at the ends",
+        ends[:, joint].max(),
+        scale,
+        "rad/s^2, m/s^2",
+        run.joint_names[joint],
+    )
+
+
+def _find_remedies(run: _Run, period: float) -> Iterator[str]:
+    """Yield what lets a run pass, each verified."""
+    profile = run.profile
+    trials: list[list[tuple[str, _Run, float]]] = [[], [], []]
+    for decimals in range(10 if profile.decimals is None else profile.decimals, 10):
+        finer = profile.model_copy(update={"decimals": decimals})
+        text = f"{decimals} decimals"
+        trials[0].append((text, replace(run, profile=finer), period))
+    for divisor in () if profile.fixed_period else _SHORTER:
+        text = f"a period of {1e3 * period / divisor:g} ms"
+        trials[1].append((text, run, period / divisor))
+    for factor in _SLOWER:
+        slower = replace(run, motion=slow_down(run.motion, factor))
+        trials[2].append((f"{100.0 / factor:.4g} % of the speed", slower, period))
+    for group in trials:
+        passing = (text for text, trial, dt in group if trial.verify(dt).passed)
+        for text in islice(passing, 1):
+            yield f"the motion passes with {text}"
+    yield "to plan a motion that passes, give the profile to the plan (--profile)"
+
+
+def slow_down(motion: Trajectory, factor: float) -> Trajectory:
+    """Return the motion, slower by a factor on its duration."""
+    return replace(
+        motion,
+        times=motion.times * factor,
+        qdot=motion.qdot / factor,
+        qddot=motion.qddot / factor**2,
+        qddot_before=motion.qddot_before / factor**2,
+        phase_ends=motion.phase_ends * factor,
+    )

@@ -1,0 +1,116 @@
+"""Plans that hold as a controller runs them."""
+
+from __future__ import annotations
+
+from typing import Unpack
+
+import numpy as np
+
+from brachis.apps.controller import (
+    Profile,
+    RunReport,
+    bind_axes,
+    load_profile,
+    robot_with_profile,
+    verify_run,
+    without_scale,
+)
+from brachis.common.progress import Listener, ignore
+from brachis.planner import RobotOrTask, plan, read_arguments
+from brachis.result import Result
+from brachis.robot import Robot
+from brachis.robot.limits import MAGNITUDES
+from brachis.task import Source, TaskKeywords
+
+_ROUNDS = 4
+"""Plans that are made, each with smaller limits than the one before."""
+_MARGIN = 1e-3
+"""By how much more than the excess a limit is made smaller."""
+
+
+def plan_for_controller(
+    profile: Profile | str,
+    robot_or_task: RobotOrTask = None,
+    /,
+    task: Source | None = None,
+    *,
+    listener: Listener | None = None,
+    **keywords: Unpack[TaskKeywords],
+) -> tuple[Result, RunReport]:
+    """Plan a motion that holds its limits as a controller runs it.
+
+    The profile's limits and ends are added to the task. Where the sampled motion then exceeds a limit, the limit is
+    scaled down by the excess, and the task is planned again.
+
+    Parameters
+    ----------
+    profile : Profile, str or path
+        Name of an included profile, or the file of one.
+    robot_or_task, task, **keywords
+        As for `brachis.plan`.
+    listener : callable, optional
+        Called with a line of text about each step.
+
+    Returns
+    -------
+    Result
+        The last plan.
+    RunReport
+        Its verification as the controller runs it.
+
+    Raises
+    ------
+    InputError, PlanningError
+        As `brachis.plan`; or the profile does not fit the robot.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result, run = brachis.plan_for_controller(
+    ...     "ros2_control", brachis.examples.scara_line, effort="single", intervals=8
+    ... )
+    >>> run.passed
+    True
+    """
+    report = listener or ignore
+    profile = load_profile(profile)
+    robot, loaded = read_arguments(robot_or_task, task, keywords)
+    robot = robot_with_profile(robot, profile, bind_axes(profile, robot))
+    if profile.rest == "full" and loaded.spline.rest == "velocity":
+        spline = loaded.spline.model_copy(update={"rest": "full"})
+        loaded = loaded.model_copy(update={"spline": spline})
+    unscaled = without_scale(robot)
+    factors = robot.settings.limits.scale.model_dump(exclude_defaults=True)
+    known = None
+    for number in range(_ROUNDS):
+        asked = loaded.model_copy(update={"robot": robot.settings})
+        result = plan(robot, asked, start_from=known, listener=listener)
+        run = verify_run(result, profile)
+        smaller = _find_factors(run, robot)
+        if run.passed or not smaller or number == _ROUNDS - 1:
+            break
+        report(f"run by {profile.title}: {'; '.join(run.failures)}; planning again")
+        factors |= {kind: factors.get(kind, 1.0) * smaller[kind] for kind in smaller}
+        robot = unscaled.with_limits(scale=factors)
+        known = result
+    return result, run
+
+
+def _find_factors(run: RunReport, robot: Robot) -> dict[str, float]:
+    """Return factors on limits of the robot that would make up for what a run exceeds."""
+    factors: dict[str, float] = {}
+    for check in run.verification.checks:
+        if check.passed:
+            continue
+        kind = check.name.removesuffix(" ratio").removesuffix(" by differences")
+        kind = kind.replace(" ", "_")
+        excess = check.value / check.allowed
+        if kind == "path_error":
+            # The sagitta of a straight line grows as the square of the speed.
+            kind = "velocity"
+            excess = excess**0.5
+        is_limited = kind in MAGNITUDES and np.isfinite(robot.limits.both_ways(kind)[1])
+        if np.any(is_limited):
+            factor = (1.0 - _MARGIN) / excess
+            factors[kind] = min(factor, factors.get(kind, 1.0))
+    return factors

@@ -1,0 +1,155 @@
+"""Motions in the units, the period and the format of a controller, verified as it runs them."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from brachis.apps.controller import (
+    ControllerAxes,
+    Profile,
+    RunReport,
+    axes_for,
+    check_period,
+    load_profile,
+    verify_run,
+)
+from brachis.apps.export.formats import FORMATS, format_of
+from brachis.apps.export.programs import ProgramReport, write_program
+from brachis.apps.export.rows import JointRows
+from brachis.common.files import atomic_write, file_name
+from brachis.errors import BrachisWarning, InputError
+from brachis.robot.custom_limits import LimitModel
+from brachis.trajectory import MotionSource, Trajectory, motion_of
+
+PROGRAM = "program"
+"""Name of the format of programs of positions, in the language of the profile."""
+
+
+class RunWarning(BrachisWarning):
+    """A motion breaks limits as a controller runs it."""
+
+
+def write_for_controller(
+    trajectory: MotionSource,
+    path: str | os.PathLike[str],
+    profile: Profile | str,
+    *,
+    form: str | None = None,
+    dt: float | None = None,
+    moves: str = "joint",
+    tolerance: float = 1e-3,
+    time_tolerance: float = 0.01,
+    own_limits: Sequence[LimitModel] = (),
+) -> RunReport | ProgramReport:
+    """Write a motion for a controller.
+
+    Parameters
+    ----------
+    trajectory : Trajectory, Result or path
+        A motion, or its file.
+    path : path
+        File to write. Its suffix sets the format.
+    profile : Profile, str or path
+        See `brachis.load_profile`.
+    form : str, optional
+        Name of the format; ``program`` for a program of positions.
+    dt : float, optional
+        Period of samples, s. The profile's unless given.
+    moves : {"joint", "linear"}, optional
+        Of programs: what moves on straight lines between positions, the joints or the tool.
+    tolerance, time_tolerance : float, optional
+        Of programs: how far the tool may be from the path, m and rad, and how late or early it may be, s.
+    own_limits : sequence of LimitModel, optional
+        Limits of the user's own with which the motion was planned.
+
+    Returns
+    -------
+    RunReport or ProgramReport
+        The verification of the samples as the controller runs them; or how far a program is from the motion.
+
+    Raises
+    ------
+    InputError
+        The profile does not fit the robot, or takes no such format or period; a joint that moves has no axis; no
+        program keeps the tolerances; or the file cannot be written.
+
+    Warns
+    -----
+    RunWarning
+        The motion breaks limits as the controller runs it. The file is written.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> from brachis import export
+    >>> trajectory = brachis.plan("examples/03_tx90l_rail_line.yaml").trajectory
+    >>> export.write_for_controller(trajectory, "motion.csv", "kuka_rsi_4ms").passed  # doctest: +SKIP
+    True
+    """
+    motion = motion_of(trajectory)
+    profile = load_profile(profile)
+    axes = axes_for(motion, profile)
+    file = file_name(path, "path")
+    language = profile.program
+    is_program = form == PROGRAM
+    if language is not None and form is None:
+        known = [name for name in profile.formats if FORMATS[name].suffix == file.suffix]
+        is_program = file.suffix == language.suffix and not known
+    if is_program and language is not None:
+        text, deviation = write_program(
+            motion,
+            profile,
+            axes,
+            file.stem,
+            moves=moves,
+            tolerance=tolerance,
+            time_tolerance=time_tolerance,
+        )
+        first_line = text.partition("\n")[0]
+        with atomic_write(path, re.escape(first_line).encode()) as stream:
+            stream.write(text.encode())
+        return deviation
+    chosen = None if is_program else format_of(path, form)
+    allowed = [*profile.formats, *([PROGRAM] if language else [])]
+    name = next((name for name, known in FORMATS.items() if known is chosen), form)
+    if chosen is None or name not in allowed:
+        raise InputError(
+            "the controller takes no such format",
+            where="format",
+            found=name,
+            allowed=f"{', '.join(allowed)} ({profile.title})",
+        )
+    period = check_period(profile, dt)
+    report = verify_run(motion, profile, period=period, own_limits=own_limits)
+    rows = _rows_of(motion, period, profile, axes)
+    with atomic_write(path, chosen.beginning) as stream:
+        chosen.writer(rows, stream)
+    if not report.passed:
+        reasons = "; ".join([*report.failures, *report.remedies])
+        warnings.warn(f"{profile.title}: {reasons}", RunWarning, stacklevel=2)
+    return report
+
+
+def _rows_of(
+    motion: Trajectory, period: float, profile: Profile, axes: ControllerAxes
+) -> JointRows:
+    """Sample a motion in the units of a controller's axes."""
+    samples = motion.sample(period, last=profile.last)
+    q = axes.encode(samples.q)
+    if profile.decimals is not None:
+        q = np.round(q, profile.decimals) + 0.0
+    changed = replace(
+        samples,
+        q=q,
+        qdot=axes.encode_rates(samples.qdot),
+        qddot=axes.encode_rates(samples.qddot),
+        tau=None if samples.tau is None else samples.tau[:, axes.index],
+    )
+    end = motion.t_end
+    return JointRows(axes.names, axes.units, (), end, period, changed, profile.columns)

@@ -1,0 +1,284 @@
+"""Programs of positions: the fewest joint or linear instructions that follow a motion within a tolerance.
+
+All positions are those of the controller's axes, so that no frame, tool or configuration is needed. The nominal
+interpolation is what a controller does if nothing slows it down. Between two positions the joints, or for linear
+instructions the tool's pose, move on a straight line at a constant speed, in the time that the motion takes there.
+Corners are rounded by parabolas, over `BLEND` times the shorter neighbouring time to each side. Where the arm rests, it
+speeds up or slows down over `BLEND` times the time of the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from brachis.apps.controller import ControllerAxes, Profile
+from brachis.apps.export.rows import require_library
+from brachis.common.summary import Summary
+from brachis.errors import InputError, check_names
+from brachis.path import path_of
+from brachis.robot import bind
+from brachis.trajectory import Trajectory
+
+BLEND = 0.25
+"""Half of the time of a corner's parabola, as a fraction of the shorter neighbouring time."""
+_POINTS = 2000
+"""Number of times at which the motion is compared with the program."""
+_STRICTER = 0.7
+"""Factor on the tolerances of single lines if the corners exceed them."""
+_ROUNDS = 12
+_REST = 1e-6
+"""Joint velocity at rest, rad/s or m/s."""
+_SLOW = 1e-3
+"""Path velocity, as a fraction of the mean one, below which times are not compared."""
+
+
+@dataclass(frozen=True, repr=False)
+class ProgramReport(Summary):
+    """How far a program of positions is from the motion, by its nominal interpolation.
+
+    Attributes
+    ----------
+    positions : int
+        Number of positions.
+    place : float
+        Largest distance of the tool from the path, m, or angle, rad.
+    time : float
+        Largest difference of the times at which places of the path are passed, s.
+    """
+
+    positions: int
+    place: float
+    time: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return dict(vars(self))
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown."""
+        return {
+            "positions": self.positions,
+            "deviation in place": f"{self.place:.3g} m, rad",
+            "deviation in time": f"{self.time:.3g} s",
+        }
+
+
+def write_program(
+    motion: Trajectory,
+    profile: Profile,
+    axes: ControllerAxes,
+    name: str,
+    *,
+    moves: str = "joint",
+    tolerance: float = 1e-3,
+    time_tolerance: float = 0.01,
+) -> tuple[str, ProgramReport]:
+    """Write a program in the language of a profile.
+
+    Parameters
+    ----------
+    motion : Trajectory
+    profile : Profile
+    axes : ControllerAxes
+    name : str
+        Of the motion, for the program's head.
+    moves : {"joint", "linear"}, optional
+        What moves on straight lines between positions: the joints or the tool.
+    tolerance : float, optional
+        Largest distance of the tool from the path, m, and angle, rad.
+    time_tolerance : float, optional
+        Largest difference in time, s.
+
+    Raises
+    ------
+    InputError
+        No program keeps the tolerances, or the language has no place for external axes.
+    """
+    check_names("kind of moves", [moves], ("joint", "linear"), "moves")
+    language = profile.program
+    assert language is not None
+    if any(axes.external) and not language.external_axes:
+        raise InputError(
+            "the language has no external axes",
+            where="profile.axes",
+            found=", ".join(axes.names),
+            allowed="joints of the arm alone",
+        )
+    jinja = require_library("jinja2", "a program", library="Jinja2", extra="report")
+    events = dict(_events(motion, profile))
+    follower = _Follower(motion, is_linear=moves == "linear")
+    share = 1.0
+    for _ in range(_ROUNDS):
+        nodes = follower.choose(share * tolerance, share * time_tolerance)
+        place, time = follower.deviate(nodes, follower.t)
+        if place <= tolerance and time <= time_tolerance:
+            break
+        share *= _STRICTER
+    else:
+        raise InputError(
+            "no program of positions keeps the tolerance",
+            where="tolerance",
+            found=f"{place:.3g} m, rad and {time:.3g} s with {len(nodes)} positions",
+            allowed=f"{tolerance:g} m, rad and {time_tolerance:g} s",
+        )
+    report = ProgramReport(len(nodes), place, time)
+    columns = follower.describe(nodes, axes)
+    steps = [
+        {name: column[row].tolist() for name, column in columns.items()}
+        | {"event": events.get(time, "")}
+        for row, time in enumerate(follower.t[nodes].tolist())
+    ]
+    text = jinja.Template(language.template, keep_trailing_newline=True).render(
+        name=name,
+        robot=motion.robot.name,
+        title=profile.title,
+        report=report,
+        t_end=motion.t_end,
+        is_linear=follower.is_linear,
+        axes=axes,
+        steps=steps,
+    )
+    return text, report
+
+
+class _Follower:
+    """Compares straight lines between positions of a motion with the motion.
+
+    Attributes
+    ----------
+    t : (K,) ndarray
+        s.
+    """
+
+    def __init__(self, motion: Trajectory, *, is_linear: bool) -> None:
+        task = motion.task
+        _, self.task_map = bind(motion.robot, task.task_space, task.tolerances)
+        self.path = path_of(self.task_map, task)
+        self.motion = motion
+        self.is_linear = is_linear
+        even = np.linspace(0.0, motion.t_end, _POINTS)
+        self.t = np.union1d(even, motion.phase_ends)
+        self.q = motion.position(self.t)
+        self.s = motion.path_coordinate(self.t)
+        self.followed = self.task_map.values(self.q) if is_linear else self.q
+        self.rests = np.abs(motion.velocity(self.t)).max(axis=1) < _REST
+
+    def choose(self, tolerance: float, time_tolerance: float) -> np.ndarray:
+        """Choose positions, (N,) indices of times, each as far away as a line within the tolerances reaches."""
+
+        def fits(first: int, last: int) -> bool:
+            """Return whether a line between two times keeps the tolerances."""
+            nodes = np.array([first, last])
+            place, time = self.deviate(nodes, self.t[first : last + 1])
+            return place <= tolerance and time <= time_tolerance
+
+        nodes = [0]
+        for end in np.searchsorted(self.t, self.motion.phase_ends).tolist():
+            while nodes[-1] < end:
+                first = nodes[-1]
+                low = first + 1
+                high = end
+                while low < high:
+                    middle = (low + high + 1) // 2
+                    low, high = (middle, high) if fits(first, middle) else (low, middle - 1)
+                nodes.append(low)
+        return np.array(nodes)
+
+    def deviate(self, nodes: np.ndarray, t: np.ndarray) -> tuple[float, float]:
+        """Return the largest deviations at times, (k,), from the path, m or rad, and from the motion's time, s."""
+        rests = self.rests[nodes]
+        values = nominal(self.t[nodes], self.followed[nodes], rests, t)
+        if not self.is_linear:
+            values = self.task_map.values(values)
+        s = self.motion.path_coordinate(t)
+        for _ in range(2):  # to the nearest place on the path
+            s = np.clip(s + self._step(values, s), 0.0, 1.0)
+        miss = self.task_map.difference(values, self.path.sample(s).target)
+        moves = np.append(True, np.diff(self.s) > 0.0)
+        late = np.abs(np.interp(s, self.s[moves], self.t[moves]) - t)
+        fast = self.motion.path_spline(t, nu=1) > _SLOW / self.motion.t_end
+        return float(np.max(self.task_map.norms(miss))), late[fast].max(initial=0.0)
+
+    def _step(self, values: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Return the step, (k,), along the path towards task coordinates, (k, c)."""
+        sample = self.path.sample(s)
+        miss = self.task_map.difference(values, sample.target)
+        along = sample.xi
+        return np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
+
+    def describe(self, nodes: np.ndarray, axes: ControllerAxes) -> dict[str, Any]:
+        """Return what a template may say of each position; see `Language`."""
+        robot = self.motion.robot
+        q = self.q[nodes]
+        rests = self.rests[nodes]
+        h = np.diff(self.t[nodes])
+        constant = h * (1.0 - 0.5 * BLEND * (rests[:-1].astype(float) + rests[1:]))
+        tool, _ = robot.tool_placements(robot.of_real_joints(q))
+        way = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+        rates = np.abs(np.diff(q, axis=0))[:, axes.index] / constant[:, None]
+        largest = robot.limits.velocity[axes.index]
+        largest = np.where(np.isfinite(largest), largest, rates.max(axis=0))
+        percent = 100.0 * np.max(rates / np.maximum(largest, _REST), axis=1)
+        zone = BLEND * np.minimum(np.append(0.0, way), np.append(way, 0.0)) * ~rests
+        return {
+            "values": axes.encode(q),
+            "duration": np.append(0.0, h),
+            "speed": np.append(0.0, way / constant),
+            "percent": np.append(1.0, percent.clip(1e-3, 100.0)),
+            "zone": zone,
+        }
+
+
+def nominal(
+    times: np.ndarray, nodes: np.ndarray, rests: np.ndarray, t: np.ndarray
+) -> np.ndarray:
+    """Return the nominal motion through nodes, (N, c), at times t, (k,); see the module's docstring.
+
+    Parameters
+    ----------
+    times : (N,) ndarray
+        Of the nodes, s.
+    nodes : (N, c) ndarray
+    rests : (N,) bool ndarray
+        Where the motion is at rest.
+    t : (k,) ndarray
+        s.
+    """
+    h = np.diff(times)
+    before = np.append(0.0, h)
+    after = np.append(h, 0.0)
+    # A line that begins at rest begins later by half of the time in which it speeds up.
+    early = 0.5 * BLEND * before * rests
+    late = 0.5 * BLEND * after * rests
+    corners = np.stack([times - early, times + late], axis=1).ravel()
+    points = np.repeat(nodes, 2, axis=0)
+    passing = BLEND * np.minimum(before, after) * ~rests
+    half = np.stack([early + passing, late], axis=1).ravel()
+    values = np.column_stack([np.interp(t, corners, column) for column in points.T])
+    slopes = np.diff(nodes, axis=0) / np.diff(corners)[1::2, None]
+    still = np.zeros_like(nodes[:1])
+    incoming = np.concatenate([still, slopes])
+    outgoing = np.concatenate([slopes, still])
+    stopped = rests[:, None]
+    turns = [outgoing * ~stopped - incoming, outgoing * stopped]
+    turn = np.stack(turns, axis=1).reshape(points.shape)
+    near = half > 0.0
+    away = np.abs(t[:, None] - corners[near])
+    bow = np.clip(half[near] - away, 0.0, None) ** 2 / (4.0 * half[near])
+    return np.asarray(values + bow @ turn[near])
+
+
+def _events(motion: Trajectory, profile: Profile) -> Iterator[tuple[float, str]]:
+    """Yield the times, s, and instructions at which a process begins or ends."""
+    is_process = [phase.kind == "given speed" for phase in motion.phases]
+    ends = [0.0, *motion.phase_ends.tolist()]
+    changes = pairwise([False, *is_process, False])
+    for time, (before, after) in zip(ends, changes, strict=True):
+        name = "process_on" if after else "process_off"
+        if before != after and name in profile.events:
+            yield time, profile.events[name]
