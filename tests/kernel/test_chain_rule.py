@@ -184,13 +184,13 @@ def test_what_does_not_fit_is_refused(chain):
         CurvePattern(none, none, POINTS, 2),
         np.zeros((3, 0)),
     )
-    with pytest.raises(ValueError, match="other points"):
+    with pytest.raises(ValueError, match="different points"):
         variables.find_entries(np.zeros((3, POINTS, 1, 3)))
     motion = MotionSlopes(*np.zeros((4, POINTS, N, 3)))
     states = np.zeros((3, POINTS, N))
     groups = ValueGroups([None], [1])
     partials = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
-    with pytest.raises(ValueError, match="other points"):
+    with pytest.raises(ValueError, match="different points"):
         differentiate(groups, motion, states, partials, variables)
     one = np.ones(1)
     beyond = ScaledQuantity("q", np.array([N]), one, one, chain)

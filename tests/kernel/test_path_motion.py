@@ -311,5 +311,5 @@ def test_largest_products_of_steps():
     np.testing.assert_allclose(
         find_largest_products(rows, step, origin), known, atol=1e-14
     )
-    with pytest.raises(ValueError, match="nowhere"):
+    with pytest.raises(ValueError, match="a point that does not exist"):
         find_largest_products(rows, step, origin + 6)

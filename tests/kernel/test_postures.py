@@ -117,9 +117,9 @@ def test_a_branch_comes_back_from_another_process():
 
 def test_what_does_not_fit_is_an_error():
     mask = np.ones(N, dtype=bool)
-    with pytest.raises(ValueError, match="not all joints"):
+    with pytest.raises(ValueError, match="must be all joints"):
         _ = Branch(REDUNDANT, REDUNDANT, mask, mask, np.zeros(N)).address
-    with pytest.raises(ValueError, match="no answers"):
+    with pytest.raises(ValueError, match="no solutions to choose from"):
         _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 0).address
     formula = Formula.of(lambda a, b: np.stack([a[:, 0], b[:, 0]], axis=1), 2, 1)
     with pytest.raises(ValueError, match=r"the answers have the shape \(2,\)"):
@@ -140,5 +140,5 @@ def test_a_branch_of_another_chain_is_an_error():
         PathMotion.prepare(chain, ASKED, given, branch=branch)
     formula = Formula.of(lambda a: a[:, None, :2], 3)
     branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula)
-    with pytest.raises(ValueError, match=r"of \(3,\) numbers; needed: \(2, 1\)"):
+    with pytest.raises(ValueError, match=r"takes \(3,\) numbers; needed: \(2, 1\)"):
         PathMotion.prepare(chain, ASKED, given, branch=branch)

@@ -1,7 +1,7 @@
-"""The compiled kernel: what is computed at every point of every motion, in C.
+"""The compiled kernel: the computations for every point of every motion, in C.
 
-Pinocchio builds the model and is the reference: the tests compare the kernel with it. See `docs/mathematics.md` for the
-formulas.
+Pinocchio builds the model and serves as the reference: the tests compare the kernel with it. See `docs/mathematics.md`
+for the formulas.
 """
 
 from brachis.kernel.chain import Chain, TorqueDerivatives

@@ -18,7 +18,7 @@ from brachis.kernel.library import (
 )
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
-"""In the order of tool.c."""
+"""Quantities in the order of tool.c."""
 
 
 _SHAPES = {
@@ -33,7 +33,7 @@ _SHAPES = {
     "gravity": "3",
     "friction": "n4",
 }
-"""Of the numbers of a chain, in the order of chain.h, with n joints."""
+"""Shapes of the arrays of a chain with n joints, in the order of chain.h."""
 
 
 class _Chain(ctypes.Structure):
@@ -48,7 +48,7 @@ class TorqueDerivatives(NamedTuple):
     Attributes
     ----------
     q, qdot, qddot : (K, n, n) ndarray
-        With respect to position, velocity, acceleration (the last is the mass matrix plus armature).
+        Derivatives with respect to position, velocity and acceleration; the last is the mass matrix plus armature.
     """
 
     q: np.ndarray
@@ -63,25 +63,25 @@ class Chain(Structured):
     Attributes
     ----------
     revolute : (n,) bool ndarray
-        Other joints are prismatic.
+        True for revolute joints; the others are prismatic.
     axes : (n, 3) ndarray
-        Unit vectors.
+        Unit vectors along the joint axes.
     points : (n, 3) ndarray
         A point on each axis, m.
     tool_position : (3,) ndarray
         m.
     tool_rotation : (3, 3) ndarray
     masses : (n,) ndarray
-        Of the body behind each joint, kg.
+        Mass of the body after each joint, kg.
     centers : (n, 3) ndarray
-        Of mass, m.
+        Centers of mass, m.
     inertias : (n, 6) ndarray
-        About the centers of mass, kg m^2: xx, xy, xz, yy, yz, zz.
+        Moments of inertia about the centers of mass, kg m^2: xx, xy, xz, yy, yz, zz.
     gravity : (3,) ndarray
         m/s^2.
     friction : (n, 4) ndarray
-        Of each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; v_eps of ``tanh(qdot / v_eps)``,
-        rad/s. Of a prismatic joint kg, N s/m, N, m/s.
+        For each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; v_eps of ``tanh(qdot / v_eps)``,
+        rad/s. For a prismatic joint the units are kg, N s/m, N and m/s.
     """
 
     revolute: np.ndarray
@@ -111,19 +111,19 @@ class Chain(Structured):
         return structure
 
     def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
-        """Torques, (K, n), Nm or N, of rigid bodies, rotors and friction in K states, (K, n) each."""
+        """Compute torques, (K, n), Nm or N, of rigid bodies, rotors and friction in K states, (K, n) each."""
         torques: np.ndarray = self._call("brachis_torques", q, qdot, qddot)
         return torques
 
     def torque_derivatives(
         self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TorqueDerivatives:
-        """Differentiate `torques` by q, qdot and qddot."""
+        """Differentiate `torques` with respect to q, qdot and qddot."""
         states = (q, qdot, qddot)
         return TorqueDerivatives(*self._call("brachis_torque_derivatives", *states))
 
     def mass_matrices(self, q: np.ndarray) -> np.ndarray:
-        """Mass matrices with rotors, (K, n, n), of K postures, (K, n)."""
+        """Compute the mass matrices, (K, n, n), rotors included, at K postures, (K, n)."""
         matrices: np.ndarray = self._call("brachis_mass_matrices", q)
         return matrices
 
@@ -138,8 +138,8 @@ class Chain(Structured):
             m.
         rotations : (K, 3, 3) ndarray
         twists : (6, K, n) ndarray
-            Columns of the Jacobian: linear, then angular velocity at the tool's origin, along the tool's axes or the
-            world's.
+            Columns of the Jacobian: linear, then angular velocity at the tool's origin, along the axes of the tool or
+            of the world.
         """
         positions, rotations, twists = self._call("brachis_tool", q, in_tool_axes)
         return positions, rotations, twists
@@ -147,12 +147,12 @@ class Chain(Structured):
     def tool_sizes(
         self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> np.ndarray:
-        """Compute the size of a motion of the tool in K states.
+        """Compute the magnitude of the tool's velocity, angular velocity or acceleration in K states.
 
         Parameters
         ----------
         quantity : {"speed", "angular speed", "acceleration"}
-            Of the tool's origin, in the world frame.
+            Quantity of the tool's origin, in the world frame.
         q, qdot, qddot : (K, n) ndarray
 
         Returns
@@ -165,7 +165,7 @@ class Chain(Structured):
     def tool_size_slopes(
         self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Compute `tool_sizes`, (K,), and their slopes by q, qdot and qddot, (K, n) each: 0 where the size is 0."""
+        """Compute `tool_sizes`, (K,), and slopes in q, qdot and qddot, (K, n) each, which are 0 where the size is 0."""
         by_q, by_qdot, by_qddot = slopes = np.empty((3, len(q), self.n))
         sizes = self._find_sizes(quantity, (q, qdot, qddot), slopes)
         return sizes, (by_q, by_qdot, by_qddot)
@@ -176,7 +176,7 @@ class Chain(Structured):
         states: tuple[np.ndarray, np.ndarray, np.ndarray],
         slopes: np.ndarray | None,
     ) -> np.ndarray:
-        """Return `tool_sizes`, and write `slopes`, (3, K, n), if these are asked for."""
+        """Return `tool_sizes`, and fill in `slopes`, (3, K, n), unless it is None."""
         number = _QUANTITIES.index(quantity)
         sizes: np.ndarray = self._call("brachis_tool_sizes", number, *states, slopes)
         return sizes

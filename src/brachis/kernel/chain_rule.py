@@ -1,4 +1,4 @@
-"""Slopes of values by curves from slopes by joints, and entries of a Jacobian.
+"""Slopes of values with respect to curves from their slopes with respect to joints, and entries of a Jacobian.
 
 See `brachis.optimise.evaluator`.
 """
@@ -17,13 +17,13 @@ from brachis.kernel.value_groups import Partial, ValueGroups, hold_and_address
 
 @dataclass(frozen=True, eq=False)
 class MotionSlopes:
-    """Derivatives of a joint motion at K points by c curves, (K, n, c) each; see `brachis.kinematics.JointDerivatives`.
+    """Derivatives of a joint motion at K points in c curves, (K, n, c) each; see `brachis.kinematics.JointDerivatives`.
 
     Attributes
     ----------
     gradient, qdot_y, qddot_y, qddot_ydot : (K, n, c) ndarray
     qdddot_y : (K, n, c) ndarray or None
-        Where a value depends on the jerk.
+        Derivative of the jerk, needed if a value depends on the jerk.
     """
 
     gradient: np.ndarray
@@ -42,20 +42,20 @@ class _Variables(ctypes.Structure):
 
 
 class CurvePattern:
-    """Where each of z variables matters: at which of K points, and for which of c curves.
+    """The place at which each of z variables matters: one of K points and one of c curves.
 
     Parameters
     ----------
     points, curves : (z,) int ndarray
     count, width : int
-        K and c.
+        Numbers of points and curves, K and c.
     """
 
     def __init__(
         self, points: np.ndarray, curves: np.ndarray, count: int, width: int
     ) -> None:
         if points.shape != curves.shape:
-            raise ValueError("points and curves are not as many")
+            raise ValueError("there must be as many points as curves")
         for indices, size, name in (points, count, "point"), (curves, width, "curve"):
             if len(indices) and not 0 <= indices.min() <= indices.max() < size:
                 raise ValueError(f"a {name} does not exist; there are {size}")
@@ -68,24 +68,24 @@ class CurvePattern:
 
     @property
     def addresses(self) -> list[int]:
-        """Where the library finds points and curves."""
+        """Addresses of the points and the curves."""
         return [address(indices) for indices in self._indices]
 
 
 @dataclass(frozen=True, eq=False)
 class VariableSlopes:
-    """Slopes of c curves and their time derivatives, at K points, by variables.
+    """Slopes of c curves and their time derivatives, at K points, with respect to variables.
 
-    Orders that values do not depend on are left out.
+    Orders on which no value depends are left out.
 
     Attributes
     ----------
     shared : (b, orders, K, c) ndarray
-        By the b variables that move all curves, at all points.
+        Slopes with respect to the b variables that affect all curves at all points.
     pattern : CurvePattern
-        Of the other z variables.
+        Pattern of the other z variables.
     basis : (orders, z) ndarray
-        Slopes of the curve of each, and of its time derivatives, by it.
+        Slopes of each variable's curve and its time derivatives with respect to the variable.
     """
 
     shared: np.ndarray
@@ -94,11 +94,11 @@ class VariableSlopes:
 
     @property
     def entries(self) -> int:
-        """How many entries a value has in the Jacobian, b K + z."""
+        """Number of entries that a value has in the Jacobian, b K + z."""
         return len(self.shared) * self.pattern.shape[0] + self.pattern.size
 
     def structure(self, orders: int, arrays: list[np.ndarray]) -> _Variables:
-        """Return what the library reads; what is added to `arrays` has to stay alive."""
+        """Return the structure that the library reads; the arrays added to `arrays` must stay alive."""
         orders = min(orders, len(self.basis))
         count = len(self.shared)
         size = self.pattern.size
@@ -108,10 +108,10 @@ class VariableSlopes:
         return _Variables(orders, count, shared, size, *self.pattern.addresses, basis)
 
     def find_entries(self, slopes: np.ndarray) -> np.ndarray:
-        """Entries of a Jacobian, (b K + z, values), of values with slopes by the curves, (orders, K, values, c)."""
+        """Return entries of a Jacobian, (b K + z, values), from slopes in the curves, (orders, K, values, c)."""
         orders, count, _, width = slopes.shape
         if (count, width) != self.pattern.shape:
-            raise ValueError("slopes are of other points or curves")
+            raise ValueError("the slopes belong to different points or curves")
         arrays: list[np.ndarray] = []
         structure = ctypes.byref(self.structure(orders, arrays))
         entries: np.ndarray = call_checked(
@@ -127,7 +127,7 @@ def differentiate(
     partials: Sequence[tuple[Sequence[Partial], Partial]],
     variables: VariableSlopes | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Differentiate values by the curves and their time derivatives.
+    """Differentiate values with respect to the curves and their time derivatives.
 
     Parameters
     ----------
@@ -136,14 +136,14 @@ def differentiate(
     states : sequence of (K, n) ndarray
         q, qdot and qddot.
     partials : sequence of (sequence of ndarray or None, ndarray or None)
-        Of the groups in ``groups.with_partials``: (K, size, n), or (size, n) if all points share them,
-        by q, qdot, qddot and qdddot, and (K, size) by the first curve.
+        Partials of the groups in ``groups.with_partials``: with respect to q, qdot, qddot and qdddot, (K, size, n), or
+        (size, n) if all points share them, and with respect to the first curve, (K, size).
     variables : VariableSlopes, optional
 
     Returns
     -------
     slopes : (3 or 4, K, sum of sizes, c) ndarray
-        By y, ydot, yddot and, with `qdddot_y`, ydddot.
+        Slopes with respect to y, ydot, yddot and, with `qdddot_y`, ydddot.
     entries : (b K + z, sum of sizes) ndarray
         See `VariableSlopes.find_entries`; (0, sum of sizes) without variables.
     """
@@ -175,7 +175,7 @@ def differentiate(
     by = None
     if variables is not None:
         if variables.pattern.shape != (count, width):
-            raise ValueError("variables are of other points or curves")
+            raise ValueError("the variables belong to different points or curves")
         entries = np.empty((variables.entries, columns))
         by = ctypes.byref(variables.structure(orders, arrays))
     call(

@@ -2,8 +2,8 @@
 
     python src/brachis/kernel/compile.py
 
-Installing the package does the same. It takes the C compiler of the machine (`CC`, or `cc`), and where there is none
-that of the package ziglang. Only the standard library is needed.
+Installing the package does the same. It uses the C compiler of the machine (`CC`, or `cc`). If there is none, it uses
+the compiler of the package ziglang. Only the standard library is needed.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from pathlib import Path
 SCRIPT = Path(__file__).resolve()
 FOLDER = SCRIPT.parent
 VARIANTS = {"baseline": (), "avx2": ("-mavx2",)}
-"""Names of the libraries, and what they may use of the processor."""
-# No contraction: all variants give the same digits.
+"""Names of the library variants, and the compiler flags for the processor features that they may use."""
+# Without contraction, all variants give the same digits.
 _FLAGS = ("-O3", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno")
 _QUIET = ("-Wno-psabi",)
 
 
 def library_path(variant: str) -> Path:
-    """Return where the library of a variant is, or is to be."""
+    """Return the path of a variant's library, which need not exist."""
     return FOLDER / f"kernel_{variant}.so"
 
 
 def describe_file(library: Path) -> str:
-    """Return the size and the digest of a library, which are noted beside it when it is made."""
+    """Return the size and the digest of a library, which are recorded beside it when it is compiled."""
     content = library.read_bytes()
     return f"{len(content)} bytes, SHA-256 {hashlib.sha256(content).hexdigest()}"
 
 
 def source_digest() -> str:
-    """Return a digest of the C source, by which a library is known to belong to it."""
+    """Return a digest of the C source, which shows whether a library was compiled from it."""
     digest = hashlib.sha256()
     for file in sorted([*FOLDER.glob("*.h"), *FOLDER.glob("*.c")]):
         digest.update(file.read_bytes())
@@ -47,7 +47,7 @@ def source_digest() -> str:
 
 
 def find_compiler() -> list[str] | None:
-    """Return the command of the machine's C compiler; None if it has none."""
+    """Return the command of the machine's C compiler; None if there is none."""
     stated = os.environ.get("CC")
     if stated:
         return shlex.split(stated)
@@ -58,7 +58,7 @@ def find_compiler() -> list[str] | None:
 
 
 def _runs(command: list[str]) -> bool:
-    """Tell whether a command can be run: macOS has a `cc` that only says how to install one."""
+    """Tell whether a command can be run: macOS has a `cc` that only says how to install a compiler."""
     try:
         return not _run(command).returncode
     except OSError:
@@ -70,7 +70,7 @@ def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
 
 
 def compile_kernel() -> list[Path]:
-    """Compile every variant that this kind of machine has.
+    """Compile every variant that this kind of machine supports.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def compile_kernel() -> list[Path]:
     Raises
     ------
     RuntimeError
-        A C compiler is missing, or it fails.
+        There is no C compiler, or it fails.
     """
     compiler = find_compiler()
     if compiler is None:
@@ -97,7 +97,7 @@ def compile_kernel() -> list[Path]:
         if flags and platform.machine().lower() not in ("x86_64", "amd64"):
             continue
         library = library_path(variant)
-        # Made aside and moved: who loads it meanwhile finds the old one or the new one.
+        # Compiled under another name and moved, so that whoever loads it meanwhile finds the old or the new library.
         aside = library.with_suffix(f".{os.getpid()}.tmp")
         command = [
             *compiler,

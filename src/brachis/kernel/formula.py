@@ -1,12 +1,12 @@
-"""Formulas that are written with NumPy, recorded once, and evaluated by the library at many points.
+"""Formulas written with NumPy, which are recorded once and evaluated by the library at many points.
 
-A function is called once with arrays of `Number` in the place of values; it takes square roots and angles by the
-functions below, which are NumPy's for plain values. What it does to them is kept as a sequence of
-steps; so are its derivatives, by the chain rule from the last step to the first (reverse accumulation; A. Griewank, A.
-Walther, Evaluating Derivatives, 2008). Steps that nothing needs are left out, and the same one is kept once.
+A function is called once with arrays of `Number` in place of values. For square roots and angles it uses the functions
+below, which are NumPy's functions for plain values. Its operations are recorded as a sequence of steps. Its derivatives
+are recorded too, by the chain rule from the last step to the first (reverse accumulation; A. Griewank, A. Walther,
+Evaluating Derivatives, 2008). Steps that are not needed are left out, and equal steps are stored once.
 
-A function has to do the same whatever the values are: no comparison, no `numpy.linalg`. Terms with a factor of zero
-count as zero, also where the other factor would be infinite.
+A function has to perform the same operations for all values: no comparisons, no `numpy.linalg`. Terms with a factor of
+zero count as zero, even if the other factor would be infinite.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from brachis.kernel.library import (
 
 _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
-"""In the order of formula.c."""
+"""Codes of the operations, in the order of formula.c."""
 
 
 def _make_operator(
     apply: Callable[[Record, Number, Number], Number],
 ) -> Callable[[Number, Any], Number]:
-    """Return a method that applies an operation to a number and a second one, which may be plain."""
+    """Return a method that applies an operation to a number and a second operand, which may be a plain number."""
 
     def operate(self: Number, operand: Any) -> Number:
         return apply(self.record, self, self.record.number(operand))
@@ -43,20 +43,20 @@ def _make_operator(
 
 
 class Number:
-    """A number of a formula: an input, a constant, or what an operation gives.
+    """A number of a formula: an input, a constant, or the result of an operation.
 
     Attributes
     ----------
     record : Record
-        To which it belongs.
+        Record to which the number belongs.
     operation : str
-        One of the operations, ``input`` or ``constant``.
+        The name of an operation, ``input`` or ``constant``.
     operands : tuple
-        Numbers; the place of an input, or the value of a constant.
+        Operands of the operation; for an input its place, for a constant its value.
     place : int
-        Among the numbers of the record.
+        Position among the numbers of the record.
     value : float or None
-        Of a constant.
+        Value of a constant.
     """
 
     __slots__ = ("operands", "operation", "place", "record", "value")
@@ -84,14 +84,14 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """The numbers of a formula, in the order in which they come about."""
+    """The numbers of a formula, in the order in which they were created."""
 
     numbers: list[Number] = field(default_factory=list)
     _known: dict[tuple[Any, ...], Number] = field(default_factory=dict)
 
     def _add_number(self, operation: str, *operands: Any) -> Number:
-        """Return the number, which is made if it is not known."""
-        key = (operation, *operands)  # numbers are known by their identity
+        """Return the number for an operation, and create it if it is new."""
+        key = (operation, *operands)  # numbers are compared by identity
         known = self._known.get(key)
         if known is None:
             known = Number(self, operation, operands)
@@ -100,13 +100,13 @@ class Record:
         return known
 
     def inputs(self, count: int) -> np.ndarray:
-        """Make the next inputs, (1, count)."""
+        """Create the next inputs, (1, count)."""
         begin = sum(number.operation == "input" for number in self.numbers)
         made = [self._add_number("input", begin + i) for i in range(count)]
         return np.array(made, dtype=object).reshape(1, count)
 
     def number(self, value: Any) -> Number:
-        """Return a number as it is, anything else as a constant."""
+        """Return a number unchanged, and any other value as a constant."""
         return (
             value
             if isinstance(value, Number)
@@ -114,14 +114,14 @@ class Record:
         )
 
     def apply(self, function: str, *operands: Number) -> Number:
-        """Apply a function of one number or two."""
+        """Apply a function of one or two numbers."""
         values = [operand.value for operand in operands]
         if None in values:
             return self._add_number(function, *operands)
         return self.number(getattr(np, function)(*values))
 
     def add(self, a: Number, b: Number) -> Number:
-        """Add two numbers; a difference where one of them is a negative."""
+        """Add two numbers, with a subtraction if one of them is negated."""
         if a.value is not None and b.value is not None:
             return self.number(a.value + b.value)
         if a.value == 0.0:
@@ -159,7 +159,7 @@ class Record:
         return self._add_number("multiply", *sorted((a, b), key=_place))
 
     def divide(self, a: Number, b: Number) -> Number:
-        """Divide a number by another one."""
+        """Divide one number by another."""
         if a.value == 0.0 or b.value == 1.0:
             return a
         if a.value is not None and b.value:
@@ -167,7 +167,7 @@ class Record:
         return self._add_number("divide", a, b)
 
     def gradient(self, output: Number, inputs: np.ndarray) -> list[Number]:
-        """Differentiate a number by inputs."""
+        """Differentiate a number with respect to inputs."""
         slopes = {output: self.number(1.0)}
         for number in self.numbers[output.place :: -1]:
             slope = slopes.get(number)
@@ -194,7 +194,7 @@ _SLOPES: dict[str, Callable[..., tuple[Any, ...]]] = {
     "arctan2": lambda _, a, b: (b / (a * a + b * b), -a / (a * a + b * b)),
     "ceil": lambda _, _a: (0.0,),
 }
-"""Slopes of what an operation gives, by its operands."""
+"""Slopes of an operation's result with respect to its operands."""
 
 
 def _place(number: Number) -> int:
@@ -202,10 +202,10 @@ def _place(number: Number) -> int:
 
 
 def _make_recordable(function: np.ufunc) -> Callable[..., Any]:
-    """Return a function of NumPy that takes arrays of numbers of a formula too, and plain ones among them."""
+    """Return a NumPy function that also accepts arrays of a formula's numbers, mixed with plain numbers."""
 
     def apply_to_one(*values: Any) -> Any:
-        """Record the step if one of the values belongs to a formula, else compute it."""
+        """Record the step if one of the values belongs to a formula, otherwise compute it."""
         records = [value.record for value in values if isinstance(value, Number)]
         if not records:
             return function(*values)
@@ -238,21 +238,21 @@ class _Formula(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class Formula(Structured):
-    """A recorded function of K points, with one argument or two.
+    """A recorded function of K points, with one or two arguments.
 
     Attributes
     ----------
     counts : tuple of int
-        Numbers of the inputs, in each argument.
+        Number of inputs in each argument.
     shape : tuple of int
-        Of the results at a point.
+        Shape of the results at a point.
     constants : (c,) ndarray
     steps : (s, 3) int32 ndarray
-        Operation and operands, which are counted over inputs, constants and steps.
+        Operation and operands. The operands are indices over inputs, constants and steps.
     outputs : (o,) int32 ndarray
-        Indices of the results, counted likewise.
+        Indices of the results, counted in the same way.
     discards_incomplete : bool
-        Whether a row of the last axis becomes NaN throughout if one of its numbers is not finite.
+        Whether all numbers of a row along the last axis become NaN if one of them is not finite.
     """
 
     counts: tuple[int, ...]
@@ -319,7 +319,7 @@ class Formula(Structured):
         return cls.of(differentiate, count)
 
     def select(self, index: Any) -> Formula:
-        """Return the formula of some of the results at a point; `index` as NumPy takes it."""
+        """Return the formula for some of the results at a point, selected by a NumPy index."""
         outputs = np.reshape(self.outputs, self.shape)[index]
         inputs = sum(self.counts)
         begin = inputs + len(self.constants)
@@ -343,7 +343,7 @@ class Formula(Structured):
         )
 
     def __call__(self, *points: np.ndarray) -> np.ndarray:
-        """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
+        """Evaluate the formula at K points, (K, count) for every argument; return (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
         arrays = [as_contiguous(values, (count, size)) for values, size in pairs]

@@ -1,4 +1,4 @@
-"""Halve knot intervals where a timing needs it; see `brachis.optimise.timed_splines`."""
+"""Halving of knot intervals where a timing needs it; see `brachis.optimise.timed_splines`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def halve_intervals(
     shortest: float,
     max_count: int,
 ) -> np.ndarray:
-    """Halve intervals of 0 to 1, those first that lose most.
+    """Halve intervals between 0 and 1, beginning with those that cost the most time.
 
-    An interval loses its length times how far accelerations are from linear within it.
+    An interval costs its length times the deviation of the accelerations from a straight line within it.
 
     Parameters
     ----------
@@ -30,24 +30,24 @@ def halve_intervals(
         Times of a timing, ascending, from 0 to 1.
     accelerations : (M, n) ndarray
     rate : (M,) ndarray
-        dp/dt there.
+        dp/dt at these times.
     jumps, ramps : (M - 1,) ndarray
-        How much of an acceleration jumps between two times, and what a ramp in its place costs a unit of length.
+        Size of the jump of the accelerations between two times, and the cost of a ramp in its place per unit of length.
     least_times : int
-        Times within an interval that are needed to tell whether it is smooth.
+        Minimum number of times within an interval that are needed to tell whether it is smooth.
     begin_count : int
-        Equal intervals that are halved.
+        Number of equal intervals at the beginning.
     tolerance : float
-        What all intervals together may lose.
+        Time that all intervals together may cost.
     shortest : float
-        Length below which they are not halved.
+        Length below which intervals are not halved.
     max_count : int
-        Number of intervals with which halving ends.
+        Number of intervals at which halving ends.
 
     Returns
     -------
     (N,) ndarray
-        Where they begin, ascending.
+        Beginnings of the intervals, ascending.
     """
     count, begins = call_checked(
         "brachis_halve",

@@ -1,4 +1,4 @@
-"""Load the compiled library, and call its functions."""
+"""Loading of the compiled library, and calls of its functions."""
 
 from __future__ import annotations
 
@@ -58,15 +58,15 @@ FUNCTIONS = {
     "brachis_curves": "- p l l p p",
     "brachis_formula": "- p l p l p l p",
 }
-"""What functions return and take: pointer, long, double, int, or nothing.
+"""Return type and arguments of each function: pointer, long, double, int, or nothing.
 
-An array has its shape in brackets: a letter is a size, a digit a number. Arrays behind ``>`` are written to; arrays
-behind ``l`` are of whole numbers, all others of doubles. A letter by itself is that size. What is in braces are fields
-of a structure, of which the function gets the address; an ``i`` cannot be a field.
+An array has its shape in brackets: a letter stands for a size, a digit for a number. Arrays after ``>`` are written to.
+Arrays after ``l`` hold whole numbers, all others doubles. A letter by itself is that size. Arguments in braces are
+fields of a structure, whose address the function gets; an ``i`` cannot be a field.
 """
 _DOUBLE = np.dtype(np.float64)
 WHOLE = np.dtype("l")
-"""Whole numbers of the library."""
+"""Type of the library's whole numbers."""
 
 
 def _split(word: str) -> tuple[str, str]:
@@ -83,7 +83,7 @@ _DIGITS = {str(digit): digit for digit in range(10)}
 
 
 def _lay_out_structure(name: str) -> tuple[slice, struct.Struct]:
-    """Return which arguments of a function are the fields of a structure, and their layout there."""
+    """Return the slice of a function's arguments that are fields of a structure, and the layout of the structure."""
     before, _, braced = FUNCTIONS[name].partition("{")
     begin = len(before.split()) - 1
     fields = slice(begin, begin + len(braced.partition("}")[0].split()))
@@ -99,7 +99,7 @@ _STRUCTURES = {
 
 
 def declare_fields(declaration: str) -> list[tuple[str, Any]]:
-    """List the fields of a structure in C: ``"l count; p q qdot"``, with the letters of `FUNCTIONS` for the types."""
+    """List the fields of a C structure, declared as ``"l count; p q qdot"``, with types as in `FUNCTIONS`."""
     fields = []
     for line in declaration.split(";"):
         kind, *names = line.split()
@@ -118,7 +118,7 @@ def load() -> ctypes.CDLL:
     Raises
     ------
     NotBuiltError
-        It was not compiled, is damaged, or belongs to other source.
+        The library was not compiled, is damaged, or belongs to other source.
     """
     baseline = _open(library_path("baseline"))
     faster = library_path("avx2")
@@ -139,7 +139,7 @@ def _open(path: Path) -> ctypes.CDLL:
         raise NotBuiltError(str(error), SCRIPT) from error
     library.brachis_source.restype = ctypes.c_char_p
     if library.brachis_source().decode() != source_digest():
-        raise NotBuiltError(f"{path.name} was made of other source", SCRIPT)
+        raise NotBuiltError(f"{path.name} was compiled from other source", SCRIPT)
     for name, declaration in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype = _KINDS[declaration[0]]
@@ -155,7 +155,7 @@ def _open(path: Path) -> ctypes.CDLL:
 
 
 def address(values: np.ndarray) -> int:
-    """Return where the numbers of a contiguous array begin."""
+    """Return the address of a contiguous array."""
     try:
         return _find_address(_find_buffer(values))
     except (TypeError, ValueError):  # read-only, or empty
@@ -164,7 +164,7 @@ def address(values: np.ndarray) -> int:
 
 
 def call(name: str, *arguments: Any) -> Any:
-    """Call a function of the library; of contiguous arrays, and of a structure, it gets the addresses."""
+    """Call a function of the library; contiguous arrays and structures are passed by address."""
     plain = [
         address(value) if isinstance(value, np.ndarray) else value
         for value in arguments
@@ -176,20 +176,20 @@ def call(name: str, *arguments: Any) -> Any:
 
 
 def call_checked(name: str, *arguments: Any, **sizes: int) -> Any:
-    """Call a function of the library after a check of the shapes of arrays, and make room for what it writes.
+    """Call a function of the library after checking the shapes of its arrays, and allocate its outputs.
 
     Parameters
     ----------
     name : str
-        One of `FUNCTIONS`.
+        Name in `FUNCTIONS`.
     *arguments
-        What it takes, but for sizes and for the arrays that it writes.
+        Arguments of the function, except sizes and the arrays that it writes.
     **sizes : int
-        By the letters that stand for them; those that follow from the shapes of arrays may be left out.
+        Sizes by their letters. Sizes that follow from the shapes of arrays may be left out.
 
     Returns
     -------
-    What the function returns, then the arrays that it writes: a list, if these are not one alone.
+    The return value of the function, then the arrays that it writes; a list if there is more than one.
 
     Raises
     ------
@@ -215,9 +215,9 @@ class _CallShapes(NamedTuple):
     Attributes
     ----------
     taken : list
-        For what is handed over shape and kind of numbers; empty where no shape is declared.
+        Shape and type of each argument that is passed; empty if no shape is declared.
     sizes : list of int or None
-        For each argument that is not written to the size that it is; None where it is handed over.
+        Size for each argument that is not an output; None if the argument is passed.
     written : list of tuple of int
         Shapes of arrays that are written to.
     """
@@ -233,7 +233,7 @@ def _resolve_shapes(
     shapes: tuple[tuple[int, ...] | None, ...],
     sizes: tuple[tuple[str, int], ...],
 ) -> _CallShapes:
-    """Derive a function's sizes, and the shapes of what it writes, from the shapes of its arguments."""
+    """Derive a function's sizes and the shapes of its outputs from the shapes of its arguments."""
     known = _DIGITS | dict(sizes)
     words = _ARGUMENTS[name]
     inputs = [word for word in words if word[0] in ("", *_KINDS)]
@@ -262,44 +262,44 @@ def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
 
 
 class Structured:
-    """A dataclass that the library reads by a structure, which is made once and lives as long as the object."""
+    """A dataclass that the library reads through a structure, which is built once and lives as long as the object."""
 
     __dataclass_fields__: dict[str, Any]
 
     def _make_structure(self) -> ctypes.Structure:
-        """Make the structure; arrays that it points to are attributes of it."""
+        """Build the structure; the arrays to which it points are attributes of it."""
         raise NotImplementedError
 
     @property
     def structure(self) -> Any:
-        """What the library reads."""
+        """The structure that the library reads."""
         attributes = vars(self)
         if "_structure" not in attributes:
-            # Threads that ask together get the same one.
+            # Threads that ask at the same time get the same structure.
             attributes.setdefault("_structure", self._make_structure())
         return attributes["_structure"]
 
     @property
     def address(self) -> int:
-        """Where the library finds the structure."""
+        """Address of the structure."""
         return _find_address(self.structure)
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave addresses, and what follows from the fields, behind."""
+        """Return the fields only, without addresses and derived values."""
         return {name: vars(self)[name] for name in self.__dataclass_fields__}
 
 
 def as_contiguous(
     values: Any, shape: tuple[int, ...], dtype: np.dtype[Any] = _DOUBLE
 ) -> np.ndarray:
-    """Return an array of this shape as contiguous doubles, or other numbers.
+    """Return an array of this shape as contiguous numbers, by default doubles.
 
     Raises
     ------
     ValueError
-        It has another shape: the library would read beyond its end.
+        The array has a different shape, and the library would read beyond its end.
     TypeError
-        It is complex.
+        The array is complex.
     """
     if type(values) is np.ndarray and values.dtype is dtype:
         if values.shape == shape and values.flags.c_contiguous:
@@ -315,10 +315,10 @@ def as_contiguous(
 def as_doubles_at_points(
     values: np.ndarray, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, int]:
-    """Return numbers at K points, (K, ...), as contiguous doubles, and how far it is from a point to the next one.
+    """Return numbers at K points, (K, ...), as contiguous doubles, and the offset from one point to the next.
 
-    Where they are the same at all points, they are those of one, and the distance is 0. `values` may then be those of
-    one point too. Raises as `as_contiguous` does.
+    If all points share the same numbers, those of one point are returned, and the offset is 0. `values` may then also
+    be given for one point only. Raises as `as_contiguous` does.
     """
     if values.ndim == len(shape) - 1:
         return as_contiguous(values, shape[1:]), 0

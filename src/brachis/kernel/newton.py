@@ -26,20 +26,20 @@ class _Prescribed(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Prescribed(Structured):
-    """What of the tool is prescribed: rows of its position, and an angle or its orientation; or its pose.
+    """The prescribed part of the tool's pose: rows of its position and an angle or its orientation, or the whole pose.
 
     Attributes
     ----------
     axes : tuple of int
         World axes of the position rows.
     turns : {0, 1, 3}
-        Rows of rotation: none, an angle about a world axis, or the orientation.
+        Number of rotation rows: none, one for an angle about a world axis, or three for the orientation.
     in_tool_axes : bool
-        Whether the rows are motions along and about the tool's axes; only of a pose.
+        Whether the rows are motions along and about the tool's axes; only for a whole pose.
     heading : tuple of int
-        Of an angle: the tool's axis, and the two world axes in whose plane its direction is the angle.
+        For an angle: the tool's axis, and the two world axes of the plane in which the axis makes this angle.
     sign : float
-        Of the second world axis.
+        Sign of the second world axis.
     """
 
     axes: tuple[int, ...]
@@ -50,18 +50,18 @@ class Prescribed(Structured):
 
     @property
     def count(self) -> int:
-        """How many rows are prescribed."""
+        """Number of prescribed rows."""
         return len(self.axes) + self.turns
 
     @property
     def parts(self) -> list[int]:
-        """Rows of the tool's twist, linear, then angular, that are prescribed."""
+        """Indices of the prescribed rows of the tool's twist, which is linear, then angular."""
         turning = [3, 4, 5] if self.turns == 3 else [6 - sum(self.heading[1:])]
         return [*self.axes, *turning[: self.turns]]
 
     @property
     def coordinates(self) -> int:
-        """How many task coordinates they have: of an orientation the rotation matrix."""
+        """Number of task coordinates; an orientation has nine, the rotation matrix."""
         return len(self.axes) + (9 if self.turns == 3 else self.turns)
 
     def _make_structure(self) -> _Prescribed:
@@ -81,9 +81,10 @@ def find_postures(
     *,
     beside: bool,
 ) -> np.ndarray:
-    """Find postures, (K, n), that meet targets, (K, c), under linear conditions.
+    """Find postures, (K, n), that reach targets, (K, c), under linear conditions.
 
-    These are rows, (K, r, n), and levels, (K, r). The others are as of `brachis.ik.newton.Newton.solve`.
+    The conditions are rows, (K, r, n), and levels, (K, r). For the other parameters see
+    `brachis.ik.newton.Newton.solve`.
     """
     rows, levels = conditions
     free = chain.n - prescribed.count

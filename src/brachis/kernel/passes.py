@@ -12,19 +12,19 @@ from brachis.kernel.library import call_checked
 def bounds_of_pairs(
     slope: np.ndarray, lower: np.ndarray, upper: np.ndarray, parallel: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the least and the largest x >= 0 at which no lower line is above an upper one.
+    """Find the smallest and the largest x >= 0 at which no lower line is above an upper line.
 
     Parameters
     ----------
     slope, lower, upper : (P, c) ndarray
         Lines ``slope x + lower`` and ``slope x + upper``.
     parallel : float
-        Difference of slopes below which lines are parallel.
+        Difference of slopes below which lines are treated as parallel.
 
     Returns
     -------
     floor, ceiling : (P,) ndarray
-        The largest x is -1 where parallel lines leave nothing between them.
+        The smallest and the largest x. The largest is -1 if parallel lines leave nothing between them.
     """
     floor, ceiling = call_checked(
         "brachis_bounds_of_pairs", slope, lower, upper, parallel
@@ -45,20 +45,20 @@ def go_backwards(
     Parameters
     ----------
     steps : three (P - 1, c) ndarrays
-        Factor, lower and upper: the next x is ``factor x + lower`` to ``factor x + upper``.
+        Factor, lower and upper: the next x lies between ``factor x + lower`` and ``factor x + upper``.
     levels : tuple of (P - 1,) ndarray
-        The least and the largest x at all stations but the last.
+        The smallest and the largest x at all stations except the last.
     last : float
         x at the last station.
     flat : float
-        Factor below which the next x does not rise with this one: such rows are left out.
+        Factor below which the next x does not increase with this x. Such rows are left out.
     rounding : float
-        Part of x by which rounding may leave an interval empty.
+        Fraction of x by which an interval may be empty because of rounding.
 
     Returns
     -------
     low, high : (P,) ndarray
-        None if an interval is empty.
+        Ends of the intervals. None is returned if an interval is empty.
     """
     count = len(steps[0]) + 1
     reached, low, high = call_checked(
@@ -73,7 +73,7 @@ def go_forwards(
     within: tuple[np.ndarray, np.ndarray],
     first: float,
 ) -> np.ndarray:
-    """Find the largest x, (P,), from the first station on, within intervals, (P,) each; see `go_backwards`."""
+    """Find the largest x at the stations, (P,), in order, within intervals, (P,) each; see `go_backwards`."""
     x: np.ndarray = call_checked(
         "brachis_go_forwards", factor, upper, *within, first, P=len(factor) + 1
     )

@@ -39,8 +39,8 @@ _INPUTS = {
     "t": "K",
     "near": "Kn",
 }
-"""What the library reads, and its shape: K points, n joints, c curves, m prescribed rows, z task coordinates, r rows of
-w = n + 1 numbers, and g = n + r + n r numbers of a chart's reference."""
+"""The arrays that the library reads, and their shapes, with K points, n joints, c curves, m prescribed rows, z task
+coordinates, r rows of w = n + 1 numbers, and g = n + r + n r numbers of a chart's reference."""
 _OUTPUTS = {
     "answers": "Kam",
     "levels": "Kr",
@@ -56,13 +56,13 @@ _OUTPUTS = {
     "qddot_y": "Knc",
     "qddot_ydot": "Knc",
 }
-"""What it writes: also a answers of a closed form."""
+"""The arrays that the library writes; `a` is the number of solutions of a closed form."""
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
-"""What is needed for more than postures."""
+"""Inputs that are needed for more than postures."""
 
 
 class Fault(IntEnum):
-    """Why there is no motion; the numbers are those of postures.c."""
+    """Reason why there is no motion; the numbers are those of postures.c."""
 
     NO_POSTURE = 1
     SINGULAR = 2
@@ -79,7 +79,7 @@ class _PathMotion(ctypes.Structure):
 
 @lru_cache
 def _lay_out(**sizes: int) -> tuple[dict[str, tuple[int, ...]], np.dtype[Any]]:
-    """Return the shapes of inputs, and one record for all that is written."""
+    """Return the shapes of the inputs, and one record type for all outputs."""
     shapes = {name: shape_of(letters, sizes) for name, letters in _INPUTS.items()}
     written = [
         (name, float, shape_of(letters, sizes)) for name, letters in _OUTPUTS.items()
@@ -88,7 +88,7 @@ def _lay_out(**sizes: int) -> tuple[dict[str, tuple[int, ...]], np.dtype[Any]]:
 
 
 def _written(name: str) -> Any:
-    """Return a property: one of the arrays that the library writes."""
+    """Return a property for one of the arrays that the library writes."""
     return property(lambda motion: motion.written[name])
 
 
@@ -96,37 +96,36 @@ def _written(name: str) -> Any:
 class PathMotion(Structured):
     """Motion at K points along a path.
 
-    First all is prepared; answers of a closed form without a formula, or postures that are known, are then written to
-    `answers` or `q`. Without `branch` and ``inputs["reference"]`` the postures are known.
+    `prepare` comes first. If the closed form has no formula, its solutions are then written to `answers`; known
+    postures are written to `q`. Without `branch` and ``inputs["reference"]`` the postures must be known.
 
     Attributes
     ----------
     chain : Chain
     prescribed : Prescribed
     branch : Branch or None
-        By which postures are found; in a chart, None.
+        Branch by which postures are found; None in a chart.
     side : float
-        Sign that det J_aug must have; 0: either.
+        Sign that det J_aug must have; 0 allows both.
     inputs : dict of str to ndarray
-        The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) where all points share them.
-        For a closed form or a chart ``targets``, (K, coordinates), and in a chart its ``reference``, (K, n + r + n
-        r): posture, sigma and dq/dsigma. For `evaluate` ``ydot`` and ``yddot``, and the path's ``xi``, ``xi_ds`` and
-        ``xi_dds``, (K, m). Where rows change along the path, three derivatives of them, ``row_derivatives``,
-        (3, K, r, n + 1). Times ``t``, (K,), by which turns are counted, or postures ``near``, (K, n), that are known
-        to be so.
+        Always the curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) if all points share them.
+        For a closed form or a chart also ``targets``, (K, coordinates). For a chart also its ``reference``, (K, n + r +
+        n r): posture, sigma and dq/dsigma. For `evaluate` also ``ydot`` and ``yddot``, and the path's ``xi``, ``xi_ds``
+        and ``xi_dds``, (K, m). If rows change along the path, also their three derivatives, ``row_derivatives``, (3, K,
+        r, n + 1). To count turns, either times ``t``, (K,), or postures ``near``, (K, n), that are known to be close.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
     written : ndarray
-        What the library writes; the arrays below are among them.
+        All that the library writes, including the arrays below.
     answers : (K, A, m) ndarray
-        Of a closed form.
+        Solutions of a closed form.
     q, qdot, qddot : (K, n) ndarray
     twists : (6, K, n) ndarray
         Columns of the tool's Jacobian.
     inverse : (K, n, n) ndarray
-        Of J_aug, the task Jacobian with the rows of the conditions below.
+        Inverse of J_aug, which is the task Jacobian with the rows of the conditions below it.
     determinants : (K,) ndarray
-        Of J_aug.
+        Determinants of J_aug.
     gradient : (K, n, 1 + r) ndarray
         dq/dy.
     """
@@ -149,13 +148,13 @@ class PathMotion(Structured):
         branch: Branch | None = None,
         side: float = 0.0,
     ) -> PathMotion:
-        """Check the inputs, and make room for the outputs; see the class.
+        """Check the inputs and allocate the outputs; see the class.
 
         Raises
         ------
         ValueError
-            An array is missing or has another shape, or the branch is that of another chain: the library would
-            read beyond the ends of arrays.
+            An array is missing or has the wrong shape, or the branch belongs to a different chain. The library would
+            then read beyond the ends of arrays.
         """
         n = chain.n
         m = prescribed.count
@@ -212,19 +211,19 @@ class PathMotion(Structured):
         )
 
     def find_postures(self) -> np.ndarray:
-        """Find the postures alone, (K, n); NaN where they do not exist."""
+        """Find only the postures, (K, n); NaN where they do not exist."""
         call("brachis_postures", self.address)
         postures: np.ndarray = self.q
         return postures
 
     def evaluate(self) -> Fault | None:
-        """Find postures and motion; return what is at fault."""
+        """Find postures and motion; return the fault, or None."""
         _need(self.inputs, _OF_MOTION)
         fault = call("brachis_evaluate", self.address)
         return Fault(fault) if fault else None
 
     def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each."""
+        """Return dqdot/dy, dqddot/dy and dqddot/dydot, (K, n, 1 + r) each."""
         call("brachis_path_derivatives", self.address)
         written = self.written
         return written["qdot_y"], written["qddot_y"], written["qddot_ydot"]
@@ -232,7 +231,7 @@ class PathMotion(Structured):
     def singular_slopes(
         self, values: np.ndarray, vectors: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate what `find_least_singular` gives for J_aug, (K,), by q, (K, n), and by s, (K,)."""
+        """Differentiate the results of `find_least_singular` for J_aug, (K,), in q, (K, n), and in s, (K,)."""
         count, n = self.qdot.shape
         by_q, by_s = call_checked(
             "brachis_singular_slopes", self.address, values, vectors, K=count, n=n
@@ -241,13 +240,13 @@ class PathMotion(Structured):
 
 
 def _need(inputs: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
-    """Refuse what is not complete."""
+    """Refuse incomplete inputs."""
     missing = [name for name in names if name not in inputs]
     if missing:
         raise ValueError(f"{', '.join(missing)} of the motion is missing")
 
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
+    """Find the smallest singular values, (K,), and their right vectors for matrices with given inverses, (K, n, n)."""
     values, vectors = call_checked("brachis_least_singular", inverses)
     return values, vectors

@@ -1,4 +1,4 @@
-"""Which postures belong to the curves along a path: those of a branch of a closed form, or of a chart."""
+"""The choice of postures along a path: those of a branch of a closed form, or of a chart."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ class _Branch(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class Branch(Structured):
-    """A branch of a closed form, by which m of n joints follow from target and redundant joints.
+    """A branch of a closed form, which gives m of n joints from the target and the redundant joints.
 
-    Of several answers the one is taken that is nearest, modulo turns, to the posture before. Angles get the turns
-    nearest to the posture before, or those to which their velocities lead.
+    Of several solutions, the one closest to the previous posture is taken, where full turns do not count. Angles get
+    the turns closest to the previous posture, or those to which their velocities lead.
 
     Attributes
     ----------
     redundant, nonredundant : (r,), (m,) int ndarray
         Indices of the joints.
     turns : (n,) bool ndarray
-        Joints whose turns are counted.
+        True for joints whose turns are counted.
     ranged : (n,) bool ndarray
-        Those with a finite range: their turns must be certain.
+        True for joints with a finite range: their turns must be certain.
     start : (n,) ndarray
-        The first posture gets the turns nearest to this one.
+        The first posture gets the turns closest to this one.
     alternatives : int
-        Number of answers, A; those that do not exist are not finite.
+        Number of solutions, A; those that do not exist are not finite.
     answers_of : Formula or None
-        Of target and redundant joints, with (A, m) results; None where the answers are given.
+        Formula of the target and the redundant joints, with (A, m) results; None if the solutions are given.
     """
 
     redundant: np.ndarray
@@ -52,13 +52,13 @@ class Branch(Structured):
 
     @property
     def counts_turns(self) -> bool:
-        """Whether it matters which turn an angle is in."""
+        """Whether the turn of some angle matters."""
         return bool(self.ranged.any())
 
     def check_fits(self, n: int, r: int, coordinates: int) -> None:
-        """Refuse other numbers of joints, redundant joints or task coordinates.
+        """Refuse different numbers of joints, redundant joints or task coordinates.
 
-        The library would read beyond the end of arrays.
+        With different numbers the library would read beyond the ends of arrays.
 
         Raises
         ------
@@ -73,16 +73,18 @@ class Branch(Structured):
         if self.answers_of is None or self.answers_of.counts == (coordinates, r):
             return
         raise ValueError(
-            f"the answers are of {self.answers_of.counts} numbers; needed: {(coordinates, r)}"
+            f"the formula takes {self.answers_of.counts} numbers; needed: {(coordinates, r)}"
         )
 
     def _make_structure(self) -> _Branch:
         n = len(self.start)
         joints = np.concatenate([self.redundant, self.nonredundant])
         if not np.array_equal(np.sort(joints), np.arange(n)):
-            raise ValueError("redundant and other joints are not all joints, once each")
+            raise ValueError(
+                "the redundant and the other joints must be all joints, each once"
+            )
         if self.alternatives < 1:
-            raise ValueError("no answers to choose from")
+            raise ValueError("the branch has no solutions to choose from")
         formula = None
         if self.answers_of is not None:
             formula = self.answers_of.address

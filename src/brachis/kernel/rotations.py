@@ -9,11 +9,11 @@ import numpy as np
 from brachis.kernel.library import call_checked
 
 _MOST = 8
-"""Derivatives that the library has room for, with the value itself."""
+"""Maximum number of derivatives that the library has room for, including the value itself."""
 
 
 def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
-    """Differentiate the rotation matrices, (m, ..., 3, 3), of quaternions w, x, y, z of any length, (m, ..., 4)."""
+    """Differentiate rotation matrices, (m, ..., 3, 3), given by quaternions w, x, y, z of any length, (m, ..., 4)."""
     orders, *places, _ = quaternions.shape
     _check(orders)
     flat = quaternions.reshape(orders, math.prod(places), 4)
@@ -27,12 +27,12 @@ def body_twists(poses: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     poses : (m, ..., 12) ndarray
-        Derivatives, from the value on, of the position and the rotation matrix row by row.
+        Value and derivatives of the position and the rotation matrix, row by row.
 
     Returns
     -------
     (m - 1, ..., 6) ndarray
-        The body twist and its derivatives: linear, then angular velocity, along the axes of the turning frame.
+        The body twist and its derivatives: linear, then angular velocity, along the axes of the rotating frame.
     """
     orders, *places, width = poses.shape
     _check(orders)
@@ -42,6 +42,6 @@ def body_twists(poses: np.ndarray) -> np.ndarray:
 
 
 def _check(orders: int) -> None:
-    """Refuse more derivatives, with the value itself, than the library has room for."""
+    """Refuse more derivatives, including the value itself, than the library has room for."""
     if not 1 <= orders <= _MOST:
         raise ValueError(f"{orders} derivatives; allowed: 1 to {_MOST}")

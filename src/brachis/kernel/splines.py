@@ -1,7 +1,7 @@
-"""Splines without SciPy, whose import takes longer than an ordinary plan.
+"""Splines without SciPy, because importing SciPy takes longer than an ordinary plan.
 
-A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots
-behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are found by de Boor's recursion
+A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots after
+its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are computed by de Boor's recursion
 (Cohen, Lyche and Riesenfeld, 1980).
 """
 
@@ -33,7 +33,7 @@ class Spline:
     Attributes
     ----------
     knots : (L + d + 1,) ndarray
-        Ascending; the first and the last d + 1 are equal.
+        Knots, ascending; the first d + 1 are equal, and so are the last d + 1.
     control_points : (L, ...) ndarray
     degree : int
         d.
@@ -45,20 +45,22 @@ class Spline:
 
     @classmethod
     def through(cls, places: np.ndarray, values: np.ndarray, degree: int = 3) -> Spline:
-        """Interpolate values, (P, ...), at ascending places, (P,); d is odd.
+        """Interpolate values, (P, ...), at ascending places, (P,), with an odd degree d.
 
-        The first and the last (d + 1) / 2 intervals are one polynomial each ("not a knot"). Between d places or fewer,
-        lines are straight.
+        The first (d + 1) / 2 intervals are one polynomial, and so are the last ("not a knot"). With d places or fewer,
+        the spline consists of straight lines.
 
         Raises
         ------
         ValueError
-            The places are too few, or do not ascend, or there are more or fewer values.
+            There are too few places, they do not ascend, or the number of values differs.
         """
         if len(places) <= degree:
             degree = 1
         if len(places) < 2 or not (np.diff(places) > 0.0).all():
-            raise ValueError("the places of an interpolation are few, or do not ascend")
+            raise ValueError(
+                "the places of an interpolation are too few, or do not ascend"
+            )
         if len(values) != len(places):
             raise ValueError(f"{len(values)} values for {len(places)} places")
         beside = (degree + 1) // 2
@@ -68,7 +70,7 @@ class Spline:
         span = _find_spans(knots, degree, places)
         number = np.arange(len(places))[:, None]
         column = span[:, None] + np.arange(-degree, 1)
-        # Of d + 1 successive control points each has a column of its own.
+        # Each of d + 1 successive control points has its own column.
         every = np.arange(len(places)) % (degree + 1)
         basis = cls(knots, np.eye(degree + 1)[every], degree)(places)
         matrix = np.zeros((len(places), 2 * degree + 1))
@@ -79,7 +81,7 @@ class Spline:
         return cls(knots, points, degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
-        """Value, or derivative of the order `nu`, at x, of any shape; at a knot that just after it."""
+        """Evaluate the spline, or its derivative of order `nu`, at x, of any shape; at a knot, just after it."""
         if nu > 0:
             return self.derivative(x, nu - 1)
         x = np.asarray(x, dtype=float)
@@ -92,9 +94,9 @@ class Spline:
     def derivatives(
         self, x: np.ndarray, order: int, rounding: float = 0.0
     ) -> np.ndarray:
-        """Value and derivatives up to `order`, (order + 1, K, ...), at x, (K,); at knots those just after them.
+        """Return value and derivatives up to `order`, (order + 1, K, ...), at x, (K,); at a knot, those just after it.
 
-        What is no more than `rounding` before a knot is at this knot.
+        An x at most `rounding` before a knot is treated as at this knot.
         """
         shape = self.control_points.shape
         points = self.control_points.reshape(len(self.control_points), -1)
@@ -111,12 +113,12 @@ class Spline:
 
     @cached_property
     def derivative(self) -> Spline:
-        """The derivative as a spline; zero of steps."""
+        """The derivative as a spline; zero for degree 0."""
         points = self.control_points
         if self.degree == 0:
             return Spline(self.knots, np.zeros_like(points), 0)
         width = self.knots[self.degree + 1 : -1] - self.knots[1 : -self.degree - 1]
-        # Where knots repeat so often that a control point matters nowhere, the width is zero.
+        # Where knots repeat so often that a control point has no effect, the width is zero.
         share = np.divide(self.degree, width, out=np.zeros_like(width), where=width > 0)
         slopes = np.diff(points, axis=0) * share.reshape(-1, *[1] * (points.ndim - 1))
         return Spline(self.knots[1:-1], slopes, self.degree - 1)
@@ -125,7 +127,7 @@ class Spline:
 def collocation(
     knots: np.ndarray, degree: int, places: np.ndarray, nu: int = 0
 ) -> np.ndarray:
-    """Matrix, (P, L), with ``matrix @ control_points`` the spline, or a derivative, at places, (P,)."""
+    """Return a matrix, (P, L), so that ``matrix @ control_points`` is the spline, or a derivative, at places, (P,)."""
     return Spline(knots, np.eye(len(knots) - degree - 1), degree)(places, nu)
 
 
@@ -142,7 +144,7 @@ def blossom(
     knots : (L + d + 1,) ndarray
     control_points : (L, c) ndarray
     spans : (K,) int ndarray
-        Numbers of the knots at which the spans of the polynomials begin.
+        Indices of the knots at which the spans of the polynomials begin.
     arguments : sequence of d (K,) ndarray
 
     Returns
@@ -167,10 +169,10 @@ def bernstein(coefficients: np.ndarray, spans: np.ndarray, u: np.ndarray) -> np.
     Parameters
     ----------
     coefficients : (m + 1, L, ...) ndarray
-        Of L pieces.
+        Coefficients of L pieces.
     spans : (K,) int ndarray
     u : (K,) ndarray
-        Places in the pieces, 0 to 1.
+        Positions in the pieces, 0 to 1.
 
     Returns
     -------
@@ -185,7 +187,7 @@ def bernstein(coefficients: np.ndarray, spans: np.ndarray, u: np.ndarray) -> np.
 
 
 def _find_spans(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
-    """Find the knot at which the span of each x, (K,), begins; beyond the ends that of the outer span."""
+    """Find the knot at which the span of each x, (K,), begins; x outside the knots belongs to the outer span."""
     spans = np.searchsorted(knots, x, side="right") - 1
     return np.clip(spans, degree, len(knots) - degree - 2)
 
@@ -198,20 +200,20 @@ class _Basis(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class Basis(Structured):
-    """Basis functions of splines, and their derivatives, that matter at K places.
+    """Basis functions of splines and their derivatives, at K places, without those that are zero there.
 
     Attributes
     ----------
     values : (orders, K, w) ndarray
     first : (K,) int ndarray
-        Number of the control point of the first of the w functions.
+        Index of the control point that belongs to the first of the w functions.
     """
 
     values: np.ndarray
     first: np.ndarray
 
     def __post_init__(self) -> None:
-        """Refuse numbers of control points that do not exist."""
+        """Refuse indices of control points that do not exist."""
         if self.first.shape != (self.values.shape[1],):
             raise ValueError("first needs one number for each place")
         if self.first.min(initial=0) < 0:
@@ -219,7 +221,7 @@ class Basis(Structured):
 
     @cached_property
     def _needed(self) -> int:
-        """How many control points a curve needs."""
+        """Number of control points that a curve needs."""
         return int(self.first.max(initial=0)) + self.values.shape[2]
 
     def _make_structure(self) -> _Basis:
@@ -230,12 +232,12 @@ class Basis(Structured):
         return structure
 
     def sum(self, control_points: np.ndarray) -> np.ndarray:
-        """Values of splines with control points, (c, L), and their derivatives, (orders, K, c)."""
+        """Compute values and derivatives, (orders, K, c), of splines with control points, (c, L)."""
         orders, count, _ = self.values.shape
         curves, point_count = control_points.shape
         if count and point_count < self._needed:
             raise ValueError(f"a control point does not exist; there are {point_count}")
-        # Shapes are known here, and this is called most often.
+        # The shapes are known here, so `call_checked` is not needed; this function is called most often.
         values = np.empty((orders, count, curves))
         points = as_contiguous(control_points, (curves, point_count))
         call("brachis_curves", self.address, curves, point_count, points, values)

@@ -18,7 +18,8 @@ def tool_derivatives(
         Columns of the Jacobian; see `Chain.tool`.
     qdot, qddot : (K, n) ndarray
     in_tool_axes : bool
-        Whether the twists are along the tool's axes; along the world's, a is the acceleration of the tool's origin.
+        Whether the twists are along the tool's axes. If they are along the world's axes, a is the acceleration of the
+        tool's origin.
 
     Returns
     -------
@@ -32,6 +33,6 @@ def tool_derivatives(
 
 
 def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
-    """Rotation vectors, (K, 3), rad, of rotation matrices, (K, 3, 3)."""
+    """Return the rotation vectors, (K, 3), rad, of rotation matrices, (K, 3, 3)."""
     vectors: np.ndarray = call_checked("brachis_logarithms", rotations)
     return vectors

@@ -1,4 +1,4 @@
-"""Values of limits in groups: quantities of joints and formulas, which the kernel computes, and all others."""
+"""Values of limits in groups: joint quantities and formulas, which the kernel computes, and all other values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from brachis.kernel.formula import Formula
 from brachis.kernel.library import address, as_contiguous, as_doubles_at_points, call
 
 QUANTITIES = ("q", "qdot", "qddot", "qdddot", "torque")
-"""In the order of motion.h."""
+"""Quantities in the order of motion.h."""
 _TORQUE = len(QUANTITIES) - 1
 _FORMULA = len(QUANTITIES)
 _PARTIAL = ("q", "qdot", "qddot", "qdddot")
@@ -35,7 +35,7 @@ Partial = np.ndarray | None
 
 @dataclass(frozen=True, eq=False)
 class ScaledQuantity:
-    """Values that are each a quantity of one joint, less an offset, times a factor.
+    """Values that are each a quantity of one joint, minus an offset, times a factor.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ScaledQuantity:
     joints : (c,) int ndarray
     offsets, factors : (c,) ndarray
     chain : Chain
-        Of the joints; of which torques are.
+        Chain of the joints, which also gives the torques.
     """
 
     quantity: str
@@ -56,14 +56,14 @@ class ScaledQuantity:
 
 @dataclass(frozen=True, eq=False)
 class FormulaQuantity:
-    """Values that are numbers of a formula of the posture times a factor.
+    """Values that are results of a formula of the posture, times a factor.
 
     Attributes
     ----------
     values_of : Formula
-        Of q, with c results.
+        Formula of q, with c results.
     slopes_of : Formula
-        Of q, with (c, n) results: their slopes by q.
+        Formula of q, with (c, n) results: the slopes of the values with respect to q.
     factors : (c,) ndarray
     """
 
@@ -73,7 +73,7 @@ class FormulaQuantity:
 
 
 Quantity = ScaledQuantity | FormulaQuantity
-"""What the kernel computes by itself."""
+"""A quantity that the kernel computes by itself."""
 
 
 class ValueGroups:
@@ -82,20 +82,20 @@ class ValueGroups:
     Parameters
     ----------
     quantities : sequence of ScaledQuantity, FormulaQuantity or None
-        Groups of which nothing is given here have partials.
+        Quantities of the groups. A group with None has partials.
     sizes : sequence of int
-        How many values are in each.
+        Number of values in each group.
 
     Attributes
     ----------
     chain : Chain or None
-        Of which torques are; None where no group needs them.
+        Chain that gives the torques; None if no group needs them.
     has_jerk : bool
         Whether a quantity is a jerk.
     with_partials : list of int
-        Numbers of the groups that have partials.
+        Indices of the groups that have partials.
     size : int
-        Number of all values.
+        Total number of values.
     """
 
     def __init__(
@@ -123,11 +123,11 @@ class ValueGroups:
                 self._set(self._table[number], quantity)
 
     def __reduce__(self) -> tuple[type[ValueGroups], tuple[Any, ...]]:
-        """Leave addresses behind."""
+        """Pickle without addresses."""
         return ValueGroups, (self._quantities, self._sizes)
 
     def _set_formula(self, number: int, quantity: FormulaQuantity) -> None:
-        """Set what the library reads of a formula."""
+        """Set the fields that the library reads for a formula."""
         row = self._table[number]
         size = int(row["values"])
         values_of = quantity.values_of
@@ -146,7 +146,7 @@ class ValueGroups:
         row["slopes_of"] = slopes_of.address
 
     def _set(self, row: np.void, scaled: ScaledQuantity) -> None:
-        """Set what the library reads of a scaled quantity."""
+        """Set the fields that the library reads for a scaled quantity."""
         quantity = QUANTITIES.index(scaled.quantity)
         joints = np.ascontiguousarray(scaled.joints, dtype="l")
         count = row["values"]
@@ -155,7 +155,7 @@ class ValueGroups:
         offsets = as_contiguous(scaled.offsets, (count,))
         factors = as_contiguous(scaled.factors, (count,))
         if joints.shape != (count,):
-            raise ValueError("joints are not as many as values")
+            raise ValueError("there must be as many joints as values")
         self._set_joints(scaled.chain.n)
         row["quantity"] = quantity
         row["joints"] = address(joints)
@@ -174,12 +174,12 @@ class ValueGroups:
         self._joints = n
 
     def check_joints(self, n: int) -> None:
-        """Refuse a motion of another number of joints: the library would read beyond its end."""
+        """Refuse a motion with a different number of joints, because the library would read beyond its end."""
         if self._joints not in (None, n):
             raise ValueError(f"the motion has {n} joints; needed: {self._joints}")
 
     def split(self, values: np.ndarray, count: int) -> list[np.ndarray]:
-        """Divide values of K points, of one group behind the other, into (K, size) of each group."""
+        """Divide values at K points, stored group after group, into arrays of each group, (K, size)."""
         groups = zip(self._first, self._sizes, strict=False)
         return [
             values[count * first : count * (first + size)].reshape(count, size)
@@ -196,12 +196,12 @@ class ValueGroups:
         states : sequence of (K, n) ndarray
             q, qdot, qddot and, where a group needs it, qdddot.
         torque : (K, n) ndarray, optional
-            Where a group needs it.
+            Torque, if a group needs it.
 
         Returns
         -------
         list of (K, size) ndarray
-            Of every group; nothing is set where it has partials.
+            Values of every group; those of a group with partials are not set.
         """
         count, n = states[0].shape
         self.check_joints(n)
@@ -225,9 +225,9 @@ class ValueGroups:
         points: tuple[int, int],
         arrays: list[np.ndarray],
     ) -> np.ndarray:
-        """Return what the library reads, with partials at K points of n joints; see `differentiate`.
+        """Return the table that the library reads, with partials at K points of n joints; see `differentiate`.
 
-        What is added to `arrays` has to stay alive.
+        The arrays that are added to `arrays` must stay alive.
         """
         if not (self.with_partials or self._formulas):
             return self._table
@@ -247,7 +247,7 @@ class ValueGroups:
 def hold_and_address(
     values: Partial, shape: tuple[int, ...], arrays: list[np.ndarray]
 ) -> int | None:
-    """Return where numbers are, None without any; what is added to `arrays` has to stay alive."""
+    """Return the address of an array, or None; the array that is added to `arrays` must stay alive."""
     if values is None:
         return None
     arrays.append(as_contiguous(values, shape))
@@ -261,7 +261,7 @@ def _set_partials(
     points: tuple[int, int],
     arrays: list[np.ndarray],
 ) -> None:
-    """Set what the library reads of partials at K points of n joints; see `hold_and_address`."""
+    """Set the fields that the library reads for partials at K points of n joints; see `hold_and_address`."""
     count, n = points
     size = int(row["values"])
     for name, partial in zip(_PARTIAL, by_joints, strict=True):

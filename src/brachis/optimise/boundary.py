@@ -1,13 +1,14 @@
-"""Splines whose first and last control points are fixed or tied by the boundary conditions.
+"""Splines whose first and last control points are fixed or tied together by the boundary conditions.
 
     control points = S free + sum of T^i fixed_i,    with T the duration
 
-A clamped spline begins like the polynomial y0 + v t + a t^2 / 2 + ..., with its first k derivatives given, where its
-first k + 1 control points are those of the polynomial: y0 + v T b_i1 + a T^2 b_i2 + ..., with b_i1 the Greville
-abscissae and b_ij the blossoms of t^j / j!. At rest all but the first are zero, and these control points are equal. The
-other ones fade from the polynomial, as v T xi_i (1 - xi_i)^2, plus what is free of them: this changes no motion, but
-lets a longer duration alone leave the curve smooth, which solvers need. What derivatives have in common at a seam is
-linear in the control points too (see `periodic`). Boundary conditions therefore need no rows in the NLP.
+Suppose the first k derivatives are given at the start. A clamped spline begins like the polynomial y0 + v t + a t^2 / 2
++ ... if its first k + 1 control points are those of the polynomial: y0 + v T b_i1 + a T^2 b_i2 + ..., with b_i1 the
+Greville abscissae and b_ij the blossoms of t^j / j!. At rest v, a, ... are zero, and these control points are equal.
+The fixed terms of the other control points fade away from the polynomial, as v T xi_i (1 - xi_i)^2, and their free
+parts are added. This does not restrict the motion. But when only the duration gets longer, the curve stays smooth,
+which solvers need. Conditions on derivatives at a seam are linear in the control points too (see `periodic`). Boundary
+conditions therefore need no rows in the NLP.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ from brachis.path.time_law import TimeLaw
 
 @dataclass(frozen=True)
 class EndCondition:
-    """What is given of a spline at one of its ends.
+    """Conditions on a spline at one of its ends.
 
     Attributes
     ----------
     value : float
-        NaN where free.
+        Value at the end; NaN if it is free.
     derivatives : (k,) ndarray
-        The first k time derivatives, in seconds; empty where they are free.
+        The first k time derivatives, per second; empty if they are free.
     """
 
     value: float
@@ -42,13 +43,13 @@ class EndCondition:
 
     @property
     def rate(self) -> float:
-        """The first derivative, per second; zero where it is free."""
+        """The first derivative, per second; zero if it is free."""
         return float(self.derivatives[:1].sum())
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMatrix:
-    """What free variables add to control points: the matrix S, entry by entry in the order of its rows.
+    """The matrix S from free variables to control points, stored by its nonzero entries in the order of its rows.
 
     Attributes
     ----------
@@ -67,22 +68,22 @@ class FreeMatrix:
 
     @classmethod
     def of(cls, matrix: np.ndarray) -> FreeMatrix:
-        """Take the entries of a matrix, (N + d, free)."""
+        """Store the nonzero entries of a matrix, (N + d, free)."""
         point, variable = np.nonzero(matrix)
         return cls(point, variable, matrix[point, variable], matrix.shape)
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """Numbers of entries in the rows, (N + d,)."""
+        """Number of entries in each row, (N + d,)."""
         return np.bincount(self.point, minlength=self.shape[0])
 
     def control_points(self, free: np.ndarray) -> np.ndarray:
-        """Return what free variables add to the control points, (N + d,)."""
+        """Return the contribution of the free variables to the control points, (N + d,)."""
         terms = self.weight * free[self.variable]
         return np.bincount(self.point, terms, self.shape[0])
 
     def dense(self) -> np.ndarray:
-        """Return S with its zeros, (N + d, free)."""
+        """Return S as a dense matrix, (N + d, free)."""
         matrix = np.zeros(self.shape)
         matrix[self.point, self.variable] = self.weight
         return matrix
@@ -90,14 +91,14 @@ class FreeMatrix:
 
 @dataclass(frozen=True)
 class BoundarySpline:
-    """A scalar spline of degree d over normalised time with boundary conditions built in.
+    """A scalar spline of degree d over normalised time, with boundary conditions built in.
 
     Attributes
     ----------
     free_matrix : FreeMatrix
-        S.
+        The matrix S.
     fixed_terms : (1 + p, N + d) ndarray
-        Fixed terms of the control points, by powers of the duration, up to the highest one that matters, p.
+        Fixed terms of the control points, one for each power of the duration up to the highest that matters, p.
     """
 
     free_matrix: FreeMatrix
@@ -138,15 +139,15 @@ class BoundarySpline:
         return self.free_matrix.shape[1]
 
     def fixed_points(self, duration: float) -> np.ndarray:
-        """Return what the boundary conditions alone make of the control points, (N + d,)."""
+        """Return the part of the control points that the boundary conditions fix, (N + d,)."""
         return sum_powers(self.fixed_terms, duration)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
-        """Control points (N + d,) from the free variables and the duration, s."""
+        """Compute the control points, (N + d,), from the free variables and the duration, s."""
         return self.free_matrix.control_points(free) + self.fixed_points(duration)
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
-        """Free variables that come nearest to given control points: means over those that are one variable each."""
+        """Return free variables for given control points; a variable shared by several points is their mean."""
         free_points = control_points - self.fixed_points(duration)
         matrix = self.free_matrix
         is_alone = (matrix.counts[matrix.point] == 1) & (matrix.weight == 1.0)
@@ -161,22 +162,22 @@ def stack_splines(
     count: int,
     variables: int,
 ) -> tuple[FreeMatrix, np.ndarray]:
-    """Put splines over the same knots together: the control points of one follow those of the one before.
+    """Stack splines over the same knots: the control points of each follow those of the spline before it.
 
     Parameters
     ----------
     splines : sequence of BoundarySpline
     slices : sequence of slice
-        Where the free variables of each are among all variables.
+        Positions of each spline's free variables among all variables.
     count, variables : int
         Numbers of control points of each spline, and of all variables.
 
     Returns
     -------
     stacked : FreeMatrix
-        By all variables.
+        Matrix with respect to all variables.
     terms : (1 + k, all control points) ndarray
-        By powers of the duration.
+        Fixed terms, one row for each power of the duration.
     """
     powers = max((len(spline.fixed_terms) for spline in splines), default=1)
     terms = np.zeros((powers, len(splines), count))
@@ -201,9 +202,9 @@ def stack_splines(
 def sum_powers(
     terms: np.ndarray, duration: float, *, slope: bool = False
 ) -> np.ndarray:
-    """Add up terms, (1 + k, p), times the powers of a duration, s; or return the slope of the sum by the duration.
+    """Add up terms, (1 + k, p), times the powers of a duration, s; with `slope`, return the derivative of this sum.
 
-    The answer is not to be written to.
+    Do not write to the array that is returned.
     """
     if len(terms) == 1:
         return np.zeros_like(terms[0]) if slope else terms[0]
@@ -214,9 +215,10 @@ def sum_powers(
 
 
 def _blossoms(knots: np.ndarray, degree: int, anchor: int, highest: int) -> np.ndarray:
-    """Control points of t^j / j!, for j up to `highest`, with t from the end of control point `anchor` on.
+    """Return control points of t^j / j!, for j up to `highest`, with t = 0 at the end of control point `anchor`.
 
-    The blossom of t^j / j! is the elementary symmetric polynomial e_j of a control point's d knots, over d! / (d - j)!.
+    The blossom of t^j / j! is e_j (d - j)! / d!, with e_j the elementary symmetric polynomial of a control point's d
+    knots.
 
     Returns
     -------
@@ -241,11 +243,11 @@ def _blossoms(knots: np.ndarray, degree: int, anchor: int, highest: int) -> np.n
 def periodic(
     knots: np.ndarray, degree: int, start: float, jump: float
 ) -> BoundarySpline:
-    """Build a spline whose value at the end is that at the start plus a jump, and whose derivatives are the same.
+    """Build a spline with equal derivatives at both ends, and a value at the end that is ahead by a jump.
 
-    These are all that continue within the spline, the first three at most. With A and B the derivatives, from the value
-    on, as functions of the first and the last p + 1 control points, the last ones are B^-1 A times the first ones, plus
-    the jump.
+    The derivatives are those that are continuous within the spline, at most the first three. Let A and B give the value
+    and derivatives from the first and the last p + 1 control points. The last control points are then B^-1 A times the
+    first ones, plus the jump.
 
     Parameters
     ----------
@@ -253,7 +255,7 @@ def periodic(
     degree : int
         d.
     start : float
-        Value at the start, NaN where free.
+        Value at the start; NaN if it is free.
     jump : float
     """
     orders = min(degree, ORDERS)
@@ -279,12 +281,12 @@ class Boundary:
     Attributes
     ----------
     start, end : (c,) tuple of EndCondition
-        Of every curve.
+        Conditions on every curve.
     periodic : bool
-        Whether the end continues as the start begins, in derivatives too; nothing else is given of these then. Values
-        that are given at both ends say by how much the end is ahead.
+        Whether the motion continues smoothly from its end to its start. No derivatives are given then. Values that are
+        given at both ends tell by how much the end is ahead of the start.
     time_law : TimeLaw or None
-        s(t) where it is given: then the duration is too, and the first curve has no spline.
+        Time law of s(t), if it is given. The duration is then given too, and the first curve has no spline.
     """
 
     start: tuple[EndCondition, ...]
@@ -301,7 +303,7 @@ class Boundary:
         *,
         periodic: bool = False,
     ) -> Boundary:
-        """Give values, (c,), NaN where free, with as many vanishing derivatives at both ends."""
+        """Build conditions from values, (c,), NaN where free, and a number of derivatives that vanish at both ends."""
         zeros = np.zeros(derivatives)
         sides = [
             tuple(EndCondition(float(value), zeros) for value in values)
@@ -311,22 +313,22 @@ class Boundary:
 
     @property
     def law_curves(self) -> int:
-        """Number of curves that the time law gives, and that have no spline: 1 or 0."""
+        """Number of curves that the time law gives and that have no spline: 1 or 0."""
         return int(self.time_law is not None)
 
     @property
     def rates(self) -> tuple[float, float]:
-        """First derivatives of the first curve at start and end, 1/s; zero where these are free."""
+        """First derivatives of the first curve at start and end, 1/s; zero if they are free."""
         return self.start[0].rate, self.end[0].rate
 
     @property
     def ahead(self) -> np.ndarray:
-        """By how much the end is ahead of the start, (c,); zero where that is free."""
+        """Distance by which the end of each curve is ahead of its start, (c,); zero where this is free."""
         pairs = zip(self.start, self.end, strict=True)
         return np.nan_to_num([end.value - start.value for start, end in pairs])
 
     def splines(self, knots: np.ndarray, degree: int) -> tuple[BoundarySpline, ...]:
-        """Build the conditions into splines."""
+        """Build splines that satisfy the conditions."""
         if self.periodic:
             jumps = zip(self.start, self.ahead, strict=True)
             return tuple(
@@ -341,14 +343,14 @@ class Boundary:
 
 @dataclass(frozen=True)
 class LocalBasis:
-    """Basis functions of value and three derivatives at K times.
+    """Basis functions at K times, for the value and three derivatives.
 
     Attributes
     ----------
     first : (K,) int ndarray
         Number of the first of the d + 1 control points that matter at each time.
     values : (4, K, d + 1) ndarray
-        Per unit of normalised time.
+        Basis functions and their derivatives, per unit of normalised time.
     """
 
     first: np.ndarray
@@ -356,8 +358,8 @@ class LocalBasis:
 
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
-        """Sample the basis at normalised times `t_norm`, (K,); at knots behind them."""
-        # Rounding must not choose the side of a knot: the highest derivative jumps there.
+        """Sample the basis at normalised times `t_norm`, (K,); at a knot, just after it."""
+        # Rounding must not decide the side of a knot, because the highest derivative jumps there.
         breaks = np.unique(knots)
         place = np.searchsorted(breaks, t_norm - 1e-13).clip(max=len(breaks) - 1)
         near = breaks[place]
@@ -370,7 +372,7 @@ class LocalBasis:
         return self.first[:, None] + np.arange(self.values.shape[2])
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
-        """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
+        """Return value and three derivatives, (4, K, c), of c splines with control points (c, N + d)."""
         return self._basis.sum(control_points)
 
     @cached_property
@@ -379,21 +381,21 @@ class LocalBasis:
 
 
 class SparsityPattern:
-    """Where the free variables of splines matter: each time and variable of a spline once, one spline after the other.
+    """The times at which the free variables of splines matter: each pair occurs once, spline by spline.
 
     Parameters
     ----------
     columns : (K, d + 1) int ndarray
         Control points of a spline that matter at each time; see `LocalBasis`.
     matrix : FreeMatrix
-        Of splines over the same knots, stacked.
+        Stacked matrix of splines over the same knots.
     curves : int
-        Number of these.
+        Number of these splines.
 
     Attributes
     ----------
     curve, point, variable : (z,) int ndarray
-        Numbers of the spline, of the time, and of the variable.
+        Indices of the spline, of the time, and of the variable.
     """
 
     def __init__(self, columns: np.ndarray, matrix: FreeMatrix, curves: int) -> None:
@@ -414,7 +416,7 @@ class SparsityPattern:
         self.curve, self.point = np.divmod(unique_row, count)
 
     def entries(self, values: np.ndarray) -> np.ndarray:
-        """Differentiate value and three derivatives by the free variables, (4, z); `values` are (4, K, d + 1)."""
+        """Differentiate value and derivatives, `values`, (4, K, d + 1), with respect to the free variables, (4, z)."""
         terms = self._weight * values[:, *self._terms]
         count = len(self.point)
         return np.array([np.bincount(self._place, order, count) for order in terms])

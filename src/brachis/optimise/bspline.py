@@ -1,9 +1,9 @@
-"""B-spline basis functions as functions of the interval lengths, and their exact derivatives by these.
+"""B-spline basis functions as functions of the interval lengths, and their exact derivatives with respect to these.
 
-A point lies at a fixed fraction of its interval. The d + 1 basis functions of degree d that differ from zero there
-depend on the lengths of the 2 d - 1 intervals around it alone, by the recursion of Cox and de Boor (Piegl and Tiller,
-The NURBS Book, A2.2). Its denominators are never less than the point's own interval, so that neighbours may have length
-zero: beyond the ends of a clamped knot vector they do. The recursion is rational and takes complex lengths; a step
+A point lies at a fixed fraction of its interval. The d + 1 basis functions of degree d that are nonzero there depend
+only on the lengths of the 2 d - 1 intervals around it, by the recursion of Cox and de Boor (Piegl and Tiller, The NURBS
+Book, A2.2). The denominators are never less than the point's own interval, so neighbouring intervals may have length
+zero, as they do beyond the ends of a clamped knot vector. The recursion is rational and accepts complex lengths. A step
 along the imaginary axis gives derivatives without cancellation (Squire and Trapp, 1998).
 
 Knot insertion gives the same curves over a finer knot vector: the control points are blossoms of the old pieces at the
@@ -23,23 +23,23 @@ ORDERS = 4
 def local_basis(
     knots: np.ndarray, degree: int, t_norm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Value and three derivatives of the basis functions that differ from zero at given times.
+    """Return value and three derivatives of the basis functions that are nonzero at given times.
 
     Parameters
     ----------
     knots : (N + 2 d + 1,) ndarray
-        Clamped knot vector, strictly ascending within.
+        Clamped knot vector, strictly ascending between the repeated end knots.
     degree : int
         d >= 2.
     t_norm : (K,) ndarray
-        Times; beyond the knots they are taken back to the nearest end.
+        Times; those outside the knots are moved to the nearest end.
 
     Returns
     -------
     first : (K,) int ndarray
-        Interval of each time, which is the control point of the first of its basis functions.
+        Interval of each time. It is also the index of the first control point that matters there.
     values : (4, K, d + 1) ndarray
-        Per unit of the knots' time.
+        Values and derivatives, per unit of the knots' time.
     """
     breaks = knots[degree : len(knots) - degree]
     first, fraction = locate(breaks, np.clip(t_norm, breaks[0], breaks[-1]))
@@ -48,14 +48,14 @@ def local_basis(
 
 
 def locate(breaks: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the interval of each of given times, (K,), and the fraction of it that is behind."""
+    """Find the interval of each of the given times, (K,), and the fraction of it that lies before the time."""
     interval = np.searchsorted(breaks, times, side="right") - 1
     interval = interval.clip(0, len(breaks) - 2)
     return interval, (times - breaks[interval]) / np.diff(breaks)[interval]
 
 
 def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarray:
-    """Matrix B, (K, N + d), with ``B @ control_points`` the spline at given times; parameters as of `local_basis`."""
+    """Return B, (K, N + d), so that ``B @ control_points`` is the spline at given times; see `local_basis`."""
     first, values = local_basis(knots, degree, t_norm)
     matrix = np.zeros((len(first), len(knots) - degree - 1))
     np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values[0], axis=1)
@@ -63,25 +63,26 @@ def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarr
 
 
 def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """Value and three derivatives of the basis functions that differ from zero at points.
+    """Return value and three derivatives of the basis functions that are nonzero at points.
 
     Parameters
     ----------
     lengths : (..., 2 d - 1) ndarray, real or complex
-        Of the intervals around each point; its own is the middle one. d >= 2.
+        Lengths of the intervals around each point; the middle one is its own interval. d >= 2.
     fraction : (...) ndarray
-        Place within the point's own interval, 0 to 1.
+        Position within the point's own interval, 0 to 1.
 
     Returns
     -------
     (4, ..., d + 1) ndarray
-        Per unit of what the lengths are measured in.
+        Values and derivatives, in the unit of the lengths.
     """
     degree = (lengths.shape[-1] + 1) // 2
     middle = degree - 1
     interval = lengths[..., middle : middle + 1]
     offset = fraction[..., None] * interval
-    # from_knots[m]: from the m-th knot before the point to the point; to_knots[m]: from it to the m-th knot behind.
+    # from_knots[m]: from the m-th knot before the point to the point; to_knots[m]: from the point to the m-th knot
+    # after it.
     before = lengths[..., :middle][..., ::-1]
     behind = lengths[..., middle + 1 :]
     from_knots = np.cumsum(np.concatenate([offset, before], axis=-1), axis=-1)
@@ -99,7 +100,7 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
 
 
 def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """Differentiate `basis_functions` by each of the lengths, at K points.
+    """Differentiate `basis_functions` with respect to each of the lengths, at K points.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
 def _raise_degree(
     value: np.ndarray, from_knots: np.ndarray, to_knots: np.ndarray, p: int
 ) -> np.ndarray:
-    """Basis functions of degree p from those of degree p - 1."""
+    """Compute basis functions of degree p from those of degree p - 1."""
     before = from_knots[..., :p][..., ::-1]
     behind = to_knots[..., :p]
     share = value / (before + behind)
@@ -134,14 +135,14 @@ def _slope(
 
 
 def _add_neighbours(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Add values, the first of them moved by one function."""
+    """Add two sets of values, the first one shifted by one basis function."""
     zero = np.zeros_like(first[..., :1])
     moved = np.concatenate([zero, first], axis=-1)
     return moved + np.concatenate([second, zero], axis=-1)
 
 
 def clamped_knots(degree: int, breaks: np.ndarray) -> np.ndarray:
-    """Knots of a clamped spline over given intervals.
+    """Return the knots of a clamped spline over given intervals.
 
     Parameters
     ----------
@@ -157,7 +158,7 @@ def clamped_knots(degree: int, breaks: np.ndarray) -> np.ndarray:
 
 
 def clamped_uniform_knots(degree: int, intervals: int) -> np.ndarray:
-    """Knots of a clamped spline with equal intervals.
+    """Return the knots of a clamped spline with equal intervals.
 
     Parameters
     ----------
@@ -168,7 +169,7 @@ def clamped_uniform_knots(degree: int, intervals: int) -> np.ndarray:
     Returns
     -------
     (N + 2 degree + 1,) ndarray
-        Normalised time, from 0 to 1.
+        Knots in normalised time, from 0 to 1.
     """
     return clamped_knots(degree, np.linspace(0.0, 1.0, intervals + 1))
 
@@ -176,12 +177,12 @@ def clamped_uniform_knots(degree: int, intervals: int) -> np.ndarray:
 def insert_knots(
     control_points: np.ndarray, knots: np.ndarray, finer: np.ndarray, degree: int
 ) -> np.ndarray:
-    """Control points of the same curves over more knots.
+    """Return the control points of the same curves over more knots.
 
     Parameters
     ----------
     control_points : (c, N + d) ndarray
-        Of c scalar splines.
+        Control points of c scalar splines.
     knots : (N + 2 d + 1,) ndarray
         Clamped knot vector.
     finer : (N' + 2 d + 1,) ndarray
@@ -194,7 +195,7 @@ def insert_knots(
     (c, N' + d) ndarray
     """
     new = np.arange(len(finer) - degree - 1)
-    # A polynomial far from its own interval would lose all digits: the middle knot's interval is the nearest.
+    # A polynomial evaluated far from its own interval would lose all digits; the middle knot's interval is closest.
     middle = finer[new + (degree + 1) // 2]
     interval = np.searchsorted(knots, middle, side="right") - 1
     interval = np.clip(interval, degree, len(knots) - degree - 2)

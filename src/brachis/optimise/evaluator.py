@@ -1,8 +1,8 @@
-"""The evaluator: curves y(t) in, joint motion, limits and their slopes out.
+"""The evaluator turns curves y(t) into the joint motion, the values of the limits, and their slopes.
 
-A limit with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
-d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from the joint map. One that asks for the
-jerk has likewise slopes by ydddot (see `joint_map`).
+A limit with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy, d/dydot = p_v G + p_a
+dqddot/dydot and d/dyddot = p_a G, where G = dq/dy and the other derivatives come from the joint map. A limit that
+depends on the jerk also has slopes with respect to ydddot (see `joint_map`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from brachis.limits import Limit, Partials
 class Evaluator:
     """Values and slopes of all limits along curves y(t).
 
-    A phase constructs one, and asks it alone: for the rows of the program, their Jacobian, and the checks between
+    Each phase has an evaluator, which it uses for the rows of the program, their Jacobian, and the checks between
     collocation points.
 
     Parameters
@@ -34,7 +34,7 @@ class Evaluator:
     joint_map, limits
         As given.
     is_mean : (c,) bool ndarray
-        Which of the limits' values are held as means over the motion.
+        True for each value of the limits that is limited as a mean over the motion.
     """
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit]) -> None:
@@ -60,9 +60,10 @@ class Evaluator:
         *curves : (K, 1 + r) ndarray
             y, ydot, yddot and ydddot.
         t : (K,) ndarray, optional
-            The times, ascending from the start on, s; by them turns are counted.
+            The times, ascending from the start, s. They are used to count turns.
         near : (K, n) ndarray, optional
-            Postures known to be near, which decide about turns; the times may then be any.
+            Known postures close to the ones sought. They decide which turn is meant; the times may then be in any
+            order.
 
         Raises
         ------
@@ -75,16 +76,16 @@ class Evaluator:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Joint motion and limits at K times; values are computed when they are asked for, and once.
+    """Joint motion and limits at K times; values are computed once, when they are first needed.
 
     Attributes
     ----------
     limits : tuple of Limit
-        With c values in all.
+        The limits; together they have c values.
     motion : JointState
-        q, qdot, qddot, qdddot, (K, n), and the gradient dq/dy.
+        Joint motion: q, qdot, qddot and qdddot, (K, n), and the gradient dq/dy.
     groups : ValueGroups
-        The values of the limits as the kernel takes them.
+        The values of the limits in the form that the kernel needs.
     """
 
     limits: tuple[Limit, ...]
@@ -93,7 +94,7 @@ class Evaluation:
 
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
-        """Values of every limit, (K, its own c)."""
+        """Values of each limit, (K, number of its values)."""
         motion = self.motion
         values = motion.values_of(self.groups)
         for number in self.groups.with_partials:
@@ -113,16 +114,16 @@ class Evaluation:
         Returns
         -------
         slopes : (3 or 4, K, c, 1 + r) ndarray
-            By y, ydot, yddot and, where a limit asks for the jerk, ydddot.
+            With respect to y, ydot, yddot and, where a limit depends on the jerk, ydddot.
         entries : (z, c) ndarray
-            Of the Jacobian by the variables, if these are given.
+            Entries of the Jacobian with respect to the variables, if these are given.
         """
         limits = (self.limits[number] for number in self.groups.with_partials)
         partials = [limit.partials(self.motion) for limit in limits]
         return self._differentiate(self.groups, partials, variables)
 
     def chain(self, partials: Partials) -> np.ndarray:
-        """Differentiate functions with given partials by y, ydot, yddot and, if they ask for it, ydddot."""
+        """Differentiate functions, given by their partials, with respect to y, ydot, yddot and, if needed, ydddot."""
         return self._differentiate(ValueGroups([None], [partials.size]), [partials])[0]
 
     def _differentiate(
@@ -131,7 +132,7 @@ class Evaluation:
         partials: list[Partials],
         variables: VariableSlopes | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate the values of groups; `partials` are those of the groups that have partials."""
+        """Differentiate the values of groups; `partials` belong to the groups that have partials."""
         motion = self.motion
         slopes = motion.slopes
         if groups.has_jerk or any(
@@ -143,7 +144,7 @@ class Evaluation:
         return differentiate(groups, slopes, states, arrays, variables)
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
-        """How far the limits that count are violated, (K, their c); negative inside."""
+        """Return violations of the limits that count, (K, number of values); negative where a limit is met."""
         pairs = zip(self.limits, self.by_limit, strict=True)
         violations = [
             limit.violation(values) for limit, values in pairs if counts(limit)

@@ -1,10 +1,10 @@
 """Splines along the fastest timing of a phase's joint path, within its limits.
 
-Splines follow a timing nearly (`timed_splines`). Where they exceed a limit, this is narrowed there by so much, and the
-joint path is timed anew, until the limits hold. That leaves the motion as fast as possible.
+Splines follow a timing approximately (`timed_splines`). Where they exceed a limit, the limit is narrowed by the excess
+and the joint path is timed again, until the limits are met. This keeps the motion as fast as possible.
 
-Knots stand where accelerations jump, and where limits were exceeded over fewer knots. They stay there on the path,
-whatever its timing.
+Knots are placed where accelerations jump, and where limits were exceeded over fewer knots. They keep their places on
+the path, whatever its timing.
 """
 
 from __future__ import annotations
@@ -29,47 +29,48 @@ from brachis.timing import Timing
 from brachis.timing.joint_path import halfway
 
 _FIRST_LOSS = 5.0
-"""What intervals may lose together at first, over what splines may lose: smooth accelerations overrate it so much."""
+"""Time that the first intervals may cost together, divided by the time that splines may cost. The estimate is too high
+by about this factor where accelerations are smooth."""
 _SHARE = 0.5
-"""Part of the tolerance that splines may lose; joint paths lose more."""
+"""Fraction of the tolerance that splines may use up; joint paths use up more."""
 _AIM = 0.7
-"""Part of this that the next mesh should lose."""
+"""Fraction of this share at which the next mesh aims."""
 _FINER = (0.02, 0.5)
-"""Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
+"""Smallest and largest factor on the time that intervals may cost, after a mesh was too slow."""
 _WAITS = 0.1
-"""Part of what splines may lose that the timing waits at an end, for every derivative that vanishes there."""
+"""Fraction of the splines' share that the timing waits at an end, for each derivative that vanishes there."""
 _FIRST_WAIT = 0.01
-"""Part of the time of such a wait over first knots."""
+"""Length of such a wait over the initial knots, as a fraction of the time."""
 _FOR_AIM = 3
-"""The first choice of knots that may lose all of the tolerance: along paths that wind quickly (example 16) others would
-take several times as many."""
+"""Number of the first mesh that may use up all of the tolerance. On paths with many quick bends (example 16), staying
+within the share would take several times as many knots."""
 _MESHES = 6
-"""Choices of knots that are tried, no more."""
+"""Maximum number of meshes that are tried."""
 _MOST_INTERVALS = 200_000
-"""Intervals of a phase: the verification looks at 8 instants in each, and at no more than 2,000,000."""
+"""Maximum number of intervals of a phase. The verification checks 8 instants in each, and at most 2,000,000 in all."""
 _LOOKS = (4, 10)
-"""Times in each interval at which limits are looked at: at first, and once they hold there."""
+"""Number of times in each interval at which limits are checked: at first, and once they are met there."""
 _ROUNDS = 40
-"""Splines that are laid over some knots, no more."""
+"""Maximum number of splines that are laid over the same mesh."""
 _PATIENCE = 8
-"""Rounds that may gain nothing, no more: with 3 the seven joints of example 16 ended 6.8 % slower than with 8."""
+"""Maximum number of rounds without gain. With 3 the seven joints of example 16 ended 6.8 % slower than with 8."""
 _ENOUGH = 5e-5
-"""Violation of a limit, as a part of it, that is small enough."""
+"""Violation of a limit that is small enough, as a fraction of the limit."""
 _UNCHANGED = 1e-5
-"""Change of a rate or an acceleration, as a part of its limit, after which nothing is looked at again, and violation
-for which limits are not narrowed: a fifth of `_ENOUGH`. A path through 500 waypoints ended 4e-5 later where all was
-looked at again, and all was narrowed, in every round."""
+"""Changes of a rate or an acceleration up to this fraction of its limit need no new check, and limits are not narrowed
+for violations up to this. It is a fifth of `_ENOUGH`. A path through 500 waypoints ended 4e-5 later when everything was
+checked again and narrowed in every round."""
 _AT_ONCE = 8192
-"""Times looked at together: their states stay in the processor's cache."""
+"""Number of times that are checked together: their states stay in the processor's cache."""
 _SMALL = 0.01
-"""Violation from which on limits are narrowed by no more than it."""
+"""Violation above which limits are narrowed by the violation itself."""
 _MORE = 1.5
-"""Factor on smaller ones: splines give way by less than limits are narrowed."""
+"""Factor on smaller violations: splines respond by less than limits are narrowed."""
 _MOST_MORE = 8.0
-"""Largest such factor, where few intervals exceed a limit: it is what the last narrowing lacked there. With 1.5 a path
-through 500 waypoints took 18 rounds, with 8 it takes 11."""
+"""Largest such factor where few intervals exceed a limit. The factor makes up for what the last narrowing lacked there.
+With 1.5 a path through 500 waypoints took 18 rounds; with 8 it takes 11."""
 _RARE = 0.01
-"""Part of the intervals that is few: where more were narrowed by so much, that path was 3e-5 slower."""
+"""Fraction of the intervals that counts as few. When more were narrowed by this factor, that path was 3e-5 slower."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class LaidSplines:
     motion : Motion
     timing : Timing
     delay : float
-        When the timing begins, s.
+        Time at which the timing begins, s.
     """
 
     motion: Motion
@@ -90,13 +91,13 @@ class LaidSplines:
 
     @property
     def times(self) -> np.ndarray:
-        """When the motion passes the stations of the timing, about, (P,), s."""
+        """Approximate times, (P,), s, at which the motion passes the stations of the timing."""
         return self.delay + self.timing.times
 
     def states(
         self, joint_map: JointMap, t: np.ndarray
     ) -> Iterator[tuple[slice, JointState]]:
-        """Yield the joint motion at times, (K,), s, part by part; raises UnreachableError as `JointMap.state` does."""
+        """Yield the joint motion at times, (K,), s, part by part; raise UnreachableError as `JointMap.state` does."""
         for begin in range(0, len(t), _AT_ONCE):
             rows = slice(begin, begin + _AT_ONCE)
             station = np.searchsorted(self.times[1:-1], t[rows])
@@ -106,7 +107,7 @@ class LaidSplines:
 
 @dataclass(frozen=True)
 class SplineFit:
-    """Splines over some knots.
+    """Splines over one mesh, and how well they meet the limits.
 
     Attributes
     ----------
@@ -114,11 +115,11 @@ class SplineFit:
     violation : float
         Largest violation of a limit; infinite if it is not known.
     slower : float
-        Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
+        Smallest fraction by which this mesh makes the motion slower; infinite if the limits cannot be met.
     outside : float
         Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
     beyond : (N,) ndarray
-        Largest violation in every interval before limits were narrowed; empty if it is not known.
+        Largest violation in each interval before limits were narrowed; empty if it is not known.
     """
 
     laid: LaidSplines
@@ -129,12 +130,12 @@ class SplineFit:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """Less for those that exceed limits on postures less, or where both keep them, are faster."""
+        """Sort key, smaller for better splines: the violation of limits on postures above `_ENOUGH`, then the time."""
         return max(self.outside, _ENOUGH), self.needed_time
 
     @property
     def needed_time(self) -> float:
-        """Time in which the limits would hold, about, s."""
+        """Approximate time in which the limits would be met, s."""
         return self.laid.motion.t_end * (1.0 + self.violation)
 
 
@@ -150,23 +151,23 @@ def follow(
     Parameters
     ----------
     phase : Phase
-        With another grid.
+        Phase over any grid.
     phase_timing : PhaseTiming
     tolerance : float
-        Part of the time by which they should not be slower.
+        Fraction of the time by which the splines may be slower.
     points : int
-        Collocation points an interval.
+        Number of collocation points per interval.
     deadline : Deadline, optional
-        After it no other mesh is tried, and no limit is narrowed further.
+        After it no further mesh is tried, and no limit is narrowed further.
 
     Returns
     -------
     phase : Phase
-        Over the knots that the timing needs.
+        The phase over the knots that the timing needs.
     x : (v,) ndarray
-        The splines; None in place of all where the limits allow no timing.
+        The splines. None is returned in place of all three if the limits allow no timing.
     violation : float
-        Largest one of a limit, as a part of it; infinite if it is not known.
+        Largest violation of a limit, as a fraction of it; infinite if it is not known.
     """
     timing = phase_timing.timing
     if timing is None:
@@ -180,8 +181,8 @@ def follow(
         breaks = even_out(np.union1d(breaks, needed))
         if len(breaks) > _MOST_INTERVALS:
             break
-        # Over the last knots limits are narrowed until they hold, however slow that is. The timing says nothing between
-        # its stations.
+        # Over the last mesh, limits are narrowed until they are met, however slow the motion becomes. A mesh is last,
+        # too, if it is so fine that the timing, known only at its stations, cannot guide a finer one.
         is_fine = 2 * len(breaks) > len(timing.times)
         is_last = number == _MESHES or is_fine or deadline.passed
         enough = aim if number < _FOR_AIM else tolerance
@@ -212,18 +213,18 @@ def begin(
     intervals: int,
     points: int,
 ) -> tuple[Phase, np.ndarray]:
-    """Lay splines along a timing over few intervals; limits may be exceeded.
+    """Lay splines along a timing over few intervals; they may exceed limits.
 
     Parameters
     ----------
     phase, phase_timing, points
-        As of `follow`.
+        See `follow`.
     timing : Timing
-        Of the joint path.
+        Timing of the joint path.
     lost : float
-        Part of the time that the intervals may lose together.
+        Fraction of the time that the intervals may cost together.
     intervals : int
-        Intervals, about.
+        Approximate number of intervals.
 
     Returns
     -------
@@ -243,7 +244,7 @@ def _knots(
     shortest: float,
     max_intervals: int = _MOST_INTERVALS + 1,
 ) -> np.ndarray:
-    """Choose knots, (N + 1,), as `breaks_for`; where accelerations vanish the intervals at the ends are short."""
+    """Choose knots, (N + 1,), with `breaks_for`; if accelerations vanish at an end, make the end intervals short."""
     breaks = breaks_for(phase_timing.course, timing, lost, max_intervals)
     if max(_vanishing(phase)) > 0:
         breaks = even_out(np.union1d(breaks, [shortest, 1.0 - shortest]))
@@ -251,7 +252,7 @@ def _knots(
 
 
 def _vanishing(phase: Phase) -> tuple[int, int]:
-    """Numbers of derivatives, from the acceleration on, that vanish at both ends of a phase."""
+    """Return the number of derivatives, from the acceleration on, that vanish at each end of a phase."""
     ends = phase.boundary.start, phase.boundary.end
     first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
     return first, last
@@ -262,8 +263,8 @@ def _lay_splines(
 ) -> LaidSplines:
     """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`.
 
-    Accelerations that vanish at an end, and their rates, do so over an interval each, as long as the one beside it:
-    the timing begins so much later.
+    Each acceleration, or derivative of it, that vanishes at an end needs one more interval there, as long as its
+    neighbour. The timing begins later by the time of the added intervals.
     """
     first, last = _vanishing(phase)
     ahead = breaks[1] * np.arange(first)
@@ -280,7 +281,7 @@ def _lay_splines(
         for spline, nearly in zip(splines, motion.control_points, strict=True)
     ]
     if phase.joint_map.path is not None:
-        # Where the tool stands, means of its rate are not exact.
+        # Where the tool stands still, means of its rate are not exact.
         points[0] = np.maximum.accumulate(points[0].clip(max=points[0][-1]))
     motion = replace(motion, control_points=np.array(points))
     return LaidSplines(motion, timing, delays[0])
@@ -294,7 +295,7 @@ def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndar
 
 
 def _look_at_postures(phase: Phase, fit: SplineFit) -> SplineFit:
-    """Find out how far splines are outside of limits on postures, where their other limits are known."""
+    """Find by how much splines violate limits on postures, if their violation of other limits is known."""
     if not np.isfinite(fit.violation):
         return fit
     t = spread(fit.laid.motion.breaks, _LOOKS[-1])
@@ -309,20 +310,20 @@ def _look_at_postures(phase: Phase, fit: SplineFit) -> SplineFit:
 
 
 class _Violations:
-    """Largest violations of limits between knots; what is known of them stays where the timing of the path stays.
+    """Largest violations of limits between knots; they are kept where the timing of the path does not change.
 
     Parameters
     ----------
     phase : Phase
     phase_timing : PhaseTiming
-        With a timing.
+        Phase timing that has a timing.
     breaks : (N + 1,) ndarray
-        Knots in its normalised time.
+        Knots in the normalised time of this timing.
 
     Attributes
     ----------
     by_limit : dict of Limit to (N, c) ndarray
-        By interval; what waits at the ends counts for the first and the last one.
+        Violations by interval; those during the waits at the ends count for the first and the last interval.
     """
 
     def __init__(
@@ -343,17 +344,17 @@ class _Violations:
         self.forget()
 
     def forget(self) -> None:
-        """Look at all intervals next time."""
+        """Mark all intervals to be checked next time."""
         self._known = np.full((len(self._fastest), 1), np.inf)
         self._earlier: dict[Limit, tuple[np.ndarray, np.ndarray]] = {}
 
     def look(self, laid: LaidSplines, looks: int) -> None:
-        """Look at stations, and at `looks` steps in every interval, next to which the timing changed.
+        """Check the limits near changes of the timing: at stations, and at the ends of `looks` steps in each interval.
 
         Raises
         ------
         UnreachableError
-            The joint map has no posture there.
+            The joint map has no posture at one of these times.
         """
         is_new = self._find_changes(laid.timing)
         for violations in self.by_limit.values():
@@ -372,7 +373,7 @@ class _Violations:
         self.worst = np.max([np.zeros(len(is_new)), *largest], axis=0)
 
     def find_excess(self, least: float) -> Iterator[tuple[Limit, np.ndarray]]:
-        """Yield by how much limits should be narrowed, (N, c): violations, and small ones times `least` or more."""
+        """Yield amounts by which to narrow limits, (N, c): violations, with small ones times at least `least`."""
         is_rare = np.mean(self.worst > _ENOUGH) < _RARE
         largest = _MOST_MORE if is_rare else _MORE
         for limit, known in self.by_limit.items():
@@ -387,20 +388,20 @@ class _Violations:
             yield limit, excess / limit.violation_scale
 
     def _raise(self, laid: LaidSplines, t: np.ndarray, interval: np.ndarray) -> None:
-        """Raise what is known of intervals, (K,), ascending, to what is found at times in them, (K,), s."""
+        """Raise the known violations of intervals, (K,), ascending, to those found at times in them, (K,), s."""
         for rows, state in laid.states(self._phase.joint_map, t):
             for limit, violations in self.by_limit.items():
                 values = limit.violation(limit.values(state))
                 _raise_to(violations, interval[rows], values)
 
     def _find_changes(self, timing: Timing) -> np.ndarray:
-        """Tell next to which intervals, (N,), a timing is not as it was when they were looked at."""
+        """Tell near which intervals, (N,), a timing has changed since they were last checked."""
         rate = timing.middle_rate / self._fastest
         now = np.column_stack([rate, self._course.accelerations(timing)])
         is_changed = (np.abs(now - self._known) > _UNCHANGED).any(axis=1)
         self._known = np.where(is_changed[:, None], now, self._known)
         (step,) = np.nonzero(is_changed)
-        # A knot matters as far away as splines have control points in common.
+        # A knot has an effect as far as splines share control points.
         beside = self._phase.degree + 1
         count = len(self.worst)
         first = (self._interval[step] - beside).clip(min=0)
@@ -417,7 +418,7 @@ def _hold_limits(
     allowed: float,
     deadline: Deadline,
 ) -> SplineFit:
-    """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
+    """Lay splines until the limits are met, or until they are slower by more than a fraction `allowed` of the time."""
     fastest = phase_timing.timing
     assert fastest is not None
     timing = fastest
@@ -468,7 +469,7 @@ def _hold_limits(
 
 
 def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
-    """Move knots, (N + 1,), to the times at which another timing passes the same places."""
+    """Move knots, (N + 1,), to the times at which a new timing passes the same places."""
     places = np.interp(breaks, before.times / before.t_end, before.path.p)
     moved = np.interp(places, timing.path.p, timing.times / timing.t_end)
     return np.concatenate([[0.0], moved[1:-1], [1.0]])
@@ -477,7 +478,7 @@ def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
 def _between_stations(
     values: np.ndarray, breaks: np.ndarray, timing: Timing
 ) -> np.ndarray:
-    """Lay lines above values of the knot intervals, (N, c), and take them between stations, (P - 1, c)."""
+    """Return bounds between stations, (P - 1, c), from lines drawn above the values of the knot intervals, (N, c)."""
     padded = np.concatenate([values[:1], values, values[-1:]])
     at_breaks = np.maximum(padded[1:], padded[:-1])
     t = timing.times / timing.t_end
@@ -491,7 +492,7 @@ def _between_stations(
 
 
 def _raise_to(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
-    """Raise rows of a table, (R, c), to the largest of the values, (K, c), that belong to them; rows, (K,), ascend."""
+    """Raise rows of a table, (R, c), to the largest of their values, (K, c); the row numbers, (K,), ascend."""
     first = np.flatnonzero(np.diff(rows, prepend=-1))
     largest = np.maximum.reduceat(values, first)
     table[rows[first]] = np.maximum(table[rows[first]], largest)

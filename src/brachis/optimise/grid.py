@@ -1,14 +1,14 @@
-"""Where the knots and the collocation points lie: fixed, or moved by the interval lengths h as variables of the NLP.
+"""Positions of knots and collocation points: fixed, or moved by the interval lengths h as variables of the NLP.
 
-Collocation points keep their place (interval, fraction of it). Where the knots are free, h = (h_1, ..., h_N) are
-variables at the end of x, in normalised time: bounded from below, and with a row that holds their sum at 1. The
+A collocation point keeps its interval and its fraction of the interval. Where the knots are free, h = (h_1, ..., h_N)
+are variables at the end of x, in normalised time. They are bounded from below, and a row holds their sum at 1. The
 collocation points then move with the knots, and the basis functions at a point depend on the 2 d - 1 intervals around
-it. A fixed grid answers the same questions: it has no variables, no rows and empty derivatives.
+it. A fixed grid has the same interface, with no variables, no rows and empty derivatives.
 
-Means over time are integrals by weights of the collocation points. The motion is smooth within a knot interval and not
-across its ends, so every interval is integrated for itself: over each step between neighbouring points the cubic
-through the four nearest ones. Points that lie much closer together than the others of their interval are skipped:
-cubics through them would swing.
+Means over time are weighted sums over the collocation points. The motion is smooth within a knot interval but not
+across its ends, so every interval is integrated separately. Each step between neighbouring points is integrated with
+the cubic through the four nearest points. Points that lie much closer together than the others in their interval are
+skipped, because cubics through them would oscillate.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from brachis.optimise.bspline import (
 
 
 def _spaced_places(u: np.ndarray) -> list[int]:
-    """Numbers of places u, ascending, without those that follow another one by less than half of the median step.
+    """Return the numbers of places u, ascending, without places closer than half the median step to the one before.
 
     Both ends are kept.
     """
@@ -46,7 +46,7 @@ def _spaced_places(u: np.ndarray) -> list[int]:
 
 
 def _weights(u: np.ndarray) -> np.ndarray:
-    """Weights, (P,), of the integral over [0, 1] of the cubics through values at places u, (P,)."""
+    """Return the weights, (P,), of the integral over [0, 1] of the cubics through values at places u, (P,)."""
     count = min(4, len(u))
     ends = np.concatenate([[0.0], u[1:-1], [1.0]])
     weights = np.zeros(len(u))
@@ -61,17 +61,17 @@ def _weights(u: np.ndarray) -> np.ndarray:
 
 
 class FixedGrid:
-    """Knots that are given, and collocation points.
+    """Fixed knots, and collocation points.
 
-    A `FreeGrid` answers for interval lengths h, (v,), that are variables; here h is empty.
+    In a `FreeGrid` the interval lengths h, (v,), are variables; here h is empty.
 
     Parameters
     ----------
     knots : (N + 2 d + 1,) ndarray
-        In normalised time; where they are variables, at the lengths that the grid was made with.
+        Knots in normalised time; where they are variables, the knots with which the grid was created.
     degree : int
     t_norm : (K,) ndarray
-        Collocation points in normalised time, ascending, from 0 to 1; as `knots`.
+        Collocation points in normalised time, ascending from 0 to 1, at these knots.
 
     Attributes
     ----------
@@ -82,9 +82,9 @@ class FixedGrid:
     lower, upper : (v,) ndarray
         Bounds on h.
     total : (0,) or (1,) ndarray
-        What rows of sums of h must be.
+        Required value of the row that holds the sum of h.
     point, variable : (z,) int ndarray
-        Pattern of the curves' derivatives with respect to h, each place once.
+        Sparsity pattern of the curves' derivatives with respect to h; each place occurs once.
     """
 
     lower: np.ndarray = np.empty(0)
@@ -100,19 +100,19 @@ class FixedGrid:
         self.breaks = knots[degree : len(knots) - degree]
 
     def knots_at(self, _h: np.ndarray) -> np.ndarray:
-        """Knots, in units of h."""
+        """Return the knots, in units of h."""
         return self.knots
 
     def t_norm_at(self, _h: np.ndarray) -> np.ndarray:
-        """Collocation points, in units of h."""
+        """Return the collocation points, in units of h."""
         return self.t_norm
 
     def lengths_of(self, _knots: np.ndarray) -> np.ndarray:
-        """Variables h that belong to given knots."""
+        """Return the variables h that belong to given knots."""
         return np.empty(0)
 
     def basis(self, _h: np.ndarray) -> LocalBasis:
-        """Basis functions at the collocation points; the same object as long as they are the same."""
+        """Return the basis functions at the collocation points: the same object as long as they do not change."""
         return self._basis
 
     @cached_property
@@ -120,22 +120,22 @@ class FixedGrid:
         return LocalBasis.of(self.knots, self.degree, self.t_norm)
 
     def slopes(self, _h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-        """Differentiate value and three derivatives of splines (c, N + d) by h, on the pattern, (4, z, c)."""
+        """Return slopes, (4, z, c), of value and three derivatives of splines, (c, N + d), with respect to h."""
         return np.empty((ORDERS, 0, len(control_points)))
 
     def fix(self, _h: np.ndarray) -> FixedGrid:
-        """Return the grid with its knots fixed where they are at `h`."""
+        """Return the grid with its knots fixed at their positions for `h`."""
         return self
 
     @cached_property
     def _interval_weights(self) -> np.ndarray:
-        """Weights, (N, K), of the collocation points in integrals over each interval, taken to be of length 1."""
+        """Weights, (N, K), of the collocation points in integrals over each interval, each taken as of length 1."""
         weights = np.zeros((len(self.breaks) - 1, len(self.t_norm)))
         ends = itertools.pairwise(self.breaks)
         for row, (low, high) in zip(weights, ends, strict=True):
             is_behind = self.t_norm > low - tolerances.TIME
             inside = np.flatnonzero(is_behind & (self.t_norm < high + tolerances.TIME))
-            # Without continuous accelerations, the values at the end belong to the next interval.
+            # Where accelerations jump at knots, the values at the end of an interval belong to the next interval.
             if self.degree < 3 and high < self.breaks[-1]:
                 inside = inside[:-1]
             u = (self.t_norm[inside] - low) / (high - low)
@@ -144,24 +144,24 @@ class FixedGrid:
         return weights
 
     def mean_weights(self, _h: np.ndarray) -> np.ndarray:
-        """Weights, (K,), of the mean over time of what is known at the collocation points."""
+        """Return the weights, (K,), of the collocation points in a mean over time."""
         return np.diff(self.breaks) @ self._interval_weights
 
     @property
     def mean_slopes(self) -> np.ndarray:
-        """Derivatives of `mean_weights` by h, (v, K)."""
+        """Derivatives of `mean_weights` with respect to h, (v, K)."""
         return np.empty((0, len(self.t_norm)))
 
 
 class FreeGrid(FixedGrid):
-    """Knots that are variables; collocation points keep their places within their intervals.
+    """Knots that are variables, and collocation points that keep their places within their intervals.
 
     Parameters
     ----------
     knots, degree, t_norm
         See `FixedGrid`.
     shortest : float
-        Least length of an interval, in normalised time.
+        Shortest length of an interval, in normalised time.
     """
 
     total = np.ones(1)
@@ -177,30 +177,30 @@ class FreeGrid(FixedGrid):
         self._interval, self._fraction = locate(breaks, t_norm)
         around = self._interval[:, None] + np.arange(1 - degree, degree)
         self._inside = (around >= 0) & (around < count)
-        # Beyond the ends: an interval without length.
+        # Beyond both ends, use an interval of zero length.
         self._around = np.where(self._inside, around, count)
         self.point, _ = np.nonzero(self._inside)
         self.variable = around[self._inside]
         self._basis_at = LastCall(self._find_basis)
 
     def knots_at(self, h: np.ndarray) -> np.ndarray:
-        """Knots for interval lengths `h`, at least the shortest each."""
+        """Return the knots for interval lengths `h`, each at least the shortest length."""
         breaks = np.concatenate([[0.0], np.cumsum(np.maximum(h, self.lower))])
         return clamped_knots(self.degree, breaks / breaks[-1])
 
     def t_norm_at(self, h: np.ndarray) -> np.ndarray:
-        """Collocation points for interval lengths `h`."""
+        """Return the collocation points for interval lengths `h`."""
         return (np.cumsum(h) - h)[self._interval] + self._fraction * h[self._interval]
 
     def lengths_of(self, knots: np.ndarray) -> np.ndarray:
-        """Lengths of the intervals between given knots."""
+        """Return the lengths of the intervals between given knots."""
         return np.diff(knots[self.degree : len(knots) - self.degree])
 
     def _lengths_around(self, h: np.ndarray) -> np.ndarray:
         return np.append(h, 0.0)[self._around]
 
     def basis(self, h: np.ndarray) -> LocalBasis:
-        """Basis functions at the collocation points; kept until `h` changes."""
+        """Return the basis functions at the collocation points; they are cached until `h` changes."""
         return self._basis_at(h)
 
     def _find_basis(self, h: np.ndarray) -> LocalBasis:
@@ -208,7 +208,7 @@ class FreeGrid(FixedGrid):
         return LocalBasis(self._interval, values)
 
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-        """Differentiate splines by the 2 d - 1 lengths around each collocation point."""
+        """Differentiate splines with respect to the 2 d - 1 lengths around each collocation point."""
         derivatives = basis_derivatives(self._lengths_around(h), self._fraction)
         points = control_points[:, self.basis(h).columns]
         slopes = np.einsum("oikw,ckw->okic", derivatives, points)
@@ -220,10 +220,10 @@ class FreeGrid(FixedGrid):
         return FixedGrid(self.knots_at(h), self.degree, t_norm / t_norm[-1])
 
     def mean_weights(self, h: np.ndarray) -> np.ndarray:
-        """Weights of the mean over time: those of every interval times its length."""
+        """Return the weights of the mean over time: the weights of every interval times its length."""
         return h @ self._interval_weights
 
     @property
     def mean_slopes(self) -> np.ndarray:
-        """Derivatives of `mean_weights` by h: the weights of every interval."""
+        """Derivatives of `mean_weights` with respect to h: the weights of every interval."""
         return self._interval_weights

@@ -1,6 +1,6 @@
-"""Initial guesses: splines through a joint path, a smooth s(t), a long enough time.
+"""Initial guesses: splines through a joint path, a smooth s(t), and a time that is long enough.
 
-The end time is scaled until all limits hold, which gives the solver a feasible start wherever gravity leaves one.
+The end time is scaled until all limits are met. This gives the solver a feasible start unless gravity rules one out.
 """
 
 from __future__ import annotations
@@ -24,23 +24,24 @@ def starting_point(
     joint_paths: Sequence[np.ndarray],
     durations: Sequence[float | None],
 ) -> np.ndarray | None:
-    """Fit splines to a joint path of every phase, and scale each phase's time until the limits hold.
+    """Fit splines to a joint path of every phase, and scale each phase's time until the limits are met.
 
-    Control points taken from the joint path itself smooth it; where that leaves the branch, least squares follow it
-    closer.
+    Points of the joint path itself serve as control points, which smooths the path. Where the smoothed path leaves the
+    branch, a least-squares fit follows the joint path more closely.
 
     Parameters
     ----------
     program : Program
     joint_paths : sequence of (S, c) ndarray
-        For each phase, successive values of its curves: along a path of s and the redundant joints.
+        For each phase, successive values of its curves: along a path, s and the redundant joints.
     durations : sequence of float or None
-        Of the motions whose values at even times these are, s; where None, they get smooth ones from end to end.
+        For each phase, the duration of the motion from which its values come, at evenly spaced times, s. With None the
+        phase gets a smooth motion from end to end.
 
     Returns
     -------
     (v,) ndarray or None
-        None where the fit is out of reach at a collocation point.
+        None if a collocation point of the fit is out of reach.
     """
     x_by_phase = []
     for phase, joint_path, duration in zip(
@@ -57,7 +58,7 @@ def starting_point(
 
 
 def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    """Take control points from the joint path."""
+    """Use points of the joint path as control points."""
     t_norm = greville(phase.knots, phase.degree)
     t_end, points = _motion_along(phase, joint_path, duration, t_norm)
     values = points[:, phase.boundary.law_curves :]
@@ -65,7 +66,7 @@ def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.
 
 
 def _follow(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    """Fit curves to the joint path."""
+    """Fit curves to the joint path by least squares."""
     t_norm = spread(phase.breaks, 4)
     t_end, targets = _motion_along(phase, joint_path, duration, t_norm)
     return fit_curves(phase, t_end, t_norm, targets)
@@ -74,11 +75,11 @@ def _follow(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.
 def _motion_along(
     phase: Phase, joint_path: np.ndarray, duration: float | None, t_norm: np.ndarray
 ) -> tuple[float, np.ndarray]:
-    """Duration, s, and values (K, c) at normalised times, (K,), of a motion along a joint path, (S, c).
+    """Return duration, s, and values, (K, c), of a motion along a joint path, (S, c), at normalised times, (K,).
 
-    A path with a duration has its values at even times. Else the motion is smooth from rest to rest, and takes 1 s; or
-    its first curve has a constant acceleration between the rates at the ends. Where a time law gives the first curve,
-    the others follow it.
+    If a duration is given, the values of the path are at evenly spaced times. Without one, the motion is smooth from
+    rest to rest and takes 1 s. If rates are given at the ends, the first curve has a constant acceleration between
+    them. Where a time law gives the first curve, the other curves follow it.
     """
     if phase.time_law is not None:
         s = phase.time_law.at(t_norm * phase.time_law.duration)[0]
@@ -87,7 +88,7 @@ def _motion_along(
     grid = np.linspace(0.0, 1.0, len(joint_path))
     boundary = phase.boundary
     if boundary.periodic:
-        # An even drift lets the path end as far ahead of its start as it has to.
+        # A uniform drift makes the path end at the required distance ahead of its start.
         missing = boundary.ahead - (joint_path[-1] - joint_path[0])
         joint_path = joint_path + grid[:, None] * missing
     first, last = boundary.rates
@@ -105,7 +106,7 @@ def _motion_along(
 def fit_curves(
     phase: Phase, duration: float, t_norm: np.ndarray, targets: np.ndarray
 ) -> np.ndarray:
-    """Point x whose curves come nearest to given values, by least squares; exact where the splines contain them.
+    """Return the point x whose curves fit given values by least squares, exactly if the splines can represent them.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def fit_curves(
     t_norm : (K,) ndarray
         Normalised times.
     targets : (K, c) ndarray
-        Values of the curves there; that of a curve that is given does not count.
+        Values of the curves at these times; the value of a curve with a time law is ignored.
 
     Returns
     -------
@@ -133,11 +134,12 @@ def fit_curves(
 
 
 def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
-    """Scale the time of every phase until velocity, acceleration and torque limits just hold.
+    """Scale the time of every phase until velocity, acceleration and torque limits are just met.
 
-    They are exceeded least if they cannot hold. Far above the least time no limit is active, and a solver that has seen
-    no curvature creeps towards it. Where an arm passes postures that it cannot hold, long times do not hold the limits
-    either, and between ends in motion they are slower on the way alone. A duration that is given stays.
+    If they cannot be met, the time is chosen that exceeds them least. Far above the least time no limit is active, and
+    a solver that has seen no curvature creeps towards the solution. If the arm passes postures in which it cannot stay
+    at rest, a long time does not meet the limits either. Between ends in motion, a longer time slows only the middle of
+    the motion. A given duration is not changed.
 
     Raises
     ------
@@ -164,7 +166,7 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
     least = np.inf
     while x[0] < 200.0:
         worst = phase.worst_time_scaling_ratio(x)
-        # A long motion between moving ends goes backwards along the path.
+        # A long motion between moving ends may run backwards along the path.
         if has_path and phase.state(x).ydot[:, 0].min() < 0.0:
             return best
         if worst <= 1.0:
@@ -173,7 +175,7 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
             return best
         best = x
         least = worst
-        # Without gravity and friction, torque falls with the square of the time.
+        # Without gravity and friction, torques fall with the square of the time.
         x = scale(x, 1.1 * min(np.sqrt(worst), 8.0))
     else:
         return best
@@ -187,7 +189,7 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
 
 
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:
-    """Largest ratio to a limit that a longer time relieves, such as those of velocity, acceleration and torque."""
+    """Return the largest ratio of a value to its limit, among limits that a longer time relieves, such as on torque."""
     return max(
         phase.worst_time_scaling_ratio(x_of_phase)
         for phase, x_of_phase in program.split(x)

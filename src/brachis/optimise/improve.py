@@ -1,7 +1,7 @@
 """Solve again, and keep the better motion.
 
-Finer meshes, free knots, another chart, other joints: each of these is a change of a solved program. `improve` tries
-such changes in turn, and its answer is a `SolvedProgram`.
+A finer mesh, free knots, another chart and other redundant joints are all changes of a solved program. `improve` tries
+such changes in turn and returns a `SolvedProgram`.
 """
 
 from __future__ import annotations
@@ -36,20 +36,21 @@ from brachis.task import SolverSettings
 
 @dataclass(frozen=True, repr=False)
 class SolvedProgram(Summary):
-    """A program and its answer, or the last attempt at one.
+    """A program and its solution, or the last attempt to solve it.
 
     Attributes
     ----------
     program : Program
     reports : tuple of SolverReport
-        Of all solves that led here; the last one belongs to `program`. Empty where nothing is solved yet.
+        Reports of all solves that led to this program; the last one belongs to `program`. Empty if nothing has been
+        solved yet.
     not_completed : str
-        What the time, or a solve that failed, left undone, in words; empty where nothing.
+        Description of work that was not done because time ran out or a solve failed; empty if all was done.
     violation : float
-        Largest violation of a limit between the collocation points, as a fraction of it; infinite where the motion
-        leaves the closed form's reach, NaN where nobody looked (see `refine`).
+        Largest violation of a limit between the collocation points, as a fraction of it; infinite where the closed form
+        has no solution, NaN if it was not checked (see `refine`).
     time_scaled : float
-        Factor by which refinement lengthened the motion at the very end.
+        Factor by which refinement lengthened the motion as its last step.
     """
 
     program: Program
@@ -70,28 +71,28 @@ class SolvedProgram(Summary):
 
     @property
     def x(self) -> np.ndarray:
-        """The answer, (v,)."""
+        """The solution, (v,), with its time scaled."""
         return self.program.scale_time(self.report.x, self.time_scaled)
 
     @property
     def t_end(self) -> float:
-        """End time of the answer, s."""
+        """End time of the solution, s."""
         return self.program.end_time(self.x)
 
     @property
     def converged(self) -> bool:
-        """True where the first solve ended well, so that `x` is a motion and not a mere iterate."""
+        """Whether the first solve succeeded, so that `x` is a motion and not just an iterate."""
         return self.reports[0].status.usable
 
 
 Solve = Callable[[Program, np.ndarray], SolverReport]
 """Solves a program from a point x, (v,)."""
 Attempt = Callable[[Program, np.ndarray], SolvedProgram]
-"""Solves a changed program from a point x, (v,), perhaps in several steps, in which the program may change again."""
+"""Solves a changed program from a point x, (v,), possibly in several steps that change the program again."""
 Change = Callable[[SolvedProgram], tuple[Program, np.ndarray] | str | None]
-"""Changes what was kept so far into a program and the point from which it is solved.
+"""Turns the solved program kept so far into a new program and the point from which to solve it.
 
-Where no further change is worth trying it returns None, or in words what is left undone.
+If no further change is worth trying, it returns None, or a text that says what was not done.
 """
 
 
@@ -111,28 +112,28 @@ def improve(
     Parameters
     ----------
     first : SolvedProgram
-        As long as its solve, or those that were tried since, gave no motion, the next one takes its place.
+        The program to begin with. Until a solve gives a motion, each new attempt replaces the one before.
     changes : iterable of callable
-        Each one gets what was kept so far.
+        Functions that each get the solved program kept so far.
     attempt : callable
-        Solves what a change proposes; see `attempt_once`.
+        Function that solves the program that a change proposes; see `attempt_once`.
     least_gain : float, optional
-        A motion is kept that is shorter by more than this fraction; by default every motion is, however long.
+        A motion is kept if it is shorter by more than this fraction. By default every motion is kept, however long.
     go_on_above : float or None, optional
-        The next change is tried after a gain of more than this fraction; by default after every motion. With None all
+        The next change is tried after a gain of more than this fraction, by default after every motion. With None all
         changes are tried.
     judge : callable, optional
-        Number by which answers are compared, the less the better, infinite without a motion; by default the objective
-        of a solve that ended well.
+        Function that rates a solved program; a smaller number is better, and infinity means no motion. The default is
+        the objective of a successful solve.
     deadline : Deadline, optional
-        No change is tried after it.
+        No change is tried after this deadline.
     if_lost : str, optional
-        What is left undone, in words, if the last change gave no motion.
+        Text that says what was not done if the last change gave no motion.
 
     Returns
     -------
     SolvedProgram
-        What was kept, with the reports of all solves, the one of its own last.
+        The program that was kept, with the reports of all solves; its own report comes last.
     """
     judge = judge or _objective
     incumbent = first
@@ -162,7 +163,7 @@ def improve(
 
 
 def _objective(solved: SolvedProgram) -> float:
-    """Objective of a solve that ended well, infinite for others."""
+    """Return the objective of a successful solve, and infinity for any other."""
     return solved.report.objective if solved.usable else np.inf
 
 
@@ -177,7 +178,7 @@ def attempt_once(
     program : Program
     x : (v,) ndarray
     accept_early_end : bool, optional
-        Whether a solve counts that ended early with a feasible motion faster than the one it began with.
+        Whether to accept a solve that ended early with a feasible motion that is faster than its starting point.
     """
     report = solve(program, x)
     if accept_early_end:
@@ -188,7 +189,7 @@ def attempt_once(
 def attempt_in_turn(
     solves: Sequence[Solve], program: Program, x: np.ndarray
 ) -> SolvedProgram:
-    """Attempt one solve after the other from x, (v,), until one gives a faster motion; see `attempt_once`."""
+    """Try several solves from x, (v,), one after the other, until one gives a faster motion; see `attempt_once`."""
     reports: tuple[SolverReport, ...] = ()
     for solve in solves:
         tried = attempt_once(solve, program, x, accept_early_end=True)
@@ -204,11 +205,12 @@ _EARLY = (
     SolveStatus.STALLED,
     SolveStatus.FAILED,
 )
-"""How a solve ends that is not done; a solver that breaks down at last may have come far."""
+"""Statuses of a solve that ended before it was finished. Even a solver that fails at the end may have made good
+progress."""
 
 
 def judge_early_end(report: SolverReport, before: float) -> SolverReport:
-    """Call a solve that ended early acceptable where its motion is feasible, and shorter than `before`, s."""
+    """Mark a solve that ended early as acceptable if its motion is feasible and shorter than `before`, s."""
     is_better = report.feasible and report.objective < before
     if is_better and report.status in _EARLY:
         return replace(report, status=SolveStatus.ACCEPTABLE)
@@ -216,9 +218,9 @@ def judge_early_end(report: SolverReport, before: float) -> SolverReport:
 
 
 def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
-    """Keep the answer of a solve that ran out of time, or the point x from which it began, whichever is feasible.
+    """After a solve ran out of time, keep its last point or its starting point x, whichever is feasible.
 
-    Any motion within the limits is better than none. Of two the faster one is kept.
+    Any motion within the limits is better than none. If both are feasible, the faster one is kept.
     """
     report = solved.report
     if report.status is not SolveStatus.TIME_LIMIT:
@@ -239,7 +241,7 @@ def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
     return replace(
         solved,
         reports=(*solved.reports[:-1], accepted),
-        not_completed="a solve ran out of time, and its motion may be far from the fastest",
+        not_completed="a solve ran out of time, so its motion may be far from the fastest",
     )
 
 
@@ -251,41 +253,42 @@ def with_last(
 
 
 _ITERATIONS = 100
-"""Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
+"""Maximum number of iterations per redundant joint that ``auto`` allows a solver on one guess."""
 
 _LARGE_PROGRAM = 250
-"""Variables of a program over the path above which an interior-point method is as fast as others, or faster."""
+"""Number of variables of a program over the path above which an interior-point method is at least as fast as other
+methods."""
 _NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
-"""`SolverOptions` from a motion that is nearly as fast as possible. Very many rows are near their bounds there, and a
-small subproblem takes half as long."""
+"""`SolverOptions` for solves that start from a motion that is nearly as fast as possible. Very many rows are close to
+their bounds there, and a small subproblem takes half as long."""
 _PROGRESS = 1e-4
-"""Gain over five iterates, as a part of the time that is not given, below which a solve ends where many motions are
-equally fast."""
+"""Gain over five iterates, as a fraction of the free time. Where many motions are equally fast, a solve ends below this
+gain."""
 
 _NEARLY = 0.05
-"""Violation that an answer over the path may have: its joint path is timed anew. With 0.01 active sets worked for 11 s
-on a program that an interior-point method had left at 0.03."""
+"""Violation that a solution over the path may have, since its joint path is timed again. With 0.01, an active-set
+method worked for 11 s on a program that an interior-point method had left at 0.03."""
 _SAME = 1e-3
-"""Part of the time by which an answer may get longer over other knots or points."""
+"""Fraction of the time by which a solution may get longer over different knots or points."""
 
 
 @dataclass(frozen=True)
 class SolverSession:
-    """A backend that solves programs one after the other; call the session to solve.
+    """A backend that solves programs one after the other. Call the session to solve a program.
 
     Attributes
     ----------
     backend : Solver
     options : SolverOptions
-        The time limit holds for every single solve.
+        Options of the solver. The time limit applies to each solve.
     deadline : Deadline
-        Of all solves.
+        Deadline of all solves together.
     progress : callable, optional
         Called between iterations with their number and the objective.
     acceptable : float
-        An answer with no larger violation is usable, however the solve ended.
+        Largest violation with which a solution is usable, however the solve ended.
     for_large : Solver, optional
-        What is tried first on large programs over the path, which are sparse; see `solver_for_large`.
+        Solver that is tried first on large programs over the path, which are sparse; see `solver_for_large`.
     """
 
     backend: Solver
@@ -307,9 +310,9 @@ class SolverSession:
         *,
         has_time_law: bool,
     ) -> SolverSession:
-        """Take the bounds from the task's ``solver`` part.
+        """Create a session with the settings of the task's ``solver`` part.
 
-        Where many motions are equally fast, in charts and where the time is given, a solve ends after fewer iterates
+        In charts, and where the time is given, many motions are equally fast. There a solve ends after fewer iterates
         without gain.
         """
         iterations = settings.max_iterations
@@ -328,9 +331,9 @@ class SolverSession:
         return cls(backend, options, deadline, progress, for_large=for_large)
 
     def over_path(self, options: SolverOptions) -> SolverSession:
-        """Return the session for programs over the path, under other options.
+        """Return the session for programs over the path, with different options.
 
-        Of iterations and time the task may only allow less. The task does not set their tolerance.
+        The task can only lower the limits on iterations and time. It does not set the tolerance of these programs.
         """
         task = self.options
         path_options = replace(
@@ -344,12 +347,12 @@ class SolverSession:
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
 
-        Where the last solve ended at x, this one goes on with the Hessian that it has learnt.
+        If the last solve ended at x, this one continues with the Hessian that the last one built up.
         """
         learnt = None
         if self._last and np.array_equal(self._last[0].x, x):
             learnt = self._last[0].learnt
-        # Only the time that is not given can get shorter.
+        # Only the free time can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress
         until = self.deadline.within(self.options.time_limit)
@@ -383,7 +386,7 @@ class SolverSession:
         if self.backend.is_interior:
             return self._accept(solve(program, x))
         is_answer = self._goes_on(program, x)
-        # Without them a joint that no near row holds runs wild: its jerk came to 500 times its limit.
+        # Without these rows, a joint with no near row is unconstrained: its jerk reached 500 times its limit.
         kept_rows = program.third_order_rows if isinstance(program, Program) else ()
         report = solve_near_rows(
             program, x, solve, is_answer=is_answer, kept_rows=kept_rows
@@ -391,9 +394,10 @@ class SolverSession:
         return self._accept(report)
 
     def _goes_on(self, program: Program | PathProgram, x: np.ndarray) -> bool:
-        """Tell whether a point, (v,), is about as fast as the answer of the last solve, which gave a motion.
+        """Tell whether the last solve gave a motion, and a point, (v,), is about as fast as that motion.
 
-        Not over the path, and not where the knots move: these solves end elsewhere without some values.
+        Return False over the path and where the knots are free: such solves end at a different motion if some values
+        are left out.
         """
         is_fixed = isinstance(program, Program) and not program.has_free_knots
         if not (is_fixed and self._last and self._last[0].status.usable):
@@ -401,14 +405,14 @@ class SolverSession:
         return bool(np.isclose(program.objective(x), self._last[0].objective, _SAME))
 
     def _accept(self, report: SolverReport) -> SolverReport:
-        """Take an answer that violates rows by little, however the solve ended."""
+        """Accept a solution that violates rows only slightly, however the solve ended."""
         if report.status.usable or report.violation > self.acceptable:
             return report
         return replace(report, status=SolveStatus.ACCEPTABLE)
 
 
 def solves_in_turn(solve: Solve) -> list[Solve]:
-    """List a solve, and of a session the same with its solver for large programs, where it has another."""
+    """List a solve; for a session with a different solver for large programs, add the session with that solver."""
     if not isinstance(solve, SolverSession) or solve.for_large in (None, solve.backend):
         return [solve]
     return [solve, replace(solve, backend=solve.for_large)]

@@ -1,17 +1,18 @@
-"""Where variables, rows and entries of the Jacobian stand in a phase.
+"""Order of the variables, the rows and the entries of the Jacobian in a phase.
 
-Variables: the duration T in seconds, then the free control points (see `boundary`) of each curve: of s(t) where there
-is a path and no time law, then of each joint that is chosen freely, in chain order. Boundary conditions are built into
-the control points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see
-`grid`). A duration that is given has equal bounds.
+Variables: first the duration T in seconds, then the free control points (see `boundary`) of each curve. The curves are
+s(t), where there is a path and no time law, then each redundant joint in chain order. Boundary conditions are built
+into the control points and have no rows. Where the knots are free, the interval lengths h in normalised time come last
+(see `grid`). A given duration has equal bounds.
 
-Rows: for each limit that holds at every instant, in the order of the list, its c values at collocation point 0, then at
-point 1, and so on; along a path then differences of successive control points of s, which are >= 0 so that ds/dt >= 0
-holds at all times (see `ProgressRows`); where the knots are free, last the sum of h, which is 1. All rows are
-dimensionless. Means over time are rows of the program.
+Rows: first each limit that applies at every instant, in the order of the list, with its c values at collocation point
+0, then at point 1, and so on. Along a path, differences of successive control points of s follow; they are >= 0, so
+that ds/dt >= 0 at all times (see `ProgressRows`). Where the knots are free, the last row is the sum of h, which is 1.
+All rows are dimensionless. Means over time are rows of the program, not of a phase.
 
-Entries of the Jacobian: of all limits that hold at every point, those by T, by the variables of each curve and by h,
-all columns of a point together; then those of the differences; last 1 for each of h.
+Entries of the Jacobian: first those of all limits that apply at every instant, with respect to T, to the variables of
+each curve and to h. For each pair of point and variable, the entries of all limits stand together. The entries of the
+differences follow, and last a 1 for each length in h.
 """
 
 from __future__ import annotations
@@ -36,19 +37,20 @@ from brachis.optimise.boundary import (
 from brachis.optimise.grid import FixedGrid
 
 SHORTEST_TIME = 1e-4
-"""Least duration of a phase, s: a motion that takes no longer is not held back by any limit."""
+"""Shortest duration of a phase, s. A motion as short as this is not held back by any limit."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgressRows:
-    """Differences of successive control points of s, those that bounds on single variables do not take care of.
+    """Rows for differences of successive control points of s that bounds on single variables do not cover.
 
     Attributes
     ----------
     fixed_terms : (1 + k, p) ndarray
-        Fixed terms of the rows, by powers of the duration.
+        Fixed terms of the rows, one for each power of the duration.
     matrix : FreeMatrix
-        What variables of the phase add to the rows, each place once; the duration, variable 0, adds nothing.
+        Contributions of the phase's variables to the rows; each place occurs once. The duration, variable 0, adds
+        nothing.
     """
 
     fixed_terms: np.ndarray
@@ -56,12 +58,12 @@ class ProgressRows:
 
     @classmethod
     def none(cls) -> ProgressRows:
-        """Make no rows."""
+        """Return an object without rows."""
         return cls(np.empty((1, 0)), FreeMatrix.of(np.empty((0, 1))))
 
     @classmethod
     def of(cls, spline: BoundarySpline) -> ProgressRows:
-        """Take the differences of a spline whose free variables follow the duration, variable 0."""
+        """Build the rows for a spline whose free variables come after the duration, variable 0."""
         terms = np.diff(spline.fixed_terms, axis=1)
         row, variable, weight = _differences(spline.free_matrix)
         by_duration = np.flatnonzero(terms[1:].any(axis=0))
@@ -79,11 +81,11 @@ class ProgressRows:
         return cls(terms[:, several], matrix)
 
     def values(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows, (p,)."""
+        """Compute the values of the rows, (p,)."""
         return sum_powers(self.fixed_terms, x[0]) + self.matrix.control_points(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian, (z,); not to be written to."""
+        """Return the entries of the Jacobian, (z,). Do not write to the array."""
         matrix = self.matrix
         if len(self.fixed_terms) == 1:
             return matrix.weight
@@ -92,7 +94,7 @@ class ProgressRows:
 
 
 def _differences(matrix: FreeMatrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Subtract from each row of a matrix the row before it; return row, column and value of what is not zero."""
+    """Subtract from each row of a matrix the row before it; return row, column and value of the nonzero entries."""
     rows, columns = matrix.shape
     row = np.concatenate([matrix.point - 1, matrix.point])
     column = np.tile(matrix.variable, 2)
@@ -107,29 +109,29 @@ def _differences(matrix: FreeMatrix) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 class VariableLayout:
-    """Places of the variables in x, and the collocation points at which they matter; see the module.
+    """Positions of the variables in x, and the collocation points at which they matter; see the module.
 
     Parameters
     ----------
     grid : FixedGrid
     boundary : Boundary
     has_path : bool
-        Whether the first spline is s; with a time law the duration is given, and none of the splines is s.
+        Whether there is a path. The first spline is then s, except with a time law, which gives the duration and s.
     splines : tuple of BoundarySpline, optional
-        Those of another grid with the same knots.
+        Splines of another grid with the same knots, which are reused.
 
     Attributes
     ----------
     splines : tuple of BoundarySpline
-        One for each curve.
+        One spline for each curve.
     slices : tuple of slice
-        Variables of each curve.
+        Positions of the variables of each curve.
     lengths : slice
-        Variables h; empty where the knots are fixed.
+        Positions of the variables h; empty where the knots are fixed.
     free_matrix : FreeMatrix
-        Of all curves, by all variables; see `stack_splines`.
+        Matrix of all curves' control points with respect to all variables; see `stack_splines`.
     fixed_terms : (1 + p, c (N + d)) ndarray
-        Fixed terms of all control points, by powers of the duration.
+        Fixed terms of all control points, one for each power of the duration.
     progress : ProgressRows
         Differences of control points of s; empty without a path.
     x_lower, x_upper : (v,) ndarray
@@ -172,34 +174,34 @@ class VariableLayout:
 
     @cached_property
     def sparsity(self) -> SparsityPattern:
-        """Where the variables of the curves matter; of splines along a timing nobody asks."""
+        """Collocation points at which the variables of the curves matter; built on demand."""
         grid = self._grid
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
         return SparsityPattern(columns, self.free_matrix, len(self.splines))
 
     @cached_property
     def point(self) -> np.ndarray:
-        """Points, (z,), at which variables matter: T, those of each curve, then h."""
+        """Points, (z,), at which variables matter: first T, then the variables of each curve, then h."""
         curve_points = np.arange(len(self._grid.t_norm))
         return np.concatenate([curve_points, self.sparsity.point, self._grid.point])
 
     @cached_property
     def variable(self) -> np.ndarray:
-        """Variables, (z,), that matter at these."""
+        """Variables, (z,), that matter at these points."""
         of_time = np.zeros(len(self._grid.t_norm), dtype=int)
         of_lengths = self._grid.variable + self.lengths.start
         return np.concatenate([of_time, self.sparsity.variable, of_lengths])
 
     @cached_property
     def pattern(self) -> CurvePattern:
-        """Point and curve of each entry between those of T and h."""
+        """Point and curve of each entry between the entries of T and those of h."""
         curve = self._law_curves + self.sparsity.curve
         width = self._law_curves + len(self.splines)
         count = len(self._grid.t_norm)
         return CurvePattern(self.sparsity.point, curve, count, width)
 
     def names(self, curves: Sequence[str]) -> list[str]:
-        """Name the variables: ``t_end`` is the duration, ``s[3]`` control point 3 of s, ``h[0]`` a length.
+        """Name the variables: ``t_end`` is the duration, ``s[3]`` is control point 3 of s, ``h[0]`` is a length.
 
         Numbers begin at 0. A variable that moves several control points has the number of the first one.
 
@@ -218,7 +220,7 @@ class VariableLayout:
 
 
 class RowLayout:
-    """Where rows and entries of the Jacobian stand; see the module.
+    """Order of the rows and of the entries of the Jacobian; see the module.
 
     Parameters
     ----------
@@ -250,7 +252,7 @@ class RowLayout:
 
     @cached_property
     def of_limits(self) -> list[np.ndarray]:
-        """Numbers of the rows of each limit, (K, c) each; none, (0, c), where its means are held."""
+        """Indices of the rows of each limit, (K, c) each; empty, (0, c), for a limit on means."""
         ends = np.cumsum([times * count for times, count in self._shapes])
         return [
             np.arange(end - times * count, end).reshape(times, count)

@@ -1,9 +1,9 @@
 """Means over the whole motion: their values, slopes and curvature.
 
-A mean is held over all phases, and over the pauses at rest between them, by their durations.
+A mean is taken over all phases and over the pauses at rest between them, weighted by their durations.
 
-Values that are held as means are squares f^2, with the Hessian 2 f' f'^T + 2 f f''. The first term is its Gauss-Newton
-part. With the slopes g = 2 f f' it is g g^T / (2 f^2).
+Values that are limited as means are squares f^2, with the Hessian 2 f' f'^T + 2 f f''. The first term is the
+Gauss-Newton part. With the slopes g = 2 f f' it equals g g^T / (2 f^2).
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from brachis.limits import Limit, Moments, Partials
 from brachis.optimise.phase import Phase
 
 _NEARLY_ZERO = 1e-12
-"""Values below this count as not curved: their slopes are nearly zero too, and the quotient is rounding."""
+"""Values below this get no curvature: their slopes are nearly zero too, and the quotient would be rounding error."""
 
 PhasePoints = Sequence[tuple[Phase, np.ndarray]]
 """Phases, each with its variables."""
 
 
 class Means:
-    """Means of the limits' values that are held as means.
+    """Means of those values that are limited as means over the motion.
 
     Parameters
     ----------
     limits : sequence of Limit
-        Of the phases.
+        Limits of the phases.
 
     Attributes
     ----------
     limits : tuple of Limit
-        Those whose means are held.
+        The limits on means.
     lower, upper : (m,) ndarray
         Their bounds.
     """
@@ -49,7 +49,7 @@ class Means:
         return len(self.lower)
 
     def values(self, phase_points: PhasePoints) -> np.ndarray:
-        """Means over all phases, (m,); raises UnreachableError as `Phase.evaluate` does."""
+        """Compute the means over all phases, (m,); raise UnreachableError as `Phase.evaluate` does."""
         if not self.limits:
             return np.empty(0)
         sums = []
@@ -60,7 +60,7 @@ class Means:
         return sum(sums) / _end_time(phase_points)
 
     def slopes(self, phase_points: PhasePoints) -> np.ndarray:
-        """Slopes of the values by all variables, (m, v)."""
+        """Compute the slopes of the values with respect to all variables, (m, v)."""
         if not self.limits:
             return np.empty((0, sum(len(x) for _, x in phase_points)))
         total = self.values(phase_points)
@@ -74,9 +74,9 @@ class Means:
         return np.hstack(columns) / _end_time(phase_points)
 
     def curvature(self, phase_points: PhasePoints, weights: np.ndarray) -> np.ndarray:
-        """Gauss-Newton part, (v, v), of the Hessian of weights . values, weights (m,).
+        """Compute the Gauss-Newton part, (v, v), of the Hessian of ``weights . values``, with weights (m,).
 
-        Pauses are left out, and so is how the shares of the phases depend on their durations.
+        It leaves out the pauses, and the effect of the durations on the shares of the phases.
         """
         ends = np.cumsum([0, *(len(x) for _, x in phase_points)])
         total = np.zeros((ends[-1], ends[-1]))
@@ -87,7 +87,7 @@ class Means:
         return total
 
     def violation(self, phase_points: PhasePoints) -> float:
-        """How far the limits are violated; -inf without any."""
+        """Return the largest violation of the limits on means; -inf if there are none."""
         ends = np.cumsum([len(limit.lower) for limit in self.limits])
         values = np.split(self.values(phase_points), ends[:-1])
         pairs = zip(self.limits, values, strict=False)
@@ -95,12 +95,12 @@ class Means:
         return float(max(violations, default=-np.inf))
 
     def _values_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Values while the arm waits at the phase's end, (m,)."""
+        """Return the values while the arm waits at the end of the phase, (m,)."""
         still = Moments.at_rest(phase.state(x).q[-1:])
         return np.concatenate([limit.values(still)[0] for limit in self.limits])
 
     def _slopes_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Slopes of `_values_at_rest`, (m, v)."""
+        """Return the slopes of `_values_at_rest`, (m, v)."""
         state = phase.state(x)
         still = Moments.at_rest(state.q[-1:])
         by_q = [_by_posture(limit.partials(still), still.q) for limit in self.limits]
@@ -111,18 +111,18 @@ class Means:
 
 
 def _end_time(phase_points: PhasePoints) -> float:
-    """Time of all phases and pauses, s."""
+    """Return the total time of all phases and pauses, s."""
     return float(sum(x[0] + phase.pause for phase, x in phase_points))
 
 
 def _means_of(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Means over one phase, (m,)."""
+    """Return the means over one phase, (m,)."""
     values = phase.evaluate(x).values[:, phase.evaluator.is_mean]
     return phase.mean_weights(x) @ values
 
 
 def _mean_slopes_of(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Slopes of the means over one phase, (m, v)."""
+    """Return the slopes of the means over one phase, (m, v)."""
     is_mean = phase.evaluator.is_mean
     slopes = phase.limit_slopes(x)[:, is_mean]
     total = phase.sum_up(slopes, phase.mean_weights(x))
@@ -132,7 +132,7 @@ def _mean_slopes_of(phase: Phase, x: np.ndarray) -> np.ndarray:
 
 
 def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Gauss-Newton part of the Hessian, (v, v), of the means over one phase with weights, (m,)."""
+    """Return the Gauss-Newton part of the Hessian, (v, v), of the means over one phase with given weights, (m,)."""
     is_mean = phase.evaluator.is_mean
     values = phase.evaluate(x).values[:, is_mean]
     is_curved = values > _NEARLY_ZERO
@@ -142,7 +142,7 @@ def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarra
 
 
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
-    """Slopes of a limit at rest by the posture, (c, n); zero where it does not depend on it."""
+    """Return the slopes of a limit at rest with respect to the posture, (c, n); zero if it does not depend on it."""
     if partials.q is None:
         return np.zeros((partials.size, q.shape[1]))
     return partials.q[0]

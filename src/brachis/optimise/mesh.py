@@ -1,13 +1,12 @@
-"""The knots of a solved program: more of them, better ones, or free ones.
+"""Changes to the knots of a solved program: more knots, better ones, or free ones.
 
-- `solve_by_levels` reaches many given intervals from few. A cold solve with hundreds of
-  variables takes seconds; from a coarse motion, inserted exactly, it takes a few
-  iterations on every level.
-- `refine_mesh` halves the intervals that lose most. A time-optimal motion has 1 + r
-  limits active at almost every instant, and jumps from one set of them to another. A
-  spline can only ramp, and loses about the ramp's length times its height.
+- `solve_by_levels` reaches a given large number of intervals from a few. A cold solve with hundreds of variables takes
+  seconds. From the exact copy of a coarser motion, each level takes a few iterations.
+- `refine_mesh` halves the intervals that cost the most time. A time-optimal motion has 1 + r limits active at almost
+  every instant, and jumps from one set of active limits to another. A spline can only ramp between them, and this costs
+  about the ramp's length times its height.
 - `optimise_knots` makes the interval lengths variables of the optimisation.
-- `adapt_mesh` chooses among them as the task asks.
+- `adapt_mesh` does the one that the task asks for.
 """
 
 from __future__ import annotations
@@ -40,41 +39,41 @@ from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
 _FEW_INTERVALS = 12
-"""Least number of intervals of a phase over which a solve begins."""
+"""Minimum number of intervals of a phase at the coarsest level."""
 _SHORTEST = 5e-5
-"""No interval gets shorter than this part of t_E: collocation points would fall together."""
+"""Shortest length of an interval as a fraction of t_E. In a shorter one, collocation points would coincide."""
 
 
 def coarsest(program: Program) -> Program:
-    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals."""
+    """Return the program over every 2^k-th of its knots, with the largest k that leaves at least 12 intervals."""
     return next(_levels(program))
 
 
 def solve_by_levels(
     target: Program, coarse: SolvedProgram, solve: Solve, deadline: Deadline = NEVER
 ) -> SolvedProgram:
-    """Solve a program from the answer of its coarsest one, level by level.
+    """Solve a program level by level, from the solution of its coarsest level.
 
     Parameters
     ----------
     target : Program
     coarse : SolvedProgram
-        ``coarsest(target)`` solved, perhaps with another branch margin, which is kept.
+        The solved ``coarsest(target)``. It may have a different branch margin, which is kept.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     deadline : Deadline, optional
-        No level is begun after it.
+        No level is started after this deadline.
 
     Returns
     -------
     SolvedProgram
-        Over the target's knots; over those of the last level that was solved, where one could not be.
+        The program over the target's knots, or over the knots of the last level that could be solved.
     """
 
     def change_to(level: Program, solved: SolvedProgram) -> tuple[Program, np.ndarray]:
-        """Write a motion over the knots of a level."""
+        """Express a motion over the knots of a level."""
         pairs = zip(solved.program.phases, level.phases, strict=True)
-        # The solved program may have another branch margin.
+        # The solved program may have a different branch margin.
         phases = [phase.with_knots(fine.knots, fine.t_norm) for phase, fine in pairs]
         return _transfer(solved, phases)
 
@@ -95,7 +94,7 @@ def solve_by_levels(
 def _transfer(
     solved: SolvedProgram, phases: Sequence[Phase]
 ) -> tuple[Program, np.ndarray]:
-    """Write a solved program, and its answer, over the knots of phases that contain its own."""
+    """Express a solved program and its solution over the knots of phases; these contain all of its own knots."""
     finer = solved.program.with_phases(phases)
     pairs = zip(solved.program.motions(solved.x), phases, strict=True)
     motions = [motion.with_knots(phase.knots) for motion, phase in pairs]
@@ -103,7 +102,7 @@ def _transfer(
 
 
 def _levels(program: Program) -> Iterator[Program]:
-    """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
+    """Yield programs over more and more of the knots, from the coarsest to the given one; points per interval stay."""
     counts = [phase.intervals / _FEW_INTERVALS for phase in program.phases]
     halvings = [int(np.log2(max(count, 1.0))) for count in counts]
     for k in range(max(halvings), 0, -1):
@@ -115,7 +114,7 @@ def _levels(program: Program) -> Iterator[Program]:
 
 
 def _thin_out(phase: Phase, step: int) -> Phase:
-    """Keep every so many-th knot and collocation point, and the last ones."""
+    """Keep every `step`-th knot and collocation point, and the last ones."""
 
     def thin_out(values: np.ndarray) -> np.ndarray:
         return np.union1d(values[::step], values[-1:])
@@ -125,43 +124,43 @@ def _thin_out(phase: Phase, step: int) -> Phase:
 
 
 COARSE_INTERVALS = 10
-"""Intervals with which a mesh begins."""
+"""Number of intervals of the first mesh."""
 _FEW_VARIABLES = 150
-"""Up to so many it is cheap to halve every interval, in case the wrong ones were thought to lose most."""
+"""Number of variables up to which it is cheap to halve every interval, in case the wrong ones were chosen."""
 _MOST_VARIABLES = 300
-"""Solves with more take seconds each, and gain some 0.1 %."""
-_COARSER = "the mesh is coarser than spline.tolerance asks for"
+"""Maximum number of variables. Solves with more take seconds each and gain about 0.1 %."""
+_COARSER = "the mesh is coarser than spline.tolerance requires"
 
 
 def refine_mesh(
     solved: SolvedProgram, solve: Solve, spline: SplineSettings, deadline: Deadline
 ) -> SolvedProgram:
-    """Insert knots into a solved program until that gains little.
+    """Insert knots into a solved program until further knots gain little.
 
-    Every round halves the intervals that lose most, and solves again from the same motion. Rounds end when the last two
-    of them together gained less than half the tolerance; small meshes are halved everywhere before.
+    Every round halves the intervals that cost the most time, and solves again from the same motion. The rounds end when
+    the last two together gained less than half the tolerance. Before that, a small mesh is halved everywhere.
 
     Parameters
     ----------
     solved : SolvedProgram
-        Of one report.
+        The solved program, with one report.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
-        Its tolerance is a fraction of the end time.
+        Spline settings; the tolerance is a fraction of the end time.
     deadline : Deadline
-        After it no round is begun.
+        No round is started after this deadline.
 
     Returns
     -------
     SolvedProgram
-        Over all knots.
+        The program over all knots, old and new.
     """
-    # An interval cannot lose more than its own length.
+    # An interval cannot cost more time than its own length.
     shortest = max(0.5 * spline.tolerance, _SHORTEST)
 
     def halve(solved: SolvedProgram) -> tuple[Program, np.ndarray] | str | None:
-        """Halve the intervals that matter, unless that no longer pays."""
+        """Halve the intervals that matter, unless this is no longer worthwhile."""
         program = solved.program
         times = np.array([report.objective for report in solved.reports])
         gains = 1.0 - times[1:] / times[:-1]
@@ -188,7 +187,7 @@ def refine_mesh(
 def _choose_intervals(
     solved: SolvedProgram, allowed: Sequence[np.ndarray]
 ) -> Sequence[np.ndarray]:
-    """Choose among the intervals of every phase those that lose most time, and 60 % of all that is lost."""
+    """Choose the intervals that cost the most time and together account for 60 % of the loss in all phases."""
     x = solved.x
     try:
         losses = [_loss(*pair) for pair in solved.program.split(x)]
@@ -205,9 +204,9 @@ def _choose_intervals(
 
 
 def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Time that each interval loses, (N,), s: how far as many limits as there are curves swing within it.
+    """Time that each interval costs, (N,), s, from the swing of the most active limits, one for each curve.
 
-    Where the duration is given, none is lost.
+    Where the duration is given, no time can be lost.
     """
     if phase.time_law is not None:
         return np.zeros(phase.intervals)
@@ -222,7 +221,7 @@ def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
 
 
 def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:
-    """Halve the chosen intervals, (N,), and add collocation points, so many an interval."""
+    """Halve the chosen intervals, (N,), and add collocation points, `points` per interval."""
     breaks = phase.breaks
     middles = 0.5 * (breaks[:-1] + breaks[1:])
     finer = np.union1d(breaks, middles[chosen])
@@ -231,7 +230,7 @@ def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:
 
 
 _BEYOND_LIMITS = 1e9
-"""Stands for the end time of motions beyond the limits, s: any motion within them is better."""
+"""Stands for the end time of a motion that violates the limits, s: any motion within the limits is better."""
 
 
 def optimise_knots(
@@ -239,25 +238,26 @@ def optimise_knots(
 ) -> SolvedProgram:
     """Optimise the interval lengths of a solved program together with the motion.
 
-    Collocation points keep their places within their intervals while the knots move. The knots are then fixed and the
-    limits made to hold in between (`refine`); from there, with the points that this added, the knots are freed again,
-    as long as that gains.
+    Collocation points keep their places within their intervals while the knots move. Then the knots are fixed, and
+    `refine` adds points until the limits are also met between collocation points. The knots are freed again, with the
+    added points, as long as this gains time.
 
     Parameters
     ----------
     solved : SolvedProgram
-        With fixed knots.
+        The solved program, with fixed knots.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     shortest : float
-        Least length of an interval, in mean intervals; 5e-5 t_E at least is taken.
+        Shortest length of an interval, in mean intervals; it is at least 5e-5 t_E.
     refinement : RefinementOptions
-        After its deadline the knots are not freed again.
+        Options of `refine`. After their deadline the knots are not freed again.
 
     Returns
     -------
     SolvedProgram
-        With knots fixed where they are best; the given program if moving them led to no motion within the limits.
+        The program with its knots fixed at the best places found; the given program if moving the knots led to no
+        motion within the limits.
     """
     intervals = max(phase.intervals for phase in solved.program.phases)
     shortest = max(shortest, _SHORTEST * intervals)
@@ -271,13 +271,13 @@ def optimise_knots(
         """Move the knots, fix them where they end, and refine."""
         moved = solve(free, x)
         fixed, start = free.fix_knots(moved.x)
-        # A few iterations, where the solver stalled before the knots came to rest.
+        # This takes a few iterations where the solver stalled before the knots had settled.
         report = judge_early_end(solve(fixed, start), free.end_time(x))
         refined = refine(fixed, report, solve, refinement)
         return replace(refined, reports=(moved, *refined.reports))
 
     def judge(candidate: SolvedProgram) -> float:
-        """Time of a motion within the limits, s; a bad mark for another."""
+        """Return the time of a motion within the limits, s, and a very large number for any other motion."""
         if not np.isfinite(candidate.violation):
             return np.inf
         if refinement.max_rounds and candidate.violation > refinement.tolerance:
@@ -310,7 +310,7 @@ def adapt_mesh(
     *,
     target: Program | None = None,
 ) -> SolvedProgram:
-    """Do with the knots of a solved program what a task's ``spline`` part asks for: nothing, free them, or refine.
+    """Free the knots of a solved program, refine them, or leave them, as the task's ``spline`` part asks.
 
     Parameters
     ----------
@@ -319,14 +319,14 @@ def adapt_mesh(
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
     refinement : RefinementOptions
-        After its deadline no further round is begun.
+        Options of `refine`. After their deadline no further round is started.
     target : Program, optional
-        The program over all its knots, where the solved one is its coarsest (see `solve_by_levels`).
+        The program over all its knots, if the solved one is its coarsest level (see `solve_by_levels`).
 
     Returns
     -------
     SolvedProgram
-        With fixed knots; the reports are those given, and those of further solves.
+        The program with fixed knots. Its reports are the given ones and those of further solves.
     """
     if not solved.usable:
         return solved

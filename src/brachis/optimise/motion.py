@@ -1,4 +1,4 @@
-"""The motion of a phase: curves y(t) as splines, the first of them perhaps given by a time law."""
+"""The motion of a phase: curves y(t) as splines, of which the first may be given by a time law."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 
 _ROUNDING = 1e-13
-"""Part of the time by which rounding moves a time."""
+"""Error of a time due to rounding, as a fraction of the end time."""
 _S_MISS = 2e-13
 """Largest deviation of the spline of s from the time law."""
 _LOOKS = 5
-"""Times in each interval at which they are compared."""
+"""Number of times in each interval at which the spline and the time law are compared."""
 _SAMPLES = 20
-"""Times for each station between which a time law is linear, where it is asked when it passes them."""
+"""Number of samples per station between which a time law is taken as linear, to find when it passes a station."""
 
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
-    """Value and derivatives per second, from those per unit of normalised time."""
+    """Convert value and derivatives per unit of normalised time to derivatives per second."""
     return tuple(values / t_end**order for order, values in enumerate(orders))
 
 
@@ -41,7 +41,7 @@ def sample_law(time_law: TimeLaw, t_norm: np.ndarray) -> np.ndarray:
 def follow_law(
     law: TimeLaw, stations: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find when a time law passes stations, (P,), s, and ds/dt, 1/s, and d2s/dt2, 1/s^2, there."""
+    """Find the times at which a time law passes stations, (P,), s, with ds/dt, 1/s, and d2s/dt2, 1/s^2, there."""
     t = np.linspace(0.0, law.duration, _SAMPLES * len(stations))
     times = np.interp(stations, law.at(t)[0], t)
     _, rate, acceleration, _ = law.at(times)
@@ -50,7 +50,7 @@ def follow_law(
 
 @dataclass(frozen=True, repr=False)
 class Motion(PhaseSpline):
-    """A point x of a phase as curves. Where a time law gives s(t), s has no spline.
+    """The curves that belong to a point x of a phase. Where a time law gives s(t), s has no spline.
 
     Attributes
     ----------
@@ -60,27 +60,27 @@ class Motion(PhaseSpline):
         In normalised time.
     degree : int
     control_points : (c, N + d) ndarray
-        Of each curve: of s along a path without a time law, then of each redundant joint in chain order.
+        Control points of each curve: first s along a path without a time law, then each redundant joint in chain order.
     time_law : TimeLaw or None
-        s(t) where it is given.
+        Time law of s(t), if it is given.
     """
 
     time_law: TimeLaw | None = None
 
     @property
     def breaks(self) -> np.ndarray:
-        """Times between which the curves are polynomials, (N + 1,), s."""
+        """Times, (N + 1,), s, between which the curves are polynomials."""
         return np.unique(self.knots) * self.t_end
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
+        """Return value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
 
-        At knots those just after them.
+        At a knot, these are the values just after it.
         """
         t_norm = t / self.t_end
         within = t_norm.clip(self.knots[0], self.knots[-1])
         spline = Spline(self.knots, self.control_points.T, self.degree)
-        # Rounding must not choose the side of a knot: the highest derivative jumps there.
+        # Rounding must not decide the side of a knot, because the highest derivative jumps there.
         orders = spline.derivatives(within, ORDERS - 1, _ROUNDING)
         if self.time_law is not None:
             law_orders = sample_law(self.time_law, t_norm)
@@ -88,32 +88,32 @@ class Motion(PhaseSpline):
         return per_second(orders, self.t_end)
 
     def with_knots(self, knots: np.ndarray) -> Motion:
-        """Return the same curves over a clamped knot vector that contains the present one."""
+        """Return the same curves over a clamped knot vector that contains the current one."""
         points = insert_knots(self.control_points, self.knots, knots, self.degree)
         return replace(self, knots=knots, control_points=points)
 
     def with_start(self, values: np.ndarray, curves: Sequence[int]) -> Motion:
-        """Return the motion with other values and derivatives at its beginning.
+        """Return the motion with new values and derivatives at its beginning.
 
         Parameters
         ----------
         values : (1 + k, c) ndarray
-            By order, per second.
+            Values and derivatives, by order, per second.
         curves : sequence of int
-            Numbers of these c curves among those that have control points.
+            Indices of these c curves among the curves that have control points.
         """
         orders = np.arange(len(values))[:, None]
         _, basis = local_basis(self.knots, self.degree, np.zeros(1))
         matrix = basis[: len(values), 0, : len(values)]
         points = self.control_points.copy()
-        # Basis functions add up to 1: so derivatives of zero give points that are equal to the last digit.
+        # Basis functions add up to 1, so derivatives of zero give points that are equal to the last digit.
         slopes = np.concatenate([0.0 * values[:1], (values * self.t_end**orders)[1:]])
         first = values[0] + np.linalg.solve(matrix, slopes)
         points[curves, : len(values)] = first.T
         return replace(self, control_points=points)
 
     def as_spline(self) -> PhaseSpline:
-        """Write all curves as splines; with a time law over more knots, so that s follows it to rounding.
+        """Return all curves as splines; with a time law, over more knots, so that s follows it to rounding error.
 
         Raises
         ------

@@ -1,11 +1,12 @@
-"""Solve a program with only the rows near their bounds.
+"""Solve a program with only the rows that are close to their bounds.
 
-From a motion that is nearly as fast as possible most limits stay far away: at a time one or two of them hold the motion
-back. A solver's effort grows with all rows that it is given. So it is given those near their bounds, and all are
-checked at its answer; those that are violated then are added, and it goes on from there.
+In a motion that is nearly as fast as possible, one or two limits are active at a time, and most others are far from
+their bounds. A solver's effort grows with the number of rows. So the solver gets only the rows close to their bounds,
+and all rows are checked at its solution. Violated rows are added, and the solver continues from there.
 
-An interior-point method leaves the bounds at first. It needs the rows of whole values, such as a joint's torque all
-along the path, where these come near a bound anywhere. So does any method where few rows hold the motion.
+An interior-point method moves away from the bounds at first. It therefore needs whole values: if a value, such as a
+joint's torque, comes close to a bound anywhere, all of its rows along the path are included. Any method needs whole
+values where few rows are active.
 """
 
 from __future__ import annotations
@@ -27,26 +28,28 @@ from brachis.optimise.backends import (
 from brachis.optimise.backends.monitor import row_slack
 
 _NEAR = 0.2
-"""Distance from its bound up to which a row is near, as a part of the limit."""
+"""Distance from its bound up to which a row counts as near, as a fraction of the limit."""
 _AT_BOUND = 0.05
-"""Distance from its bound up to which a row holds the motion, about."""
+"""Distance from its bound up to which a row is taken to hold the motion back."""
 _ROWS_A_VARIABLE = 2.0
-"""Rows that hold the motion, for every variable, no fewer: from a slower motion the end time would collapse."""
+"""Minimum number of rows per variable that hold the motion back. With fewer, as in a slower motion, the end time would
+collapse."""
 _ROWS_IF_CURVED = 1.0
-"""The same where a part of the Hessian is known: curvature keeps steps short."""
+"""The same number where part of the Hessian is known, because curvature keeps steps short."""
 _LEAST_KEPT = 0.2
-"""Part of the rows, the nearest ones, that is kept whatever their distance: too few let the end time collapse."""
+"""Fraction of the rows, the nearest ones, that is kept at any distance. With too few rows the end time collapses."""
 _MOST_KEPT = 0.6
-"""Part of the rows: if more are near, leaving out the others gains nothing."""
+"""Fraction of the rows. If more than this are near, leaving out the others gains nothing."""
 _FIRST_VIOLATION = 0.5
-"""Largest violation of a first point that counts as a fast motion."""
+"""Largest violation with which a starting point still counts as a fast motion."""
 _LAST_VIOLATION = 0.5
-"""Violation of other rows above which an answer is another motion: then all rows are needed."""
+"""Violation of the left-out rows above which the solution is a different motion. Then all rows are needed."""
 _NEAR_ANYWHERE = 0.3
-"""Distance from its bound up to which a value is near, if it is anywhere: of 13 solves over the path all but one ended
-with no other value violated, in 0.4 of the time; with 0.5, and with rows near their bounds, in 0.9 of it."""
+"""A value counts as near if it comes this close to its bound anywhere. Of 13 solves over the path, all but one ended
+with no other value violated, in 0.4 of the time. With 0.5, and with single rows near their bounds, they took 0.9 of the
+time."""
 _ROUNDS = 4
-"""Solves with more and more rows, no more."""
+"""Maximum number of solves with more and more rows."""
 _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 """Statuses after which no further solve is tried."""
 
@@ -58,7 +61,7 @@ class NearRows:
     ----------
     program : NonlinearProgram
     numbers : (c',) int ndarray
-        Indices of the rows to keep, ascending.
+        Indices of the rows that are kept, ascending.
     """
 
     def __init__(self, program: NonlinearProgram, numbers: np.ndarray) -> None:
@@ -79,15 +82,15 @@ class NearRows:
         self.gradient = program.gradient
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows that are left."""
+        """Return the values of the rows that are kept."""
         return self._program.rows(x)[self._numbers]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian that are left."""
+        """Return the entries of the Jacobian in the rows that are kept."""
         return self._program.jacobian(x)[self._entries]
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
-        """Return what the program knows of its Hessian; multipliers of the rows that are left out are zero."""
+        """Return the known part of the program's Hessian, with zero multipliers for the rows that are left out."""
         curvature = self._program.curvature(x)
         if curvature is None:
             return None
@@ -95,7 +98,7 @@ class NearRows:
         def find_hessian(
             x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
         ) -> np.ndarray:
-            """Return the known part by the multipliers of the rows that are left."""
+            """Return the known part for the multipliers of the rows that are kept."""
             every = np.zeros_like(curvature.multipliers)
             every[self._numbers] = multipliers
             return curvature.hessian(x, objective_multiplier, every)
@@ -104,11 +107,11 @@ class NearRows:
 
 
 class HasValues(NonlinearProgram, Protocol):
-    """A problem whose rows are values of limits at places."""
+    """A problem whose rows are values of limits at places along the motion."""
 
     @property
     def value_numbers(self) -> np.ndarray:
-        """Number of the value that each row holds at a place, (c,)."""
+        """Number of the value in each row, (c,), the same at all places."""
 
 
 def solve_near_rows(
@@ -119,7 +122,7 @@ def solve_near_rows(
     is_answer: bool = False,
     kept_rows: Sequence[int] = (),
 ) -> SolverReport:
-    """Solve a program from a point, with the rows near their bounds where that is enough.
+    """Solve a program from a point, with only the rows near their bounds where these are enough.
 
     Parameters
     ----------
@@ -128,15 +131,15 @@ def solve_near_rows(
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
     is_answer : bool, optional
-        Whether the point is the answer of a solve over other knots or points. If too few rows are near, whole values
-        are then left out.
+        Whether the point is the solution of a solve over different knots or points. If too few rows are near, only
+        whole values are then left out.
     kept_rows : sequence of int, optional
-        Numbers of rows that are kept whatever their distance.
+        Numbers of rows that are kept at any distance from their bounds.
 
     Returns
     -------
     SolverReport
-        Of the program with all its rows.
+        Report for the program with all its rows.
     """
     slack = row_slack(program, x)
     if slack.min() < -_FIRST_VIOLATION:
@@ -157,7 +160,7 @@ def solve_near_rows(
         reports.append(report)
         slack = row_slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), numbers)
-        # With all rows the solve would use up time and iterations too.
+        # With all rows the solve would run out of time or iterations too.
         is_over = report.status in _FINAL
         if is_over or (report.status.usable and not len(missing)):
             return _complete(program, numbers, reports)
@@ -173,12 +176,12 @@ def solve_near_values(
     x: np.ndarray,
     solve: Callable[[NonlinearProgram, np.ndarray], SolverReport],
 ) -> SolverReport:
-    """Solve a program from a point, with the values that come near their bounds anywhere.
+    """Solve a program from a point, with only the values that come close to their bounds anywhere.
 
     Parameters
     ----------
     program : HasValues
-        Its ``value_numbers``, (c,), tell of which value each row is.
+        Its ``value_numbers``, (c,), give the value to which each row belongs.
     x : (v,) ndarray
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
@@ -186,7 +189,7 @@ def solve_near_values(
     Returns
     -------
     SolverReport
-        Of the program with all its rows; some may be violated after many rounds.
+        Report for the program with all its rows. After the last round some rows may be violated.
     """
     values = program.value_numbers
     is_near = np.zeros(1 + values.max(), dtype=bool)
@@ -208,7 +211,7 @@ def solve_near_values(
 def _complete(
     program: NonlinearProgram, numbers: np.ndarray, reports: Sequence[SolverReport]
 ) -> SolverReport:
-    """Combine the reports; the last solve had the rows with these numbers."""
+    """Combine the reports of several solves; the last solve had the rows with these numbers."""
     last = reports[-1]
     multipliers = np.zeros(len(program.lower))
     multipliers[numbers] = last.multipliers

@@ -1,4 +1,4 @@
-"""What is minimised: the end time, or the accelerations of the joints."""
+"""The objective to minimise: the end time, or the accelerations of the joints."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from brachis.limits import Partials
 from brachis.optimise.phase import Phase
 
 _CALM = 1e-4
-"""Weight of the redundant joints' accelerations where the time is given, s per rad^2 or m^2.
+"""Weight of the redundant joints' squared accelerations where the time is given, s per rad^2 or m^2.
 
-They are measured in the time of a knot interval: joints may hurry where intervals are short, and not swing between two
-collocation points that are far apart. End times of ten lines at 0.02 to 0.5 m/s were the same within 1e-4 with 1e-5 and
-1e-3.
+The accelerations are scaled by the duration of a knot interval. So joints may move fast where intervals are short, but
+do not swing between two collocation points that are far apart. The end times of ten lines at 0.02 to 0.5 m/s were the
+same to within 1e-4 with weights of 1e-5 and 1e-3.
 """
 
 
@@ -32,30 +32,30 @@ class Objective(Protocol):
     def longest(self) -> float | np.ndarray: ...  # noqa: D102
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Share of a phase at its variables x, (v,)."""
+        """Return the share of a phase in the objective, at its variables x, (v,)."""
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gradient of the share, (v,)."""
+        """Return the gradient of the share, (v,)."""
 
     def is_curved(self, phase: Phase) -> bool:
         """Tell whether the share contains a sum of squares."""
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gauss-Newton part of the share's Hessian, (v, v)."""
+        """Return the Gauss-Newton part of the share's Hessian, (v, v)."""
 
 
 @dataclass(frozen=True)
 class EndTime:
     """The end time t_E, s: the sum of the durations.
 
-    Where the duration of a phase is given, many motions are equally fast, and solvers need a best one. So the mean
-    square of the redundant joints' accelerations is added there, with small weights.
+    Where the duration of a phase is given, many motions are equally fast, but solvers need a unique optimum. So the
+    mean square of the redundant joints' accelerations is added with a small weight.
     """
 
     longest: float = np.inf
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Duration of a phase, s, and of the pause after it."""
+        """Return the duration of a phase and the pause after it, s; if the duration is given, add the accelerations."""
         duration = float(x[0]) + phase.pause
         if phase.time_law is None:
             return duration
@@ -63,7 +63,7 @@ class EndTime:
         return duration + float(_calm(phase, x) @ squares.sum(axis=1))
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gradient of the value, (v,)."""
+        """Return the gradient of the value, (v,)."""
         gradient = np.zeros(len(x))
         if phase.time_law is not None:
             yddot = phase.state(x).yddot[:, None]
@@ -71,15 +71,15 @@ class EndTime:
             slopes[2] = 2.0 * _calm(phase, x)[:, None, None] * yddot
             slopes[2, :, :, 0] = 0.0
             gradient = phase.gradient_by_curves(slopes, x)
-        gradient[0] = 1.0  # a duration that is given does not change
+        gradient[0] = 1.0  # a given duration does not change
         return gradient
 
     def is_curved(self, phase: Phase) -> bool:
-        """Tell whether the duration is given, and joints are redundant."""
+        """Tell whether the duration is given and there are redundant joints."""
         return phase.time_law is not None and phase.joint_map.r > 0
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Hessian of the weighted mean square of the redundant joints' accelerations, (v, v)."""
+        """Return the Hessian of the weighted mean square of the redundant joints' accelerations, (v, v)."""
         points, curves = phase.state(x).yddot.shape
         by_curves = np.zeros((3, points, curves - 1, curves))
         by_curves[2, :, :, 1:] = np.eye(curves - 1)
@@ -97,7 +97,7 @@ class LeastAcceleration:
     Attributes
     ----------
     weights : (n,) ndarray
-        By joint, reciprocals of accelerations.
+        Weight of each joint, the reciprocal of an acceleration.
     longest : (phases,) ndarray
         See `Objective`.
     """
@@ -106,12 +106,12 @@ class LeastAcceleration:
     longest: np.ndarray
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Mean over a phase; raises UnreachableError as `Phase.evaluate` does."""
+        """Return the mean over a phase; raise UnreachableError as `Phase.evaluate` does."""
         squares = (phase.state(x).qddot * self.weights) ** 2
         return float(_shares(phase) @ squares.sum(axis=1))
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gradient of the mean, (v,); raises UnreachableError as `Phase.evaluate` does."""
+        """Return the gradient of the mean, (v,); raise UnreachableError as `Phase.evaluate` does."""
         slopes = 2.0 * _shares(phase)[:, None] * self.weights**2 * phase.state(x).qddot
         return phase.gradient(Partials(qddot=slopes[:, None]), x)
 
@@ -120,7 +120,7 @@ class LeastAcceleration:
         return True
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gauss-Newton part of the mean's Hessian, (v, v)."""
+        """Return the Gauss-Newton part of the mean's Hessian, (v, v)."""
         by_joints = np.tile(np.diag(self.weights), (len(phase.t_norm), 1, 1))
         by_curves = phase.evaluate(x).chain(Partials(qddot=by_joints))
         slopes = phase.slopes_by_variables(by_curves, x)
@@ -129,7 +129,7 @@ class LeastAcceleration:
 
 
 def _calm(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Weights of squares of accelerations at the collocation points, (K,), s per (rad/s^2)^2 or (m/s^2)^2."""
+    """Return weights of squared accelerations at the collocation points, (K,), s per (rad/s^2)^2 or (m/s^2)^2."""
     breaks = phase.breaks
     interval = np.searchsorted(breaks[1:-1], phase.t_norm, side="right")
     durations = np.diff(breaks)[interval] * float(x[0])
@@ -137,6 +137,6 @@ def _calm(phase: Phase, x: np.ndarray) -> np.ndarray:
 
 
 def _shares(phase: Phase) -> np.ndarray:
-    """Weights of the trapezoidal rule at the collocation points, (K,)."""
+    """Return the weights of the trapezoidal rule at the collocation points, (K,)."""
     gaps = np.concatenate([[0.0], np.diff(phase.t_norm), [0.0]])
     return 0.5 * (gaps[:-1] + gaps[1:])

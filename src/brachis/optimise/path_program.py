@@ -1,14 +1,14 @@
-"""The NLP over the path: how fast stations of the path are passed, and redundant curves as splines of s.
+"""The NLP over the path: its variables are speeds at stations of the path, and redundant curves as splines of s.
 
-Places of the path do not move, as they do over time: corners that are passed within milliseconds have their stations.
-With X = sdot^2 linear in s between two stations, u = d2s/dt2 is constant there, as in the phase plane. At any place
-between them
+Places of the path are fixed, unlike in the program over time, so that corners that are passed within milliseconds have
+their own stations. X = sdot^2 is linear in s between two stations. So u = d2s/dt2 is constant there, as in the phase
+plane. At any place between them
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
-Limits hold half-way between the stations, and at both ends.
+Limits are imposed midway between the stations and at both ends.
 
-What it finds is a joint path: its timing is computed anew, on a finer grid.
+The result is a joint path. Its timing is recomputed on a finer grid.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
 _SLOWEST = 1e-3
-"""Least sdot^2 between the ends, as a part of what it is at the beginning."""
+"""Smallest sdot^2 between the ends, as a fraction of its initial value."""
 _STOPPED = 1e-8
-"""Part of the median sdot^2 below which a station is passed at rest."""
+"""Fraction of the median sdot^2 below which the tool is taken to be at rest at a station."""
 _SHORTEST = tolerances.PATH
 _NOTHING = 1e-24
-"""Stands for zero where it is divided by."""
+"""Replaces zero as a divisor."""
 _SAMPLES = 20
-"""Places in every interval of the splines at which they begin as the curves are."""
+"""Number of places in every spline interval at which the initial splines are fitted to the curves."""
 _SMALL = 2e-5
 """Violation up to which a limit on postures is not narrowed."""
 _RAMP = 2.0
-"""Places over which the narrowing grows from nothing, beside a given end posture."""
+"""Number of places over which the narrowing grows from zero, next to a given end posture."""
 _MORE = 1.2
 """Factor on a violation by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
-"""Stations in every piece of a path, at most as far apart as others."""
+"""Number of stations that are added in every short piece of a path."""
 _Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
-"""The motion at the places where limits hold, and the limits there."""
+"""The motion at the places where limits are imposed, and the limits there."""
 
 
 def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
@@ -61,7 +61,7 @@ def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
 
 
 def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
-    """Stand still in postures along curves, (S, c); raise UnreachableError where the joint map has no posture."""
+    """Return states at rest along curves, (S, c); raise UnreachableError where the joint map has no posture."""
     q = phase.joint_map.postures(curves)
     if not np.isfinite(q).all():
         raise UnreachableError("the joint path leaves the joint map")
@@ -74,22 +74,23 @@ class PathPhase:
     Parameters
     ----------
     phase : Phase
-        Along a path, with limits up to the second order.
+        Phase along a path, with limits up to the second order.
     phase_timing : PhaseTiming
-        From which the solve begins.
+        Timing from which the solve starts.
     intervals, stations : int
-        Of the splines, and between the stations; both are as long in time.
+        Numbers of intervals of the splines and between the stations. Each kind has equal lengths in time.
 
     Attributes
     ----------
     curves_count : int
         Number of redundant curves.
     breaks : (M + 1,) ndarray
-        Ends of the intervals of the splines, path coordinates.
+        Ends of the intervals of the splines, as path coordinates.
     ends : tuple of float
-        Path coordinates.
+        Path coordinates of both ends.
     start, x_lower, x_upper : (v,) ndarray
-        Variables: X at the stations, in units of what it is at the beginning, and the control points.
+        Initial values and bounds of the variables: X at the stations, in units of its initial values, and the control
+        points.
     jacobian_rows, jacobian_columns : (nnz,) int ndarray
     """
 
@@ -113,7 +114,7 @@ class PathPhase:
         even_s = np.interp(evenly, t, s)
         self._s = _with_pieces(even_s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
-        # Where limits hold: the interval between stations, and the part of it that is ahead.
+        # Places where limits are imposed: the interval between stations, and the fraction of it that lies ahead.
         inner = np.full(len(self._steps), 0.5)
         self._number = np.pad(np.arange(len(inner)), 1, mode="edge")
         self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
@@ -140,7 +141,7 @@ class PathPhase:
         ends = [(limit.lower, limit.upper) for limit in self._limits]
         lower_and_upper = np.concatenate(ends, axis=1)
         self._bounds = np.repeat(lower_and_upper[:, None], len(self._places), axis=1)
-        # Splines over time leave a joint path by a little.
+        # Splines over time deviate slightly from a joint path.
         for values, limit in self._posture_limits():
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
@@ -148,7 +149,7 @@ class PathPhase:
         self._evaluate = LastCall(self._evaluate_anew)
 
     def _set_pattern(self, columns: np.ndarray) -> None:
-        """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
+        """Set the pattern of the Jacobian; `columns`, (L, 4), are the control points that matter at each place."""
         places, values = self._bounds.shape[1:]
         curves = np.arange(self.curves_count)
         of_curves = (len(self._s) + curves * self._count)[:, None, None] + columns
@@ -164,7 +165,7 @@ class PathPhase:
         self.jacobian_rows = rows[point].ravel()
 
     def _set_constants(self) -> None:
-        """Set s, s' and s'' at the places, and the slopes of X and u by the variables at both stations beside them."""
+        """Set s, s' and s'' at the places, and the slopes of X and u with respect to X at the stations beside them."""
         s = self._places[:, None]
         self._of_s = np.array([s, np.ones_like(s), np.zeros_like(s)])
         units = self._units[np.array([self._number, self._number + 1])][:, :, None]
@@ -173,7 +174,7 @@ class PathPhase:
         self._by_step = units * np.array([-1.0 / steps, 1.0 / steps])
 
     def _set_variables(self, squares: np.ndarray, points: np.ndarray) -> None:
-        """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
+        """Set the initial variables and their bounds: X at both ends, and given values, are fixed."""
         count = len(self._s)
         self.start = np.concatenate([squares / self._units, points.ravel()])
         is_fixed = np.zeros(len(self.start), dtype=bool)
@@ -193,7 +194,7 @@ class PathPhase:
         self.x_upper = np.where(is_fixed, self.start, np.inf)
 
     def _begin_within_limits(self) -> None:
-        """Begin with the fastest timing of the splines over these stations, if there is one."""
+        """Start from the fastest timing of the splines over these stations, if there is one."""
         phase = self.phase
         squares, _ = self._split(self.start)
         course = self.course(self.start, self._s)
@@ -212,21 +213,21 @@ class PathPhase:
         self.start[1 : len(self._s) - 1] = inner
 
     def place_of(self, curve: int, end: int) -> int:
-        """Return the number of the variable that is a redundant curve's value at the start (0) or end (-1)."""
+        """Return the index of the variable that is a redundant curve's value at the start (0) or end (-1)."""
         return len(self._s) + curve * self._count + end % self._count
 
     def _basis_at(self, s: np.ndarray) -> LocalBasis:
-        """Basis functions of the curves at path coordinates, (S,), and their derivatives by these."""
+        """Return the curves' basis functions at path coordinates, (S,), and their derivatives with respect to s."""
         return LocalBasis.of(self._knots, _DEGREE, s)
 
     def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """X at the stations, (P,), and control points, (r, M + 3)."""
+        """Return X at the stations, (P,), and the control points, (r, M + 3)."""
         count = len(self._s)
         points = x[count:].reshape(self.curves_count, self._count)
         return x[:count] * self._units, points
 
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Curves and two derivatives by s, (3, L, c), and X and u, (L, 1), at the L places where limits hold."""
+        """Return curves with two derivatives in s, (3, L, c), and X and u, (L, 1), where the limits apply."""
         squares, points = self._split(x)
         redundant = self._basis.curves(points)[:3]
         curves = np.concatenate([self._of_s, redundant], axis=2)
@@ -237,11 +238,11 @@ class PathPhase:
         return curves, square, u[:, None]
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Joint motion and limits where these hold; raises UnreachableError where the joint map has no posture."""
+        """Evaluate joint motion and limits at all places; raise UnreachableError where the joint map has no posture."""
         return self._evaluate(x)[1]
 
     def _evaluate_anew(self, x: np.ndarray) -> _Evaluated:
-        """Return `_motion` and `evaluate`."""
+        """Return the results of `_motion` and `evaluate`."""
         motion = self._motion(x)
         (y, y_ds, y_dds), square, u = motion
         orders = (y, y_ds * np.sqrt(square), y_dds * square + y_ds * u, 0.0 * y)
@@ -249,12 +250,12 @@ class PathPhase:
         return motion, self._evaluator.evaluate(*orders, t=t)
 
     def narrow(self, x: np.ndarray) -> float:
-        """Narrow, along the whole path, the limits on postures that are exceeded between the places.
+        """Narrow those limits on postures, along the whole path, that are exceeded between the places.
 
         Returns
         -------
         float
-            The largest violation there was.
+            The largest violation before narrowing.
         """
         motion = _moments_along(self.phase, self.curves(x))
         worst = 0.0
@@ -266,7 +267,7 @@ class PathPhase:
         return worst
 
     def _posture_limits(self) -> Iterator[tuple[slice, Limit]]:
-        """Yield the limits on postures alone, each with the columns of its values."""
+        """Yield the limits that depend on postures alone, each with the columns of its values."""
         first = 0
         for limit in self._limits:
             columns = slice(first, first + len(limit.lower))
@@ -275,7 +276,7 @@ class PathPhase:
                 yield columns, limit
 
     def _narrow(self, columns: slice, by: np.ndarray | float) -> None:
-        """Move both bounds of some values inwards, (c,), beside an end with a given posture by less."""
+        """Move both bounds of some values inwards by an amount, (c,); next to an end with a given posture, by less."""
         number = np.arange(float(len(self._places)))
         ends = self.phase.boundary.start, self.phase.boundary.end
         share = np.ones_like(number)
@@ -297,17 +298,17 @@ class PathPhase:
 
     @property
     def value_numbers(self) -> np.ndarray:
-        """Number of the limits' value that each row holds at a place, (c,)."""
+        """Number of the limit value in each row, (c,); it is the same at all places."""
         places, values = self._bounds.shape[1:]
         return np.tile(np.arange(values), places)
 
     def time(self, x: np.ndarray) -> float:
-        """Time, s."""
+        """Return the time of the phase, s."""
         rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         return float((2.0 * self._steps / (rates[1:] + rates[:-1])).sum())
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Gradient of the time, (v,); zero by what is given at the ends."""
+        """Return the gradient of the time, (v,); it is zero with respect to the given X at both ends."""
         rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         by_sum = -2.0 * self._steps / (rates[1:] + rates[:-1]) ** 2
         by_rate = np.pad(by_sum, (1, 0)) + np.pad(by_sum, (0, 1))
@@ -316,14 +317,14 @@ class PathPhase:
         return np.pad(by_square, (0, len(x) - len(by_square)))
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of all limits, (c,)."""
+        """Compute the values of all limits, (c,)."""
         return self.evaluate(x).values.ravel()
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian on its pattern, (nnz,)."""
+        """Compute the entries of the Jacobian on its pattern, (nnz,)."""
         ((_, y_ds, y_dds), square, u), evaluation = self._evaluate(x)
         rate = np.sqrt(square)
-        # X is given where it vanishes.
+        # Where X vanishes, it is given.
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
         by_squares = np.zeros((2, 3, *y_ds.shape))
         by_squares[:, 1] = self._by_square * (half * y_ds)
@@ -335,17 +336,17 @@ class PathPhase:
         return evaluation.differentiate(variables)[1].ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
-        """Take s and the redundant curves at many places, (S, c)."""
+        """Return s and the redundant curves at many places, (S, c)."""
         return self.course(x, spread(self.breaks, _SAMPLES)).y
 
     def course(self, x: np.ndarray, s: np.ndarray) -> Course:
-        """Take the curves at path coordinates s, (S,)."""
+        """Return the curves at path coordinates s, (S,)."""
         orders = self._basis_at(s).curves(self._split(x)[1])
         return Course.over_path(s, orders[:3])
 
 
 def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
-    """Add stations, (P,), in the pieces of a path between them, such as rounded corners."""
+    """Add stations to the given ones, (P,), in short pieces of the path, such as rounded corners."""
     breaks = cut(breaks, s[0], s[-1])
     inner = spread(breaks, _STATIONS_A_PIECE)
     is_short = np.repeat(np.diff(breaks), _STATIONS_A_PIECE) < 4.0 * np.diff(s).max()
@@ -360,7 +361,7 @@ class PathProgram(PhaseSequence[PathPhase]):
     ----------
     phases : sequence of PathPhase
     links : sequence of Link
-        Of values alone: phases meet at rest.
+        Links of values only, because phases meet at rest.
     """
 
     def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
@@ -393,7 +394,7 @@ class PathProgram(PhaseSequence[PathPhase]):
         self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
 
     def _number_values(self) -> np.ndarray:
-        """Give each value of a phase, and each join, a number, and tell that of every row, (c,)."""
+        """Give every limit value of a phase, and every join, a number; return the number for each row, (c,)."""
         numbers = []
         first = 0
         for phase in self.phases:
@@ -414,44 +415,44 @@ class PathProgram(PhaseSequence[PathPhase]):
         return np.concatenate([*(phase.upper for phase in self.phases), joined])
 
     def narrow(self, x: np.ndarray) -> float:
-        """Narrow limits on postures of all phases; see `PathPhase.narrow`."""
+        """Narrow limits on postures in all phases; see `PathPhase.narrow`."""
         return max(phase.narrow(x_of_phase) for phase, x_of_phase in self.split(x))
 
     def objective(self, x: np.ndarray) -> float:
-        """Time of all phases, s."""
+        """Return the total time of all phases, s."""
         return sum(phase.time(x_of_phase) for phase, x_of_phase in self.split(x))
 
     end_time = objective
     free_time = objective
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Gradient of the time, (v,)."""
+        """Return the gradient of the time, (v,)."""
         return np.concatenate(
             [phase.gradient(x_of_phase) for phase, x_of_phase in self.split(x)]
         )
 
     def curvature(self, _x: np.ndarray) -> None:
-        """Nothing of the Hessian is known."""
+        """Return None: no part of the Hessian is known."""
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows, (c,); raises UnreachableError where the joint map has no posture."""
+        """Compute the values of the rows, (c,); raise UnreachableError where the joint map has no posture."""
         before, after = x[self._pairs].T
         rows = [phase.rows(x_of_phase) for phase, x_of_phase in self.split(x)]
         return np.concatenate([*rows, before - after])
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian on its pattern, (nnz,); raises as `rows` does."""
+        """Compute the entries of the Jacobian on its pattern, (nnz,); raise as `rows` does."""
         entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in self.split(x)]
         return np.concatenate([*entries, np.tile([1.0, -1.0], len(self._pairs))])
 
     def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Take s and the redundant curves of all phases at many places, (S, c) each."""
+        """Return s and the redundant curves of all phases at many places, (S, c) each."""
         return tuple(phase.curves(x_of_phase) for phase, x_of_phase in self.split(x))
 
     def timings(
         self, x: np.ndarray, places: int, *, is_rough: bool
     ) -> tuple[PhaseTiming, ...]:
-        """Time the joint paths of all phases anew, as `PhaseTiming.along` does."""
+        """Time the joint paths of all phases again with `PhaseTiming.along`."""
         courses = [
             partial(path_phase.course, x_of_phase)
             for path_phase, x_of_phase in self.split(x)

@@ -1,13 +1,13 @@
-"""One phase of a motion: spline curves y, mapped to joints, within limits at collocation points.
+"""One phase of a motion: spline curves y that are mapped to joints and meet the limits at collocation points.
 
-A phase has variables x = (T, c_1, ..., c_c [, h]), its duration and the free control points of its curves, and rows;
-see `layout`. Where a time law gives s(t), T is given too, and s has no control points. With basis matrices B, B', ...
-in normalised time,
+A phase has rows and variables x = (T, c_1, ..., c_c [, h]): its duration, the free control points of its curves, and
+interval lengths if the knots are free; see `layout`. Where a time law gives s(t), T is given too, and s has no control
+points. With basis matrices B, B', ... in normalised time,
 
     dy/dc = B,  dydot/dc = B' / T,  dyddot/dc = B'' / T^2,  dydot/dT = -ydot / T,  dyddot/dT = -2 yddot / T
     dy/dh = dB/dh c,  dydot/dh = dB'/dh c / T,  dyddot/dh = dB''/dh c / T^2,  and so on
 
-Slopes of the limits by y and its derivatives come from the `evaluator`.
+Slopes of the limits with respect to y and its derivatives come from the `evaluator`.
 """
 
 from __future__ import annotations
@@ -42,40 +42,40 @@ _is_checked = attrgetter("is_checked_at_points")
 
 
 class Phase:
-    """A phase as functions of its variables x; see the module.
+    """A phase, evaluated as functions of its variables x; see the module.
 
     Parameters
     ----------
     joint_map : JointMap
     limits : sequence of Limit
-        Of robot, process and scene.
+        Limits of robot, process and scene.
     grid : FixedGrid
-        Knots and collocation points; the knots are variables with a `FreeGrid`.
+        Knots and collocation points; with a `FreeGrid` the knots are variables.
     boundary : Boundary
     margin : float or None, optional
-        Least branch margin, where the joint map has one: a safeguard that is added to the limits. None: nothing is
+        Smallest branch margin, if the joint map has one. It is added to the limits as a safeguard. With None nothing is
         added.
     pause : float, optional
-        How long the arm waits at rest after the phase, s.
+        Time that the arm waits at rest after the phase, s.
     layout : VariableLayout, optional
-        That of another phase with this grid and boundary; by default it is made anew.
+        Layout of another phase with the same grid and boundary; by default a new one is built.
 
     Attributes
     ----------
     joint_map, grid, boundary, pause
         As given.
     time_law : TimeLaw or None
-        s(t) where it is given.
+        Time law of s(t), if it is given.
     limits : tuple of Limit
-        Those given, then the safeguards.
+        The given limits, then the safeguards.
     evaluator : Evaluator
-        Of joint map and limits.
+        Evaluator of the joint map and the limits.
     splines : tuple of BoundarySpline
-        Of each curve.
+        One spline for each curve.
     slices : tuple of slice
-        The variables of each curve.
+        Positions of the variables of each curve.
     degree, knots, breaks, t_norm
-        Those of the grid.
+        As in the grid.
     intervals, variables : int
         Numbers of knot intervals, N, and of variables, v.
     x_lower, x_upper : (v,) ndarray
@@ -124,7 +124,7 @@ class Phase:
         self._slopes: tuple[Evaluation, np.ndarray] | None = None
 
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
-        """Return the same phase over another grid, and with other boundary conditions where they are given."""
+        """Return the same phase over another grid, and with new boundary conditions if they are given."""
         splines = None
         if boundary is None and grid.knots is self.grid.knots:
             splines = self.splines
@@ -135,22 +135,21 @@ class Phase:
         return Phase(*arguments, margin=None, pause=self.pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
-        """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
+        """Return the same phase over its current knots, with collocation points `t_norm`; x keeps its meaning."""
         return self.with_knots(self.knots, t_norm)
 
     def with_knots(self, knots: np.ndarray, t_norm: np.ndarray) -> Phase:
-        """Return the same phase over other fixed knots, with collocation points `t_norm`, ascending from 0 to 1.
+        """Return the same phase over new fixed knots, with collocation points `t_norm`, ascending from 0 to 1.
 
-        Where `knots` contain the present ones, ``variables_from(before.motion(x).with_knots(knots))`` is the same
-        motion.
+        If `knots` contain the current ones, ``variables_from(before.motion(x).with_knots(knots))`` is the same motion.
         """
         return self.with_grid(FixedGrid(knots, self.degree, t_norm))
 
     def with_free_knots(self, shortest: float) -> Phase:
         """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals.
 
-        Where s(t) is given the knots stay: s at a collocation point would depend on all lengths before, and no time
-        would be gained.
+        Where s(t) is given, the knots stay fixed: s at a collocation point would depend on all interval lengths before
+        it, and no time would be gained.
         """
         if self.time_law is not None:
             return self
@@ -158,16 +157,16 @@ class Phase:
         return self.with_grid(FreeGrid(self.knots, self.degree, self.t_norm, shortest))
 
     def fix_knots(self, x: np.ndarray) -> Phase:
-        """Return the phase with its knots fixed where they are at x."""
+        """Return the phase with its knots fixed at their positions for x."""
         return self.with_grid(self.grid.fix(self._h(x)))
 
     def with_limits(self, limits: Sequence[Limit]) -> Phase:
-        """Return the same phase with other limits, safeguards included; x keeps its meaning."""
+        """Return the same phase with new limits, which include the safeguards; x keeps its meaning."""
         arguments = (self.joint_map, limits, self.grid, self.boundary)
         return Phase(*arguments, margin=None, pause=self.pause, layout=self._layout)
 
     def limits_near(self, curves: np.ndarray) -> list[Limit]:
-        """Return what matters of the limits while the motion stays close to curves, (S, c); see `Limit.restrict_to`."""
+        """Return the limits, reduced to what matters close to given curves, (S, c); see `Limit.restrict_to`."""
         q = self.joint_map.postures(curves)
         restricted = [limit.restrict_to(q) for limit in self.limits]
         return [limit for limit in restricted if limit is not None]
@@ -175,7 +174,8 @@ class Phase:
     def restrict_to(self, curves: np.ndarray, *, is_followed: bool = False) -> Phase:
         """Return the same phase with `limits_near` curves, (S, c).
 
-        If splines are laid along the motion later, and postures are free, limits on these are narrowed by their inset.
+        If splines are laid along the motion later and postures are free, limits on postures are narrowed by their
+        inset.
         """
         limits = self.limits_near(curves)
         if is_followed and self.joint_map.r:
@@ -187,7 +187,7 @@ class Phase:
         return self.with_limits(limits)
 
     def with_margin(self, margin: float) -> Phase:
-        """Return the same phase with another least branch margin; x keeps its meaning."""
+        """Return the same phase with a different smallest branch margin; x keeps its meaning."""
         limits = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
         return self.with_limits(
             [*limits, *build_branch_margins(self.joint_map, margin)]
@@ -212,30 +212,30 @@ class Phase:
 
     @property
     def lengths(self) -> slice:
-        """The variables that are interval lengths; none where the knots are fixed."""
+        """Positions of the variables that are interval lengths; empty where the knots are fixed."""
         return self._layout.lengths
 
     @property
     def jumps(self) -> np.ndarray:
-        """Knots, in normalised time, at which the highest derivative that a limit asks for jumps."""
+        """Knots, in normalised time, at which the highest derivative that a limit depends on jumps."""
         order = max((limit.order for limit in self.limits), default=0)
         return self.breaks[1:-1] if self.degree <= order else np.empty(0)
 
     def _h(self, x: np.ndarray) -> np.ndarray:
-        """Interval lengths that are variables; empty where the knots are fixed."""
+        """Return the interval lengths that are variables; empty where the knots are fixed."""
         return x[self._layout.lengths]
 
     def motion(self, x: np.ndarray) -> Motion:
-        """Curves that belong to x."""
+        """Return the curves that belong to x."""
         h = self._h(x)
-        # Should the lengths add up to a little more or less than 1, so much longer or shorter is the motion.
+        # If the lengths do not add up to exactly 1, the motion is longer or shorter by the same factor.
         t_end = float(x[0] * self.grid.t_norm_at(h)[-1])
         points = self._control_points(x)
         knots = self.grid.knots_at(h)
         return Motion(t_end, knots, self.degree, points, self.time_law)
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
-        """Control points (c, N + d)."""
+        """Return the control points, (c, N + d)."""
         layout = self._layout
         free = layout.free_matrix.control_points(x)
         points = free + sum_powers(layout.fixed_terms, x[0])
@@ -244,9 +244,9 @@ class Phase:
     def _orders(
         self, x: np.ndarray, control_points: np.ndarray, *, is_slope: bool = False
     ) -> np.ndarray:
-        """Value and derivatives of all curves at the collocation points, (4, K, c), by normalised time.
+        """Return value and derivatives of all curves at the collocation points, (4, K, c), per unit of normalised time.
 
-        With `is_slope` the control points are those of slopes, and that of a curve that is given is zero.
+        With `is_slope` the control points are slopes, and the slope of a curve with a time law is zero.
         """
         h = self._h(x)
         orders = self.grid.basis(h).curves(control_points)
@@ -259,14 +259,15 @@ class Phase:
     def scale_time(
         self, x: np.ndarray, factor: float, held: tuple[int, int] = (0, 0)
     ) -> np.ndarray:
-        """Return the same motion, longer by a factor; a duration that is given stays.
+        """Return the same motion, longer by a factor; a given duration does not change.
 
         Parameters
         ----------
         x : (v,) ndarray
         factor : float
         held : tuple of int, optional
-            So many time derivatives of the redundant joints stay at start and end. What they change fades from there.
+            Numbers of time derivatives of the redundant joints that stay the same at start and end. The correction that
+            this needs fades away from the ends.
         """
         if self.time_law is not None:
             return x
@@ -289,14 +290,14 @@ class Phase:
         return self.variables_from(replace(motion, control_points=points))
 
     def variables_from(self, motion: Motion) -> np.ndarray:
-        """Point x nearest to given curves over the same knots, or over as many where these are free."""
+        """Return the point x closest to given curves over the same knots, or over as many knots if these are free."""
         pairs = zip(self.splines, motion.control_points, strict=True)
         free = [spline.free_from(points, motion.t_end) for spline, points in pairs]
         h = self.grid.lengths_of(motion.knots)
         return np.concatenate([[motion.t_end], *free, h])
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Joint motion and limits at the collocation points; kept until x changes, so that rows and Jacobian share it.
+        """Evaluate joint motion and limits at the collocation points; the result is cached until x changes.
 
         Raises
         ------
@@ -311,11 +312,11 @@ class Phase:
         return self.evaluator.evaluate(*curves, t=t)
 
     def state(self, x: np.ndarray) -> JointState:
-        """Joint motion at the collocation points; raises as `evaluate` does."""
+        """Return the joint motion at the collocation points; raise as `evaluate` does."""
         return self.evaluate(x).motion
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows, (c,); raises UnreachableError as `evaluate` does."""
+        """Compute the values of the rows, (c,); raise UnreachableError as `evaluate` does."""
         evaluation = self.evaluate(x)
         pairs = zip(self.limits, evaluation.by_limit, strict=True)
         values = [
@@ -327,30 +328,30 @@ class Phase:
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
     def has(self, limit: Limit) -> bool:
-        """Tell whether a limit is one of the phase's, the very object."""
+        """Tell whether a limit is one of the phase's limits, as the same object."""
         return any(candidate is limit for candidate in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Numbers of the rows of one of the limits, (K, c); none, (0, c), where its means are held."""
+        """Return the indices of the rows of one of the limits, (K, c); empty, (0, c), for a limit on means."""
         number = next(
             i for i, candidate in enumerate(self.limits) if candidate is limit
         )
         return self._rows.of_limits[number]
 
     def mean_weights(self, x: np.ndarray) -> np.ndarray:
-        """Weights of the collocation points in a mean over the phase's time, (K,)."""
+        """Return the weights of the collocation points in a mean over the phase's time, (K,)."""
         return self.grid.mean_weights(self._h(x))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
-        """How far the limits are violated at every collocation point, (K, c); negative inside.
+        """Return the violations of the limits at every collocation point, (K, c); negative where a limit is met.
 
-        Limits that hold over the whole motion are left out. So are safeguards, which are numerical and not physical.
-        Raises UnreachableError as `evaluate` does.
+        Limits on the whole motion are left out, and so are safeguards, which are numerical and not physical. Raises
+        UnreachableError as `evaluate` does.
         """
         return self.evaluate(x).violation(_is_checked)
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-        """As `violation`, at other normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
+        """Return violations at given normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
         motion = self.motion(x)
         known = self.state(x)
         at = self.grid.t_norm_at(self._h(x))
@@ -363,9 +364,10 @@ class Phase:
         return evaluation.violation(_is_checked)
 
     def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
-        """Ratios, (K, c), to limits at single points that a longer time relieves; raises as `evaluate` does.
+        """Return ratios of values to their limits, (K, c), for limits at points that a longer time relieves.
 
-        See `Limit.ratio`. Means are left out: they are the same at all points.
+        See `Limit.ratio`. Means are left out, because they are the same at all points. Raises UnreachableError as
+        `evaluate` does.
         """
         ratios = [np.empty((len(self.t_norm), 0))]
         for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
@@ -374,17 +376,17 @@ class Phase:
         return np.hstack(ratios)
 
     def worst_time_scaling_ratio(self, x: np.ndarray) -> float:
-        """Largest of `time_scaling_ratios`."""
+        """Return the largest of `time_scaling_ratios`."""
         return float(np.abs(self.time_scaling_ratios(x)).max(initial=0.0))
 
     def posture_violation(self, motion: JointStates) -> float:
-        """Largest violation of the limits on postures alone, along a motion; 0 without such limits."""
+        """Return the largest violation, along a motion, of the limits on postures alone; 0 if there are none."""
         limits = [limit for limit in self.limits if limit.is_of_postures]
         violations = [limit.violation(limit.values(motion)).max() for limit in limits]
         return float(max(violations, default=0.0))
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
+        """Compute the entries of the rows' Jacobian on its pattern, (nnz,); raise as `evaluate` does."""
         slopes = self.limit_slopes(x)
         is_mean = self.evaluator.is_mean
         if is_mean.any():
@@ -393,7 +395,7 @@ class Phase:
         return np.concatenate([slopes.ravel(), *entries])
 
     def limit_slopes(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of all limits' values by the variables, (z, c); kept, and raises, as `evaluate`."""
+        """Return slopes of all limits' values in the variables, (z, c); cached, and raises, as `evaluate`."""
         evaluation = self.evaluate(x)
         if self._slopes is None or self._slopes[0] is not evaluation:
             slopes, entries = evaluation.differentiate(self._variable_slopes(x))
@@ -401,28 +403,28 @@ class Phase:
         return self._slopes[1]
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
-        """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `evaluate` does.
+        """Return the gradient, (v,), of a sum over the collocation points; raise UnreachableError as `evaluate` does.
 
         Parameters
         ----------
         partials : Partials
-            Of its terms with respect to the joints, one term a point: (K, 1, n).
+            Partials of the terms with respect to the joints, with one term per point: (K, 1, n).
         x : (v,) ndarray
         """
         return self.gradient_by_curves(self.evaluate(x).chain(partials), x)
 
     def gradient_by_curves(self, slopes: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Gradient, (v,), of a sum over the collocation points with slopes by y, ydot, ..., (orders, K, 1, c)."""
+        """Return the gradient, (v,), of a sum over the points from its slopes in y, ydot, ..., (orders, K, 1, c)."""
         entries = self.slopes_by_variables(slopes, x)
         return self.sum_up(entries)[0]
 
     def end_pattern(self, point: int) -> np.ndarray:
-        """Variables, (z,), that matter for the curves at the first (0) or last (-1) collocation point."""
+        """Return the variables, (z,), that matter for the curves at the first (0) or last (-1) collocation point."""
         return self._layout.variable[self._at_end(point)]
 
     def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
-        """Slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
-        # As the slopes of values that are each one curve, or one of its derivatives, at this end.
+        """Return slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
+        # Each value is one curve, or one of its derivatives, at this end.
         curves = len(self.boundary.start)
         values = ORDERS * curves
         by_curves = np.zeros((ORDERS, len(self.t_norm), values, curves))
@@ -431,7 +433,7 @@ class Phase:
         return slopes.T.reshape(ORDERS, curves, -1)
 
     def _at_end(self, point: int) -> np.ndarray:
-        """Numbers of the entries at the first or last collocation point; not that by a duration that is given."""
+        """Return the indices of the entries at the first or last collocation point, except that of a given T."""
         number = range(len(self.t_norm))[point]
         is_free = (self._layout.variable > 0) | (self.time_law is None)
         return np.flatnonzero((self._layout.point == number) & is_free)
@@ -439,7 +441,7 @@ class Phase:
     def sum_up(
         self, slopes: np.ndarray, weights: np.ndarray | float = 1.0
     ) -> np.ndarray:
-        """Add up slopes, (z, c), over the collocation points, with weights (K,): (c, v)."""
+        """Add up slopes, (z, c), over the collocation points, with weights, (K,); return (c, v)."""
         factors = np.broadcast_to(weights, len(self.t_norm))[self._layout.point]
         terms = slopes * factors[:, None]
         variable = self._layout.variable
@@ -458,19 +460,19 @@ class Phase:
         return (rows * weights[:, :, None]).reshape(flat.shape).T @ flat
 
     def slopes_by_variables(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
+        """Turn slopes in y, ydot, ..., (orders, K, c, 1 + r), into slopes in the phase's variables, (z, c)."""
         entries = self._variable_slopes(x).find_entries(by)
         return self._add_lengths(entries, by, x)
 
     def _variable_slopes(self, x: np.ndarray) -> VariableSlopes:
-        """Slopes of the curves and their time derivatives by T and by each curve's variables."""
+        """Return slopes of the curves and their time derivatives with respect to T and each curve's variables."""
         shared = self._by_duration(x)[None]
         return VariableSlopes(shared, self._layout.pattern, self._basis(x))
 
     def _add_lengths(
         self, entries: np.ndarray, by: np.ndarray, x: np.ndarray
     ) -> np.ndarray:
-        """Add slopes by h, if knots are free, to those by T and the curves' variables; see `slopes_by_variables`."""
+        """Append slopes with respect to h, if the knots are free, to the other slopes; see `slopes_by_variables`."""
         orders = len(by)
         if not len(self.grid.point):
             return entries
@@ -482,7 +484,7 @@ class Phase:
         return np.concatenate([entries, of_lengths[:, :, 0]])
 
     def _by_duration(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of the curves and their time derivatives by T, (4, K, c): a longer time slows them down."""
+        """Return slopes of the curves and their time derivatives with respect to T, (4, K, c)."""
         rates = -_EACH_ORDER / x[0]
         slower = np.array(self.state(x).curves) * rates[:, None, None]
         terms = self._layout.fixed_terms
@@ -493,7 +495,7 @@ class Phase:
         return np.array(moving) + slower
 
     def _basis(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of the curves and their time derivatives by the variables between T and h, (4, z)."""
+        """Return slopes of the curves and their time derivatives in the variables between T and h, (4, z)."""
         basis = self.grid.basis(self._h(x))
         if self._entries is None or self._entries[0] is not basis:
             self._entries = (basis, self._layout.sparsity.entries(basis.values))

@@ -1,4 +1,4 @@
-"""The fastest timing of the joint path of a phase, known from the phase plane within milliseconds (`timing`)."""
+"""The fastest timing of the joint path of a phase, which the phase plane (`timing`) finds within milliseconds."""
 
 from __future__ import annotations
 
@@ -16,41 +16,42 @@ from brachis.optimise.program import Program
 from brachis.timing import Course, TimedCourse, Timing, divide_turns
 
 PLACES = 4000
-"""Places at which a joint path is timed, no fewer: with half of them splines were up to 0.4 % slower."""
+"""Minimum number of places at which a joint path is timed. With half as many, splines were up to 0.4 % slower."""
 _PLACES_A_PIECE = 24
-"""Places in every piece of a path, unless there are very many of these."""
+"""Number of places in every piece of a path, unless there are very many pieces."""
 _MOST_PLACES = 40_000
-"""Places in all pieces together, about."""
+"""Approximate maximum number of places in all pieces together."""
 _ROUGH_AGREEMENT = 1e-3
-"""Change of the time, as a part of it, with which a rough timing ends."""
+"""Relative change of the time with which a rough timing ends."""
 _LEAST_PLACES = 12
-"""Places in every knot interval, no fewer."""
+"""Minimum number of places in each knot interval."""
 _FEW_PLACES = 2
-"""The same of a rough timing."""
+"""The same number for a rough timing."""
 _LOSS_OF_SWITCHES = 0.1
-"""What switches within steps between stations may cost together, in mean steps: that is 0.0025 % with 4000. Drives that
-take a slide to its speed within microseconds lost 0.01 % without, and their ramps could not be told from rest."""
+"""Time that all switches within steps between stations may cost together, in mean steps: 0.0025 % with 4000 places.
+Without this bound, motions with drives that bring a slide to its speed within microseconds lost 0.01 %, and their ramps
+could not be told from rest."""
 _SHARE_OF_STEP = 0.1
-"""Part of this that a step may cost after it is divided."""
+"""Fraction of its share of this time that a step may cost after it is divided."""
 _MOST_PARTS = 64
-"""Parts of such a step, no more at once."""
+"""Maximum number of parts into which a step is divided at once."""
 _TIMINGS = 7
-"""Times that a joint path is timed, no more: after six divisions ramps of a part of 1e-9 of the time are resolved."""
+"""Maximum number of times that a joint path is timed: six divisions resolve ramps as short as 1e-9 of the time."""
 
 
 @dataclass(frozen=True)
 class PhaseTiming:
-    """A phase's motion beside the fastest timing of its joint path.
+    """The fastest timing of a phase's joint path.
 
     Attributes
     ----------
     course : TimedCourse
     rates : tuple of float
-        Of the path's length at both ends, 1/s.
+        Rates of the path's length at both ends, 1/s.
     timing : Timing or None
-        None where the limits allow none, not even the motion's own, within rounding.
+        The timing; None if the limits allow no timing, not even that of the motion itself, because of rounding.
     fixed_duration : float or None
-        Duration where it is given, s.
+        Duration if it is given, s.
     """
 
     course: TimedCourse
@@ -69,9 +70,10 @@ class PhaseTiming:
     def of(
         cls, phase: Phase, x: np.ndarray, *, is_rough: bool = False
     ) -> PhaseTiming | None:
-        """Time the joint path of a phase; None where its speed is given, or where it cannot be evaluated.
+        """Time the joint path of a phase; return None if its speed is given or the path cannot be evaluated.
 
-        Roughly: once, without resolving ramps, and at fewer places in each of many intervals.
+        A rough timing is done once, without resolving ramps, and at fewer places per interval if there are many
+        intervals.
         """
         if phase.time_law is not None:
             return None
@@ -81,10 +83,10 @@ class PhaseTiming:
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
 
         def lay(t: np.ndarray) -> PhaseTiming:
-            """Time the curves at times, (P,)."""
+            """Time the joint path at stations given by times, (P,)."""
 
             def course_at(t: np.ndarray) -> Course:
-                """Take the curves at times, (P,)."""
+                """Return the curves at times, (P,)."""
                 return Course(t, *motion.at(t)[:3])
 
             fine = _lay_finely(phase, course_at, t)
@@ -107,20 +109,20 @@ class PhaseTiming:
         *,
         is_rough: bool = False,
     ) -> PhaseTiming:
-        """Time a joint path; raise UnreachableError if it leaves the map.
+        """Time a joint path; raise UnreachableError if it leaves the joint map.
 
         Parameters
         ----------
         phase : Phase
-            With its rates at the ends.
+            Phase that gives the rates at both ends.
         course_at : callable
-            Curves at ascending path coordinates, (P,).
+            Function that returns the curves at ascending path coordinates, (P,).
         ends : tuple of float
-            Path coordinates.
+            Path coordinates of both ends.
         places : int, optional
-            Where it is timed, no fewer; a third of them if `is_rough`.
+            Minimum number of places at which the path is timed; a third of it if `is_rough`.
         is_rough : bool, optional
-            Whether it is timed once, at places spread evenly along the path. That is right within 1 %.
+            Whether the path is timed only once, at evenly spread places, which gives the time to within 1 %.
         """
         path = phase.joint_map.path
         assert path is not None
@@ -132,7 +134,7 @@ class PhaseTiming:
         def lay(
             s: np.ndarray, estimate: tuple[np.ndarray, np.ndarray] | None = None
         ) -> tuple[TimedCourse, tuple[float, float]]:
-            """Lay the course over path coordinates, (S,), and find its rates at both ends."""
+            """Build the course over path coordinates, (S,), and find its rates at both ends."""
             course = _lay_finely(phase, course_at, s)
             sdot = None if estimate is None else np.interp(course.p, *estimate)
             timed = TimedCourse(course, phase.joint_map, phase.limits, sdot)
@@ -144,13 +146,13 @@ class PhaseTiming:
         duration = None if law is None else law.duration
         if timing is None or is_rough:
             return cls(course, by_length, timing, duration)
-        # Stations where the motion takes its time.
+        # Stations at equal time steps of this timing.
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
         passed = np.maximum.accumulate(y[:, 0])
         s = drop_near(np.union1d(passed.clip(begin, end), pieces), tolerances.PATH)
         s[0] = begin
-        del course, timing, y  # they take much memory
+        del course, timing, y  # they need a lot of memory
 
         def time_at(s: np.ndarray) -> PhaseTiming:
             """Time the course at path coordinates, (S,)."""
@@ -168,7 +170,7 @@ class PhaseTiming:
         *,
         is_rough: bool = False,
     ) -> PhaseTiming:
-        """Time a joint path through curves, (S, c), the first of them s; see `along`."""
+        """Time a joint path through curves, (S, c), of which the first is s; see `along`."""
         curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
         begin, end = curves[[0, -1], 0]
         course_at = partial(Course.through, curves)
@@ -178,19 +180,19 @@ class PhaseTiming:
 def _resolve_ramps(
     time_at: Callable[[np.ndarray], PhaseTiming], stations: np.ndarray
 ) -> PhaseTiming:
-    """Time a joint path at stations, (P,), and at others where the timing switches within a step."""
+    """Time a joint path at stations, (P,), and at further ones where the timing switches within a step."""
     for _ in range(_TIMINGS - 1):
         phase_timing = time_at(stations)
         finer = _divide_switches(phase_timing)
         if finer is None:
             return phase_timing
         stations = finer
-        del phase_timing  # two of them take too much memory
+        del phase_timing  # two of them need too much memory
     return time_at(stations)
 
 
 def _divide_switches(phase_timing: PhaseTiming) -> np.ndarray | None:
-    """Divide the steps in which a timing switches, at too great a cost; None where none does, or without a timing."""
+    """Divide the steps in which switches of a timing cost too much; return None if there is nothing to divide."""
     timing = phase_timing.timing
     if timing is None:
         return None
@@ -208,7 +210,7 @@ def _divide_switches(phase_timing: PhaseTiming) -> np.ndarray | None:
 def _lay_finely(
     phase: Phase, course_at: Callable[[np.ndarray], Course], p: np.ndarray
 ) -> Course:
-    """Lay a course over stations, (P,), and others between them where the joint path turns."""
+    """Build a course over stations, (P,), with further stations between them where the joint path turns."""
     state = course_at(p).state(phase.joint_map)
     return course_at(divide_turns(p, state.qdot))
 

@@ -1,11 +1,11 @@
-"""The nonlinear program: the best motion in phases, by an objective that is the end time unless said otherwise.
+"""The nonlinear program: the best motion in phases. The objective is the end time by default.
 
     minimise    objective(x), for example t_E = sum of the phases' durations
     over        x = the variables of the first phase, then of the second, ...
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
-Rows are those of the phases, one phase after the other, then means over the whole motion, then those of the links. Most
-motions have one phase and no links; see `phase`. The objective is a sum over the phases.
+The rows are those of the phases, one phase after the other, then means over the whole motion, then the rows of the
+links. Most motions have one phase and no links; see `phase`. The objective is a sum over the phases.
 """
 
 from __future__ import annotations
@@ -31,18 +31,19 @@ from brachis.optimise.phase import Phase
 
 @dataclass(frozen=True)
 class Link:
-    """Equal values and derivatives of some curves where one phase ends and another one begins.
+    """A condition that some curves have equal values and derivatives where one phase ends and another begins.
 
-    A row for each of them is the difference of the two, times the duration of a knot interval to the power of the
-    derivative's order, which is 0. Along a path with the same joint map on both sides, equal curves are equal motions.
+    Each value or derivative has a row that must be 0: the difference between the two phases, times the duration of a
+    knot interval to the power of the derivative's order. With the same joint map on both sides, equal curves mean equal
+    motions.
 
     Attributes
     ----------
     before, after : int
-        Numbers of the phase that ends, and of the one that begins there.
+        Numbers of the phase that ends and of the phase that begins.
     curves : tuple of int
     orders : tuple of int
-        What is the same: 0 for the values, 1 for the first time derivatives, ...
+        Orders of the derivatives that are equal: 0 for the values, 1 for the first time derivatives, ...
     """
 
     before: int
@@ -56,12 +57,12 @@ class Link:
         return len(self.curves) * len(self.orders)
 
     def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Factors on the rows of every order, (orders, 1)."""
+        """Return the factors on the rows of every order, (orders, 1)."""
         interval = x[0] * (1.0 - phase.breaks[-2])
         return interval ** np.array(self.orders)[:, None]
 
     def rows(self, phase_points: PhasePoints) -> np.ndarray:
-        """Values of the rows, by order and curve; `phase_points` are all phases, with their variables."""
+        """Compute the values of the rows, by order and curve; `phase_points` are all phases with their variables."""
         chosen = np.ix_(self.orders, self.curves)
         last = _curves_at(*phase_points[self.before], -1)[chosen]
         first = _curves_at(*phase_points[self.after], 0)[chosen]
@@ -70,14 +71,14 @@ class Link:
     def pattern(
         self, phases: Sequence[Phase], first: Sequence[int]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Rows, from 0, and columns of the Jacobian's entries, (nnz,) each.
+        """Return rows, counted from 0, and columns of the Jacobian's entries, (nnz,) each.
 
         Parameters
         ----------
         phases : sequence of Phase
             All phases of the program.
         first : sequence of int
-            Where the variables of each one begin.
+            Index at which the variables of each phase begin.
         """
         last = phases[self.before].end_pattern(-1) + first[self.before]
         begin = phases[self.after].end_pattern(0) + first[self.after]
@@ -86,7 +87,7 @@ class Link:
         return rows, np.tile(columns, self.size)
 
     def jacobian(self, phase_points: PhasePoints) -> np.ndarray:
-        """Entries of the Jacobian on the pattern, (nnz,)."""
+        """Compute the entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
         chosen = np.ix_(self.orders, self.curves)
         phase, x = phase_points[self.before]
@@ -103,18 +104,18 @@ class Link:
 
 
 def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
-    """Value and time derivatives of all curves at a collocation point, (4, c)."""
+    """Return value and time derivatives of all curves at a collocation point, (4, c)."""
     return np.array([curves[point] for curves in phase.state(x).curves])
 
 
 class _HasVariables(Protocol):
-    """A phase of any program."""
+    """A phase of a program over time or over the path."""
 
     x_lower: np.ndarray
     x_upper: np.ndarray
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Evaluate joint motion and limits at the phase's variables, (v,)."""
+        """Evaluate joint motion and limits at given variables of the phase, (v,)."""
 
 
 _Phase = TypeVar("_Phase", bound=_HasVariables)
@@ -145,12 +146,12 @@ class PhaseSequence(Generic[_Phase]):
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
 
     def split(self, x: np.ndarray) -> list[tuple[_Phase, np.ndarray]]:
-        """Every phase, and its part of x."""
+        """Return every phase with its part of x."""
         pairs = zip(self.phases, self._blocks, strict=True)
         return [(phase, x[block]) for phase, block in pairs]
 
     def safeguard_slack(self, x: np.ndarray) -> float:
-        """Smallest distance of a safeguard from its bound; infinite without safeguards.
+        """Return the smallest distance of a safeguard from its bound; infinite without safeguards.
 
         Raises
         ------
@@ -163,14 +164,14 @@ class PhaseSequence(Generic[_Phase]):
 
 
 class Program(PhaseSequence[Phase], Summary):
-    """The NLP as functions of x; what a solver sees.
+    """The NLP as functions of x, in the form that solvers use.
 
     Parameters
     ----------
     phases : iterable of Phase
     links : sequence of Link, optional
     objective : Objective, optional
-        What is minimised; the end time.
+        Objective to minimise; by default the end time.
 
     Attributes
     ----------
@@ -178,14 +179,14 @@ class Program(PhaseSequence[Phase], Summary):
     links : tuple of Link
     minimised : Objective
     means : Means
-        Of the limits that are held as means.
+        Means of the values that are limited as means over the motion.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
     """
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown: its size."""
+        """Return the figures shown to the user: the size of the program."""
         return {
             "phases": len(self.phases),
             "intervals": self.intervals,
@@ -219,7 +220,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @cached_property
     def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the entries of the Jacobian; of many programs nobody asks for them."""
+        """Rows and columns of the entries of the Jacobian, computed on demand: many programs never need them."""
         firsts = self.first_variables
         patterns = [
             (phase.jacobian_rows, phase.jacobian_columns + first)
@@ -245,7 +246,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @property
     def names(self) -> list[str]:
-        """Names of the variables by their index in x; see `Phase.names`. Those of several phases say which one."""
+        """Names of the variables by their index in x, with the phase if there are several; see `Phase.names`."""
         if len(self.phases) == 1:
             return self.phases[0].names
         return [
@@ -261,7 +262,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @property
     def intervals(self) -> int:
-        """Number of knot intervals of all phases."""
+        """Total number of knot intervals of all phases."""
         return sum(phase.intervals for phase in self.phases)
 
     @property
@@ -271,16 +272,16 @@ class Program(PhaseSequence[Phase], Summary):
 
     @property
     def collocation_points(self) -> int:
-        """Number of collocation points of all phases."""
+        """Total number of collocation points of all phases."""
         return sum(len(phase.t_norm) for phase in self.phases)
 
     def end_time(self, x: np.ndarray) -> float:
-        """End time t_E, s: the sum of the durations and the pauses."""
+        """Return the end time t_E, s: the sum of the durations and the pauses."""
         pauses = sum(phase.pause for phase in self.phases)
         return float(sum(x[first] for first in self.first_variables) + pauses)
 
     def free_time(self, x: np.ndarray) -> float:
-        """Sum of the durations that are not given, s."""
+        """Return the sum of the durations that are free, s."""
         return float(
             sum(
                 x_of_phase[0]
@@ -290,7 +291,7 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def scale_time(self, x: np.ndarray, factor: float) -> np.ndarray:
-        """Return the same motion, every phase longer by a factor whose duration is not given."""
+        """Return the same motion with the duration of every phase longer by a factor, except given durations."""
         return np.concatenate(
             [
                 phase.scale_time(x_of_phase, factor, self.held_orders(number))
@@ -299,7 +300,7 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def held_orders(self, number: int) -> tuple[int, int]:
-        """Return the highest derivatives that links to phases of given duration hold at start and end of a phase."""
+        """Return the highest derivatives that links to phases of given duration fix at the start and end of a phase."""
         first = 0
         last = 0
         for link in self.links:
@@ -310,7 +311,7 @@ class Program(PhaseSequence[Phase], Summary):
         return first, last
 
     def objective(self, x: np.ndarray) -> float:
-        """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""
+        """Return the value to minimise; raise UnreachableError as `states` does, if it depends on the joints."""
         return float(
             sum(
                 self.minimised.value(phase, x_of_phase)
@@ -319,7 +320,7 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Gradient of the objective, (v,); raises as `objective` does."""
+        """Return the gradient of the objective, (v,); raise as `objective` does."""
         return np.concatenate(
             [
                 self.minimised.gradient(phase, x_of_phase)
@@ -332,7 +333,7 @@ class Program(PhaseSequence[Phase], Summary):
         return Program(self.phases, self.links, objective)
 
     def states(self, x: np.ndarray) -> list[JointState]:
-        """Joint motion of every phase at its collocation points.
+        """Return the joint motion of every phase at its collocation points.
 
         Raises
         ------
@@ -342,7 +343,7 @@ class Program(PhaseSequence[Phase], Summary):
         return [phase.state(x_of_phase) for phase, x_of_phase in self.split(x)]
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows, (c,); raises UnreachableError as `states` does."""
+        """Compute the values of the rows, (c,); raise UnreachableError as `states` does."""
         phase_points = self.split(x)
         rows = [phase.rows(x_of_phase) for phase, x_of_phase in phase_points]
         rows.append(self.means.values(phase_points))
@@ -350,7 +351,7 @@ class Program(PhaseSequence[Phase], Summary):
         return np.concatenate(rows)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `states` does."""
+        """Compute the entries of the rows' Jacobian on its sparsity pattern, (nnz,); raise as `states` does."""
         phase_points = self.split(x)
         entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in phase_points]
         entries.append(self.means.slopes(phase_points).ravel())
@@ -358,11 +359,11 @@ class Program(PhaseSequence[Phase], Summary):
         return np.concatenate(entries)
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
-        """Return what squares in the objective and in means add to the Hessian of the Lagrangian; None without any."""
+        """Return the Hessian part that comes from squares in the objective and in means; None if there are none."""
         is_curved = any(map(self.minimised.is_curved, self.phases))
         if not (is_curved or len(self.means)):
             return None
-        # Squares of accelerations fall with the fourth power of the time T: dT/d(mean) = -T/4 where the mean is 1.
+        # Squared accelerations fall with the fourth power of the time T, so dT/d(mean) = -T/4 where the mean is 1.
         guess = np.zeros(len(self.lower))
         if len(self.means):
             guess[self._mean_rows] = -0.25 * self.end_time(x) / len(self.means)
@@ -371,7 +372,7 @@ class Program(PhaseSequence[Phase], Summary):
     def _find_hessian(
         self, x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
     ) -> np.ndarray:
-        """Return that Gauss-Newton part by the multipliers of objective and rows."""
+        """Return the Gauss-Newton part for given multipliers of objective and rows."""
         weights = -multipliers[self._mean_rows].clip(max=0.0)
         hessian = self.means.curvature(self.split(x), weights)
         for (phase, x_of_phase), block in zip(self.split(x), self._blocks, strict=True):
@@ -387,9 +388,9 @@ class Program(PhaseSequence[Phase], Summary):
         return tuple(limits.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it.
+        """Return the indices of the rows of a limit, (K, c), at the collocation points of all phases that have it.
 
-        One row of numbers, (1, c), where its means are held.
+        For a limit on means it is a single row of indices, (1, c).
         """
         if limit.guarantee.is_mean:
             limits = self.means.limits
@@ -397,7 +398,7 @@ class Program(PhaseSequence[Phase], Summary):
             before = sum(len(earlier.lower) for earlier in limits[:number])
             first = self._mean_rows.start + before
             return np.arange(first, first + len(limit.lower))[None]
-        # The links' rows come behind.
+        # The rows of the links come last.
         pairs = zip(self.phases, self._first_rows, strict=False)
         return np.concatenate(
             [first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)]
@@ -405,7 +406,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @cached_property
     def value_numbers(self) -> np.ndarray:
-        """Number of the limits' value that each row holds at the points of a phase, (c,); other rows have their own."""
+        """Number of the limit value in each row, (c,), the same at all points of a phase; other rows have their own."""
         numbers = np.arange(len(self.lower))
         for phase, first in zip(self.phases, self._first_rows, strict=False):
             for limit in phase.limits:
@@ -415,7 +416,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @cached_property
     def third_order_rows(self) -> list[int]:
-        """Numbers of the rows of limits on third derivatives, such as jerks."""
+        """Indices of the rows of limits on third derivatives, such as jerks."""
         pairs = zip(self.phases, self._first_rows, strict=False)
         return [
             int(first + row)
@@ -426,20 +427,20 @@ class Program(PhaseSequence[Phase], Summary):
         ]
 
     def motions(self, x: np.ndarray) -> list[Motion]:
-        """Curves of every phase that belong to x."""
+        """Return the curves of every phase that belong to x."""
         return [phase.motion(x_of_phase) for phase, x_of_phase in self.split(x)]
 
     def variables_from(self, motions: Sequence[Motion]) -> np.ndarray:
-        """Point x nearest to given curves of every phase; see `Phase.variables_from`."""
+        """Return the point x closest to given curves of every phase; see `Phase.variables_from`."""
         pairs = zip(self.phases, motions, strict=True)
         return np.concatenate([phase.variables_from(motion) for phase, motion in pairs])
 
     def with_phases(self, phases: Iterable[Phase]) -> Program:
-        """Return the program with other phases for the present ones, all else as it is."""
+        """Return the program with its phases replaced, and all else unchanged."""
         return Program(phases, self.links, self.minimised)
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
-        """Return the same program with other collocation points of every phase; see `Phase.with_points`."""
+        """Return the same program with new collocation points in every phase; see `Phase.with_points`."""
         pairs = zip(self.phases, t_norm, strict=True)
         return self.with_phases(phase.with_points(times) for phase, times in pairs)
 
@@ -450,18 +451,18 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def fix_knots(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
-        """Return the program with its knots fixed where they are at x, and the same motion as its point x."""
+        """Return the program with its knots fixed at their positions for x, and its point with the same motion."""
         fixed = self.with_phases(
             phase.fix_knots(x_of_phase) for phase, x_of_phase in self.split(x)
         )
         return fixed, fixed.variables_from(self.motions(x))
 
     def with_margin(self, margin: float) -> Program:
-        """Return the same program with another least branch margin; x keeps its meaning."""
+        """Return the same program with a different smallest branch margin; x keeps its meaning."""
         return self.with_phases(phase.with_margin(margin) for phase in self.phases)
 
     def relax(self, limit: Limit, bound: Bound, amount: float) -> Program:
-        """Return the same program with a figure of one of its limits giving way by `amount`, in the figure's unit."""
+        """Return the same program with one figure of a limit relaxed by `amount`, in the unit of the figure."""
         relaxed = limit.relax(bound, amount)
         return self.with_phases(
             phase.with_limits(
@@ -475,5 +476,5 @@ class Program(PhaseSequence[Phase], Summary):
 
 
 def is_safeguard(limit: Limit) -> bool:
-    """Tell whether a limit only keeps the solve on its branch."""
+    """Tell whether a limit is a safeguard, which only keeps the solve on its branch."""
     return limit.role is Role.SAFEGUARD

@@ -1,15 +1,14 @@
-"""Refinement: from limits at collocation points to limits everywhere.
+"""Refinement: from limits met at collocation points to limits met everywhere.
 
-After a solve the limits are evaluated on a much denser grid. Where one is violated
-between collocation points, points are added around the worst place of each interval,
-and the problem is solved again from where it stands, until the worst ratio is within
-the tolerance. A last violation of the tolerance's own size is removed by a slightly
-longer t_E, up to one per cent longer once the rounds, or the time, are used up.
+After a solve the limits are evaluated on a much denser grid. Where a limit is violated between collocation points,
+points are added around the worst place of each interval. The problem is then solved again from its current solution,
+until the worst violation is within the tolerance. A remaining violation about as large as the tolerance is removed by a
+slightly longer t_E. Once the rounds are used up, t_E may become up to one per cent longer; once the time is up, up to
+twice as long.
 
-The torque of a joint with Coulomb friction rises by twice the friction where the joint
-reverses, within the friction's own width. A width of 1e-5 rad/s is passed in
-microseconds, which no grid resolves. Between grid points the velocity of a joint is
-therefore taken for the cubic that its velocities and accelerations define.
+Where a joint with Coulomb friction reverses, its torque rises by twice the friction, within the width of the friction
+law. A width of 1e-5 rad/s is passed in microseconds, which no grid resolves. Between grid points the velocity of a
+joint is therefore approximated by the cubic that its velocities and accelerations define.
 """
 
 from __future__ import annotations
@@ -30,26 +29,26 @@ from brachis.robot import Friction
 from brachis.task import RefinementSettings
 
 _LEVELS = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
-"""Velocities, in widths of the friction, that are looked for: at 7 all but 2e-6 of it is there."""
+"""Velocities that are checked, in widths of the friction law. At 7, all but 2e-6 of the friction has built up."""
 _NEAR_REVERSALS = 10.0
-"""A velocity that turns within so many widths of zero is looked at as well."""
+"""An extremum of the velocity is checked as well if it lies within this many widths of zero."""
 
 
 def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.ndarray:
-    """Find the times at which joints with Coulomb friction pass through its width.
+    """Find the times at which joints with Coulomb friction pass through the width of the friction law.
 
     Parameters
     ----------
     friction : Friction
     times : (K,) ndarray
-        Ascending, s.
+        Times, ascending, s.
     state : JointState
-        At these times.
+        Joint motion at these times.
 
     Returns
     -------
     (Z,) ndarray
-        s, ascending.
+        Times found, ascending, s.
     """
     rubbing = np.flatnonzero(friction.coulomb > 0.0)
     if not len(rubbing):
@@ -77,10 +76,10 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
 
 
 def _root(c: np.ndarray) -> np.ndarray:
-    """Find where polynomials in Bernstein form on [0, 1], (m + 1, F), whose ends differ in sign are zero, (F,)."""
+    """Find the zeros, (F,), of polynomials in Bernstein form on [0, 1], (m + 1, F), whose ends differ in sign."""
 
     def is_before(u: np.ndarray) -> np.ndarray:
-        """Tell at which places, (F,), polynomials have the sign of their beginning."""
+        """Tell at which places, (F,), the polynomials have the same sign as at their beginning."""
         value = c
         while len(value) > 1:  # de Casteljau
             value = value[:-1] * (1.0 - u) + value[1:] * u
@@ -90,29 +89,29 @@ def _root(c: np.ndarray) -> np.ndarray:
 
 
 _NEAR = 0.005
-"""A violation may hide between grid points where the motion comes so near a limit, as a part of it."""
+"""Distance from a limit, as a fraction of it, within which a violation may hide between grid points."""
 _SAME_TIME = 1e-9
-"""Normalised times that differ by less are the same knot or grid point, seen from its two sides."""
+"""Normalised times that differ by less belong to the same knot or grid point, on either side of it."""
 _EVERYWHERE = slice(5, None, 10)
-"""Of the dense grid's times: one more between neighbouring collocation points."""
+"""Times of the dense grid that add one point between neighbouring collocation points."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
-"""Points around an abrupt change, in steps of the dense grid."""
+"""Offsets of points around an abrupt change, in steps of the dense grid."""
 
 
 def dense_grid(phase: Phase, density: int) -> np.ndarray:
-    """Spread times evenly over every knot interval, `density` for each of its collocation points."""
+    """Spread times evenly over every knot interval, `density` per collocation point."""
     breaks = phase.breaks
     behind = np.searchsorted(phase.t_norm, breaks + _SAME_TIME)
     grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
-    return np.union1d(grid, phase.jumps - 1e-7)  # just before what jumps there
+    return np.union1d(grid, phase.jumps - 1e-7)  # just before a jump
 
 
 def violations(
     dense: Program, x: np.ndarray, goal: float
 ) -> tuple[float, list[np.ndarray]]:
-    """Largest violation, and the normalised times of every phase at which collocation points are missing.
+    """Return the largest violation, and the normalised times at which collocation points are missing in each phase.
 
-    Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
+    Around every grid peak that comes close to a limit, finer and finer grids locate the true peak.
     """
     checks = [
         _check_phase(phase, x_of_phase, goal) for phase, x_of_phase in dense.split(x)
@@ -130,14 +129,14 @@ def violations(
 
 
 def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
-    """Largest violation of a phase, and where points are missing."""
+    """Return the largest violation of a phase, and where points are missing."""
     t_norm = dense.t_norm
     try:
         table = dense.violation(x)
         largest = float(table.max())
         peaks = _suspects(t_norm, table, dense.knots, goal - _NEAR)
         if largest > 20.0 * goal:
-            # The grid's own peaks will do until they are nearly held down.
+            # The peaks on the grid are good enough until they are nearly within the limits.
             at = np.searchsorted(t_norm, peaks - _SAME_TIME).clip(max=len(t_norm) - 1)
             missing = _around(peaks[table.max(axis=1)[at] > goal], t_norm)
         else:
@@ -155,10 +154,11 @@ def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.nd
 
 
 def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List t_norm between grid points that are looked at in any case.
+    """List normalised times between grid points that are always checked.
 
-    They are spread over every piece of a path of several, for a blend of millimetres lies between grid points; stand
-    where a joint with Coulomb friction reverses, or nearly so; and where a limit changes abruptly.
+    These are times spread over every piece of a path with several pieces, because a blend of a few millimetres may lie
+    between grid points. They are also the times at which a joint with Coulomb friction reverses, or nearly so, and at
+    which a limit changes abruptly.
     """
     motion = dense.motion(x)
     path = dense.joint_map.path
@@ -173,14 +173,14 @@ def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
 
 
 def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List t_norm at which the path coordinate is where a limit changes abruptly."""
+    """List normalised times at which the path coordinate passes an abrupt change of a limit."""
     motion = dense.motion(x)
     breaks = np.concatenate([limit.breaks for limit in dense.limits])
     return motion.times_of(breaks) / motion.t_end
 
 
 def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarray:
-    """Spread points t_norm around the abrupt changes near which points are missing.
+    """Spread normalised times around the abrupt changes near which points are missing.
 
     The time of a change moves with every solve: single points would follow it for many rounds.
     """
@@ -193,7 +193,7 @@ def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarr
 
 
 def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Find the distance between grid times around each of `times`; at a knot the larger one of its two sides."""
+    """Find the distance between grid times around each of `times`; at a knot, the larger distance of its two sides."""
     gaps = np.diff(t_norm)
     sides = [
         np.searchsorted(t_norm, times + by) - 1 for by in (-_SAME_TIME, _SAME_TIME)
@@ -203,7 +203,7 @@ def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """List times at the centres, and a grid step before and after them: a peak moves when it is held down."""
+    """List times at the centres and one grid step before and after them: a peak moves when it is pressed down."""
     steps = _spacing(t_norm, centres)[:, None] * np.array([-1.0, 0.0, 1.0])
     return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
 
@@ -216,11 +216,11 @@ def _find_lost(phase: Phase, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
 
 
 def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List the middle of every stretch of the dense grid on which the branch has no answer."""
+    """List the middle of every stretch of the dense grid on which the branch has no posture."""
     is_lost = _find_lost(dense, x, dense.t_norm)
     edges = np.flatnonzero(np.diff(np.pad(is_lost, 1).astype(int)))
     if not len(edges):
-        # Reachable, but singular or too far apart to count turns: more points everywhere.
+        # Reachable, but singular, or too far apart to count turns: add points everywhere.
         return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
 
@@ -228,10 +228,10 @@ def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
 def _suspects(
     t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float
 ) -> np.ndarray:
-    """List times around which a violation may hide: the grid's peaks near a limit, and both sides of knots near one.
+    """List times around which a violation may hide: grid peaks close to a limit, and both sides of knots close to one.
 
-    A peak between grid points is higher than its neighbours by an eighth of their second difference; four times that
-    is allowed for. The motion's higher derivatives jump at knots: a peak next to a knot need not show on the grid.
+    A peak between grid points is higher than its neighbours by an eighth of their second difference; four times as much
+    is allowed for. The motion's higher derivatives jump at knots, so a peak next to a knot may not show on the grid.
     """
     padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
     bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
@@ -248,7 +248,7 @@ def _suspects(
 def _zoom(
     dense: Phase, x: np.ndarray, centres: np.ndarray, goal: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find true peaks near the centres on ever finer grids: their normalised times, and the violations there."""
+    """Find the true peaks near the centres on finer and finer grids; return their normalised times and violations."""
     heights: np.ndarray = np.empty(len(centres))
     reach = _spacing(dense.t_norm, centres)
     steps = np.linspace(-1.0, 1.0, 9)
@@ -267,7 +267,7 @@ def _zoom(
 
 
 def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
-    """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
+    """Add extra collocation points to those of a phase, leaving out points whose rows would equal existing ones."""
     t_norm = phase.t_norm
     before = np.clip(np.searchsorted(t_norm, extra), 1, len(t_norm) - 1) - 1
     side = np.searchsorted(phase.jumps, extra, side="right")
@@ -278,20 +278,20 @@ def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
 
 
 _LONGEST = 0.01
-"""Fraction by which a motion may get slower where nothing else makes the limits hold."""
+"""Fraction by which a motion may get slower if nothing else brings it within the limits."""
 _CLOSE = 1.01
-"""Ratio of a time that is long enough to one that is too short, at which no shorter one is looked for."""
+"""Ratio of a long enough time to a time that is too short, below which no shorter time is searched for."""
 _LONGEST_IF_LATE = 1.0
-"""The same where the time is up: a slower motion within the limits is better than none."""
+"""The same fraction once the time is up: a slower motion within the limits is better than none."""
 _RELIEF = 4.0
-"""Violations fall by no more than about so many times the fraction by which a motion gets slower."""
+"""A violation falls by at most about this many times the fraction by which the motion gets slower."""
 _GOAL = 0.5
-"""Refinement aims at this part of the tolerance: the verification's grid is another one."""
+"""Fraction of the tolerance at which refinement aims, because the verification uses a different grid."""
 
 
 @dataclass(frozen=True)
 class RefinementOptions:
-    """When refinement is content.
+    """Options of the refinement: when it is finished, and how much effort it may take.
 
     Attributes
     ----------
@@ -300,11 +300,11 @@ class RefinementOptions:
     density : int
         Grid points per collocation point of the first solve.
     max_rounds : int
-        Solves after the first one; with 0 the first answer is left as it is.
+        Maximum number of solves after the first one; with 0 the first solution is left as it is.
     deadline : Deadline
-        No solve is begun after it.
+        No solve is started after this deadline.
     longest : float
-        End time beyond which it is not lengthened, s.
+        End time above which the motion is not lengthened, s.
     """
 
     tolerance: float = 1e-4
@@ -317,7 +317,7 @@ class RefinementOptions:
     def of(
         cls, settings: RefinementSettings, deadline: Deadline, longest: float = np.inf
     ) -> RefinementOptions:
-        """Take what the ``refinement`` part of a task says."""
+        """Create the options from the ``refinement`` part of a task."""
         known = (settings.tolerance, settings.density, settings.max_rounds)
         return cls(*known, deadline, longest)
 
@@ -325,15 +325,16 @@ class RefinementOptions:
 def refine(
     program: Program, first: SolverReport, solve: Solve, options: RefinementOptions
 ) -> SolvedProgram:
-    """Add collocation points to a solved program until the limits hold on the dense grid.
+    """Add collocation points to a solved program until the limits are met on the dense grid.
 
-    This does not look for a better motion, as `improve` does: from round to round motions get slower, until they hold.
+    Unlike `improve`, this does not search for a better motion. The motion gets slower from round to round, until it
+    meets the limits.
 
     Parameters
     ----------
     program : Program
     first : SolverReport
-        Of the program's solve.
+        Report of the program's solve.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     options : RefinementOptions
@@ -341,7 +342,7 @@ def refine(
     Returns
     -------
     SolvedProgram
-        With all collocation points. Its reports are the first one, and one for every round.
+        The program with all collocation points. Its reports are the first one and one for every round.
     """
     if not first.status.usable:
         return SolvedProgram(program, (first,), violation=np.inf)
@@ -367,7 +368,7 @@ def refine(
         if is_same or options.deadline.passed:
             break
         report = solve(finer, answer)
-        # A solve that ended early may have left a motion about as fast as the one before.
+        # A solve that ended early may still give a motion about as fast as the one before.
         is_as_fast = report.objective <= reports[-1].objective * (1.0 + _LONGEST)
         if not (report.status.usable or (report.feasible and is_as_fast)):
             break
@@ -389,10 +390,11 @@ def _lengthen(
     options: RefinementOptions,
     by: float,
 ) -> tuple[float, float]:
-    """Find the factor, up to 1 + `by`, by which a longer time brings the violation to the goal, and what is left of it.
+    """Find the factor on the time, up to 1 + `by`, that brings the violation to the goal; return both.
 
-    A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
-    gravity or friction add to by less, and where the time is given nothing. So this is tried, and the best is kept.
+    A time longer by some fraction lowers velocities by this fraction, and torques that only accelerate by twice as
+    much. Torques that contain gravity or friction fall by less, and nothing falls where the time is given. So factors
+    are tried, and the best one is kept.
     """
     goal = options.tolerance * _GOAL
     max_factor = min(1.0 + by, options.longest / dense.end_time(x))
@@ -412,7 +414,7 @@ def _lengthen(
             best = (factor, violation)
         if violation > 0.99 * before:
             break
-    # Jerks fall with the third power of the time: less may be enough.
+    # Jerks fall with the third power of the time, so a smaller factor may be enough.
     while best[1] <= goal and best[0] > _CLOSE * too_short:
         factor = np.sqrt(best[0] * too_short)
         violation, _ = violations(dense, dense.scale_time(x, factor), goal)

@@ -1,4 +1,4 @@
-"""The search for joint paths over the path, and programs that begin with the fastest timing of one."""
+"""The search for joint paths over the path, and programs that start from the fastest timing of a joint path."""
 
 from __future__ import annotations
 
@@ -25,42 +25,45 @@ from brachis.optimise.program import Program
 from brachis.timing import is_left_out
 
 SOLVER = "phase plane"
-"""Name of what solves a program by its timing alone."""
+"""Solver name in reports of programs that are solved by timing alone."""
 _CREDIBLE = 0.01
-"""Part of the time by which an answer over the path may differ from its timing."""
+"""Fraction of the time by which a solution over the path may differ from its timing."""
 _MOST_INTERVALS = 256
-"""Intervals of all redundant curves together: with four curves of 128 a solve takes half a minute, and gains 0.2 %."""
+"""Maximum number of intervals of all redundant curves together: with four curves of 128 intervals a solve takes half a
+minute and gains 0.2 %."""
 _LEAST_INTERVALS = 4
-"""Intervals of a redundant curve in a phase, however short."""
+"""Minimum number of intervals of a redundant curve in a phase, however short the phase."""
 _PLACES_AN_INTERVAL = 3.5
-"""Places of the path at which limits hold, for every interval."""
+"""Number of places per interval at which the limits are imposed along the path."""
 _NARROWED = 4
-"""Times that limits on postures are narrowed, no more."""
+"""Maximum number of times that limits on postures are narrowed."""
 ROUGH_MARGIN = 0.02
-"""Least branch margin in a rough search: from joint paths clear of the boundary finer ones may come nearer."""
+"""Smallest branch margin in a rough search. Finer searches that start from its joint paths may come closer to the
+boundary."""
 _FEWEST = 12
-"""Intervals of a phase over which a search over time begins, no fewer if its timing needs as many."""
+"""Minimum number of intervals of a phase at the beginning of a search over time, if its timing needs that many."""
 
 
 @dataclass(frozen=True)
 class PathEffort:
-    """How closely joint paths are looked for.
+    """How thoroughly joint paths are searched for.
 
     Attributes
     ----------
     intervals : tuple of int
-        Of the redundant curves over the whole path, one number after the other; phases share them by their time.
+        Numbers of intervals of the redundant curves over the whole path, tried one after the other. The phases share
+        them in proportion to their times.
     places : int
-        At which joint paths are timed.
+        Number of places at which joint paths are timed.
     margin : float
-        Least branch margin.
+        Smallest branch margin that is allowed.
     options : SolverOptions
-        Of every solve. Limits may be exceeded by a little: the timing is computed anew.
+        Options of every solve. Limits may be exceeded slightly, because the timing is recomputed.
     is_rough_before, is_rough_after : bool, optional
-        Whether joint paths are timed roughly before they are improved, and afterwards. Of a joint path that is not
-        improved the latter counts. A gain or a loss of less than 1 % over a rough timing is not noticed.
+        Whether joint paths are timed roughly before and after they are improved. For a joint path that is not improved,
+        the second setting applies. A rough timing does not show gains or losses below 1 %.
     posture_violation : float, optional
-        Violation of limits on postures that is small enough.
+        Violation of limits on postures that is accepted.
     """
 
     intervals: tuple[int, ...]
@@ -89,7 +92,7 @@ COARSE = PathEffort(
     ),
     posture_violation=5e-3,
 )
-"""For choosing which joint paths get a rough search."""
+"""Effort for choosing the joint paths that get a rough search."""
 ROUGH = PathEffort(
     intervals=(16,),
     places=800,
@@ -105,7 +108,7 @@ ROUGH = PathEffort(
         widening=1.5e-5,
     ),
 )
-"""To rank joint paths, clear of branch boundaries."""
+"""Effort for ranking joint paths; these stay clear of branch boundaries."""
 FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     places=PLACES,
@@ -119,11 +122,11 @@ FINE = PathEffort(
         widening=1e-6,
     ),
 )
-"""For a plan, from the answer of a rough search."""
+"""Effort for a plan that starts from the result of a rough search."""
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
-    """Solve nothing: a timing is not improved by more collocation points, but lengthened until limits hold."""
+    """Report x unchanged: more collocation points do not improve a timing, but a longer time meets the limits."""
     return _report(program, x, SolveStatus.STALLED, np.inf, 0.0)
 
 
@@ -134,7 +137,7 @@ def _report(
     violation: float,
     seconds: float,
 ) -> SolverReport:
-    """Report a motion that no solver changed."""
+    """Report a motion that no solver has changed."""
     return SolverReport(
         solver=SOLVER,
         status=status,
@@ -156,29 +159,30 @@ def begin_with_timing(
     points: int,
     x: np.ndarray | None = None,
 ) -> tuple[Program, np.ndarray] | None:
-    """Lay splines along the timings of all phases, over few knots, close together where these need them.
+    """Lay splines along the timings of all phases, over few knots that are dense only where the timings need it.
 
-    Phases whose time is given keep their knots.
+    Phases with a given time keep their knots.
 
     Parameters
     ----------
     program : Program
-        Over any knots.
+        Program over any knots.
     timings : sequence of PhaseTiming or None
     lost : float
-        Part of the time that the intervals may lose together.
+        Fraction of the time that the intervals may cost together.
     intervals : int
-        Intervals of all phases together, about.
+        Approximate number of intervals of all phases together.
     points : int
-        Collocation points an interval.
+        Number of collocation points per interval.
     x : (v,) ndarray, optional
-        Of the program: where phases begin whose time is given. Not needed without any.
+        Point of the program, from which phases with a given time start. It is not needed if there are none.
 
     Returns
     -------
     program : Program
     x : (v,) ndarray
-        Slowed down until the limits hold at the collocation points; None where the limits allow no timing.
+        Motion slowed down until the limits are met at the collocation points. None is returned in place of both where
+        the limits allow no timing.
     """
     total = least_time(timings)
     phases = []
@@ -201,7 +205,7 @@ def begin_with_timing(
 
 
 def is_timing_all(program: Program) -> bool:
-    """Tell whether the phase plane knows all limits, and phases meet at rest."""
+    """Tell whether the phase plane covers all limits, and all phases meet at rest."""
     is_linked = any(max(link.orders) for link in program.links)
     is_periodic = any(phase.boundary.periodic for phase in program.phases)
     has_laws = any(phase.time_law is not None for phase in program.phases)
@@ -211,22 +215,22 @@ def is_timing_all(program: Program) -> bool:
 
 @dataclass(frozen=True)
 class BetterPaths:
-    """What came of the search over the path.
+    """Result of the search over the path.
 
     Attributes
     ----------
     curves : tuple of (S, c) ndarray
-        The best joint path of every phase, as curves: s and the redundant ones.
+        The best joint path of every phase, as curves: s and the redundant curves.
     timings : tuple of PhaseTiming
-        Of them.
+        Timings of these joint paths.
     reports : tuple of SolverReport
     violation : float
         Largest violation of a limit on postures.
     is_credible : bool
-        Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
-        no curves over the path describe the motion.
+        Whether the solutions are about as fast as their timings. If the tool stands still on its path while the joints
+        move, curves over the path cannot describe the motion.
     is_held_back : bool
-        Whether a branch margin is so near to its bound that it holds the motion back.
+        Whether a branch margin is so close to its bound that it holds the motion back.
     """
 
     curves: tuple[np.ndarray, ...]
@@ -238,11 +242,11 @@ class BetterPaths:
 
     @property
     def t_end(self) -> float:
-        """Time of all phases, s; infinite where one has no timing."""
+        """Total time of all phases, s; infinite if a phase has no timing."""
         return least_time(self.timings)
 
     def rank(self, slack: float) -> tuple[float, float]:
-        """Less for those that violate limits on postures less, or if both stay within `slack`, are faster."""
+        """Return a sort key, smaller for better paths: the violation of posture limits above `slack`, then the time."""
         return max(self.violation, slack), self.t_end
 
 
@@ -253,28 +257,28 @@ def improve_joint_paths(
     tolerance: float,
     effort: PathEffort,
 ) -> BetterPaths:
-    """Find better joint paths over the path; see `PathProgram`.
+    """Find better joint paths with the program over the path; see `PathProgram`.
 
     Parameters
     ----------
     program : Program
-        Over any knots. Limits that the phase plane does not know are left out.
+        Program over any knots. Limits that the phase plane does not cover are left out.
     curves : sequence of (S, c) ndarray
-        Of every phase: s, ascending, and the redundant curves.
+        Curves of every phase: s, ascending, and the redundant curves.
     solve : SolverSession
     tolerance : float
-        Splines get more intervals as long as that gains this part of the time.
+        The number of spline intervals is increased as long as this gains at least this fraction of the time.
     effort : PathEffort
 
     Returns
     -------
     BetterPaths
-        Those given, where the limits allow no timing of them.
+        The improved joint paths, or the given ones if the limits allow no timing of them.
 
     Raises
     ------
     UnreachableError
-        Curves leave the joint map.
+        The curves leave the joint map.
     """
     solve = solve.over_path(effort.options)
     program = program.with_phases(
@@ -317,7 +321,7 @@ def _better(
     intervals: int,
     best: BetterPaths,
 ) -> BetterPaths:
-    """Solve over the path from the best joint paths, and keep what is faster."""
+    """Solve over the path from the best joint paths so far, and keep the faster ones."""
     phases = []
     for phase, phase_timing in zip(program.phases, best.timings, strict=True):
         share = phase_timing.t_end / best.t_end
@@ -343,7 +347,7 @@ def _better(
         return replace(best, reports=reports, is_credible=False)
     paths = BetterPaths(over_path.curves(report.x), timings, reports, violation)
     missed = 1.0 - report.objective / paths.t_end
-    # The phase plane does not tell whether the limits allow a speed that is given.
+    # The phase plane does not show whether the limits allow a given speed.
     has_laws = any(timing.fixed_duration is not None for timing in timings)
     has_timed_laws = has_laws and np.isfinite(paths.t_end)
     is_beyond = has_timed_laws and report.violation > _CREDIBLE
@@ -359,7 +363,7 @@ def _better(
 
 
 def least_time(timings: Iterable[PhaseTiming | None]) -> float:
-    """Return the time of all phases, s; infinite where one has no timing."""
+    """Return the total time of all phases, s; infinite if a phase has no timing."""
     return sum(np.inf if timing is None else timing.t_end for timing in timings)
 
 
@@ -370,25 +374,25 @@ def lay_splines(
     points: int,
     deadline: Deadline = NEVER,
 ) -> tuple[Program, SolverReport] | None:
-    """Lay splines along the fastest timing of joint paths, over the knots that these need.
+    """Lay splines along the fastest timing of joint paths, over as many knots as the timing needs.
 
     Parameters
     ----------
     program : Program
-        Of which `is_timing_all` holds, over any knots.
+        Program over any knots for which `is_timing_all` is true.
     timings : sequence of PhaseTiming or None
-        Of joint paths for its phases.
+        Timings of a joint path for each phase.
     tolerance : float
-        Part of the time by which splines should not be slower.
+        Fraction of the time by which the splines may be slower.
     points : int
-        Collocation points an interval.
+        Number of collocation points per interval.
     deadline : Deadline, optional
         See `follow`.
 
     Returns
     -------
     (Program, SolverReport) or None
-        None where a joint path has no timing.
+        None if a joint path has no timing.
     """
     began = time.perf_counter()
     followed_phases = []

@@ -1,8 +1,9 @@
-"""Splines that follow a timing: where their knots stand, and their control points.
+"""Splines that follow a timing: the choice of their knots and control points.
 
-Accelerations of the fastest timing jump, and splines can only ramp: so knots stand close together where accelerations
-jump, and far apart where they are nearly linear. The control points of the splines' rates are means of the curves'
-rates, and are sharpened where these change smoothly: so no spline accelerates much more than its curve does near by.
+In the fastest timing accelerations jump, but splines can only ramp. Knots are therefore close together where
+accelerations jump, and far apart where they are nearly linear. The control points of the splines' rates are means of
+the curves' rates, sharpened where these change smoothly. As a result, no spline accelerates much more than its curve
+does close by.
 """
 
 from __future__ import annotations
@@ -19,45 +20,45 @@ from brachis.timing import TimedCourse, Timing
 from brachis.timing.joint_path import halfway
 
 _FIRST_INTERVALS = 8
-"""Intervals that are halved, no fewer."""
+"""Minimum number of intervals before halving."""
 _PLACES_AN_INTERVAL = 250
-"""Places for each of these."""
+"""Number of places of the path for each interval before halving."""
 _LONGER = 4.5
-"""Times the length of an interval that those beside it may have."""
+"""Maximum ratio between the lengths of neighbouring intervals."""
 _SWITCH = 0.2
-"""Part of accelerations by which they change where the motion switches from one limit to another."""
+"""Smallest change of the accelerations, as a fraction of them, that counts as a switch from one limit to another."""
 _FEW = 5
-"""Times within an interval that are needed to tell whether it is smooth. With 8 an arc of degree 5 was 0.1 % slower,
-with 3 there were a third more intervals for the same time."""
+"""Number of times within an interval that are needed to tell whether the timing is smooth there. With 8 an arc of
+degree 5 was 0.1 % slower; with 3 there were a third more intervals for the same end time."""
 _POINT = 1e-12
-"""Half a chord below which it is a point, as a part of the time."""
+"""Half length below which a chord is treated as a point, as a fraction of the time."""
 _ANCHORED = 100
-"""Intervals after which the splines are where the timing is."""
+"""Number of intervals after which the splines are brought back to the positions of the timing."""
 
 
 def breaks_for(
     course: TimedCourse, timing: Timing, tolerance: float, max_intervals: int
 ) -> np.ndarray:
-    """Choose knots over which splines follow a timing.
+    """Choose knots for splines that follow a timing.
 
-    Intervals are halved, those first that lose most. An interval of length h loses h times how far accelerations are
-    from linear within it, as a part of the limits. A jump of d2p/dt2 costs less: a ramp in its place takes the motion
-    less far by the jump's height times h^2 / 24. None is shorter than the mean step of the timing: in a step the limits
-    hold once.
+    Intervals are halved, beginning with the one that costs the most time. An interval of length h costs h times the
+    deviation of the accelerations from a straight line within it, as a fraction of the limits. A jump of d2p/dt2 costs
+    less: with a ramp in its place the motion falls behind by the jump's height times h^2 / 24. No interval is shorter
+    than the mean step of the timing, because the limits are imposed once per step.
 
     Parameters
     ----------
     course : TimedCourse
     timing : Timing
     tolerance : float
-        Part of the time that all intervals together may lose.
+        Fraction of the time that all intervals together may cost.
     max_intervals : int
-        Intervals with which halving ends, before those beside much shorter ones are halved too.
+        Number of intervals at which halving ends. Intervals beside much shorter ones are halved after that.
 
     Returns
     -------
     (N + 1,) ndarray
-        In normalised time.
+        Ends of the intervals in normalised time.
     """
     values = course.accelerations(timing)
     rate = timing.middle_rate
@@ -65,7 +66,7 @@ def breaks_for(
     t = 0.5 * (timing.times[1:] + timing.times[:-1]) / timing.t_end
     sizes = np.abs(values).max(axis=1)
     jumps = np.abs(np.diff(values, axis=0)).max(axis=1)
-    # A smaller step is one of the limits themselves, which a ramp exceeds.
+    # A smaller step comes from the limits themselves, and a ramp there would exceed them.
     is_switch = jumps > _SWITCH * np.maximum(sizes[1:], sizes[:-1])
     jumps = np.where(is_switch, jumps, 0.0)
     ramps = timing.t_end / 24.0 * np.abs(np.diff(acceleration))
@@ -86,7 +87,7 @@ def breaks_for(
 
 
 def even_out(breaks: np.ndarray) -> np.ndarray:
-    """Halve intervals, (N + 1,), that are much longer than those beside them."""
+    """Halve the intervals between breaks, (N + 1,), that are much longer than their neighbours."""
     while True:
         steps = np.diff(breaks)
         beside = np.pad(steps, 1, constant_values=1.0)
@@ -104,11 +105,12 @@ def control_points_along(
     degree: int,
     delays: tuple[float, float],
 ) -> np.ndarray:
-    """Control points, (c, N + d), of splines whose rates have means of the curves' rates for control points.
+    """Compute control points, (c, N + d), of splines whose rates have means of the curves' rates as control points.
 
-    A control point of the rate belongs to d - 1 knots. Its mean is the chord over as many of these as are even beside
-    their mean. So accelerations stay among those near by, whatever the knots. Beside its ends, for the delays, s, the
-    timing keeps its rates.
+    A control point of the rate belongs to d - 1 knots. Its mean is the slope of the chord over the largest interval
+    that is symmetric around the mean of these knots and lies between the first and the last of them. So accelerations
+    stay within the range of those close by, whatever the knots. For the delays, s, before and after the timing, the
+    curves keep their rates at its ends.
     """
     t_end = timing.t_end + sum(delays)
     windows = sliding_window_view(knots[2:-2], degree - 1)
@@ -121,7 +123,7 @@ def control_points_along(
     y = course.curves(timing, ends.ravel())[0].reshape(len(ends), 2, -1)
     means = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths)[:, None]
     means[is_point] = course.curves(timing, ends[is_point, 0])[1]
-    # Second moments of the means, and of control points beside their curve.
+    # Second moments of the means, and of control points relative to their curve.
     beside = half**2 / 6.0 + windows.var(axis=1) / (2.0 * max(degree - 2, 1))
     rates = _sharpen(means, places, half, beside)
     first = course.curves(timing, np.array([-delays[0]]))[0]
@@ -133,14 +135,14 @@ def control_points_along(
 def _sharpen(
     means: np.ndarray, places: np.ndarray, half: np.ndarray, beside: np.ndarray
 ) -> np.ndarray:
-    """Turn means of a curve, (w, c), over `half`, (w,), to both sides into control points of a spline that follows it.
+    """Turn means of a curve, (w, c), over `half`, (w,), to both sides, into control points of a spline along the curve.
 
-    The curve's second derivative, times `beside`, (w,), lies between. It is taken for the smallest one near by, and for
-    none where it changes its sign: so nothing swings beside a jump.
+    A mean and its control point differ by the curve's second derivative times `beside`, (w,). The smallest second
+    derivative close by is used, and zero where it changes its sign, so that nothing oscillates beside a jump.
     """
     widths = np.diff(places)[:, None]
     slopes = np.diff(means, axis=0) / widths
-    # Where means over different widths have the curve's slopes.
+    # Places at which the slopes of these means are the curve's slopes.
     taken = halfway(places) + np.diff(half**2) / (6.0 * widths[:, 0])
     bends = np.diff(slopes, axis=0) / np.diff(taken)[:, None]
     near = sliding_window_view(np.pad(bends, ((1, 1), (0, 0))), 3, axis=0)
@@ -162,7 +164,7 @@ def splines_along(
     t_end = timing.t_end + sum(delays)
     points = control_points_along(course, timing, knots, degree, delays)
     places = greville(knots, degree)
-    # Means of rates miss the curves by a little, which grows along the motion.
+    # Means of rates miss the curves by a small error that grows along the motion.
     count = 1 + (len(places) - degree) // _ANCHORED
     anchors = np.linspace(0.0, 1.0, count + 1)
     inner = np.clip(anchors * t_end - delays[0], 0.0, timing.t_end)
@@ -176,7 +178,7 @@ def splines_along(
 def _smoothly(
     anchors: np.ndarray, values: np.ndarray, places: np.ndarray
 ) -> np.ndarray:
-    """Interpolate values, (A, c), at anchors from 0 to 1, without a slope at the ends, at places, (P,)."""
+    """Interpolate values, (A, c), given at anchors from 0 to 1, at places, (P,), with zero slope at both ends."""
     knots = clamped_knots(3, anchors)
     slopes = collocation(knots, 3, np.array([0.0, 1.0]), 1)
     matrix = np.vstack([collocation(knots, 3, anchors), slopes])

@@ -1,8 +1,8 @@
-"""The nonlinear program of a task on a robot: a phase for every leg of the path, in the coordinates of a joint map.
+"""The nonlinear program of a task on a robot, with a phase for every leg of the path, in coordinates of a joint map.
 
-Where the arm stops, the phases on both sides have the same posture, which is free, and rest there. Where the tool's
-speed is given on one side, s and its derivatives are known there, and the redundant joints continue with as many
-derivatives: the links say so.
+Where the arm stops, the phases on both sides are at rest in the same posture, which is free. Where the tool's speed is
+given on one side, s and its derivatives are known there. Links make the redundant joints continue with the same number
+of derivatives.
 """
 
 from __future__ import annotations
@@ -23,21 +23,22 @@ from brachis.optimise.program import Link, Program
 from brachis.problem.problem import Problem
 
 _FOR_SPEEDS = 12
-"""Intervals of the first mesh of every phase, where a speed is given; with 20 plans took two to three times as long."""
+"""Number of intervals of the first mesh of every phase if a speed is given. With 20, plans took two to three times as
+long."""
 _END_INTERVAL = 0.2
-"""Longest interval, s, next to the end of a phase whose time is given: joints come there from a motion that is as fast
-as possible, and go on to one. With 0.1 end times of ten lines were the same; with 0.4 some plans took twice as long,
+"""Longest interval, s, next to an end of a phase with a given time. There the joints enter from, or leave for, a motion
+that is as fast as possible. With 0.1 the end times of ten lines were the same; with 0.4 some plans took twice as long,
 and with even intervals one of the ten failed."""
 
 
 def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:
-    """Write the NLP of a decomposition down, over even knot intervals, shorter ones where a given speed ends.
+    """Set up the NLP of a decomposition over even knot intervals, with shorter ones at the ends of a given speed.
 
     Parameters
     ----------
     problem : Problem
     joint_maps : sequence of JointMap
-        One for each leg, beginning at, or near, the posture there.
+        One joint map for each leg, starting at, or close to, the posture at the leg's beginning.
 
     Returns
     -------
@@ -56,14 +57,14 @@ def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:
 
 
 def _halve_at_ends(breaks: np.ndarray, duration: float) -> np.ndarray:
-    """Halve the first and the last interval of a phase, (N + 1,), until they are short enough.
+    """Halve the first and the last interval of a phase until they are short enough.
 
     Parameters
     ----------
     breaks : (N + 1,) ndarray
-        In normalised time.
+        Ends of the intervals in normalised time.
     duration : float
-        Of the phase, s.
+        Duration of the phase, s.
     """
     halvings = np.ceil(np.log2(breaks[1] * duration / _END_INTERVAL))
     added = breaks[1] * 0.5 ** np.arange(halvings, 0.0, -1.0)
@@ -73,12 +74,12 @@ def _halve_at_ends(breaks: np.ndarray, duration: float) -> np.ndarray:
 def program_over(
     problem: Problem, joint_maps: Sequence[JointMap], grids: Sequence[FixedGrid]
 ) -> Program:
-    """Write the NLP down as `program_of` does, over a grid for each phase.
+    """Set up the NLP as `program_of` does, over a given grid for each phase.
 
     Raises
     ------
     UnreachableError
-        A periodic motion is asked for in coordinates that do not close with the path.
+        The motion is to be periodic, but the coordinates do not close with the path.
     """
     is_periodic = problem.task.boundary.periodic
     first = joint_maps[0]
@@ -97,7 +98,7 @@ def program_over(
 def maps_by_leg(
     problem: Problem, joint_map: JointMap, starts: np.ndarray
 ) -> list[JointMap]:
-    """Take a map of the whole path leg by leg, from the postures, (legs, n), at which these begin."""
+    """Divide a map of the whole path into maps of the legs, from the postures, (legs, n), at which the legs begin."""
     if len(problem.legs) == 1:
         return [joint_map]
     pairs = zip(problem.leg_paths, starts, strict=True)
@@ -105,7 +106,7 @@ def maps_by_leg(
 
 
 def boundary_of(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
-    """Write the boundary conditions of a leg, by its number, in the coordinates of a joint map."""
+    """Set up the boundary conditions of leg `number` in the coordinates of a joint map."""
     leg = problem.legs[number]
     last = len(problem.legs) - 1
     is_periodic = problem.task.boundary.periodic
@@ -128,7 +129,7 @@ def boundary_of(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
 
 
 def _is_at_rest(problem: Problem, number: int, side: int) -> bool:
-    """Tell whether the arm rests at the beginning (side 0) or end (-1) of a leg."""
+    """Tell whether the arm is at rest at the beginning (side 0) or end (-1) of a leg."""
     before = number - 1 if side == 0 else number
     if 0 <= before < len(problem.legs) - 1:
         return problem.legs[before].stops
@@ -136,7 +137,7 @@ def _is_at_rest(problem: Problem, number: int, side: int) -> bool:
 
 
 def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
-    """Time derivatives of s that are given at the beginning (side 0) or end (-1) of a leg; empty where free."""
+    """Return the given time derivatives of s at the beginning (side 0) or end (-1) of a leg; empty if free."""
     if _is_at_rest(problem, number, side):
         return np.zeros(problem.task.spline.vanishing)
     beside = problem.leg_beside(number, side)
@@ -152,7 +153,7 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
 
 
 def derivatives_in_motion(problem: Problem) -> int:
-    """Return how many derivatives continue from phase to phase in motion: up to the jerk where a limit asks for it."""
+    """Return how many derivatives continue between phases in motion: up to the jerk if a limit depends on it."""
     order = max((limit.order for limit in problem.limits), default=2)
     return min(order, problem.task.spline.degree - 1)
 
@@ -168,7 +169,7 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
     if not problem.task.boundary.periodic or not (last or has_law):
         return
     if redundant:
-        # A start posture that is given fixes both ends.
+        # A given start posture fixes both ends.
         orders = in_motion if problem.start is None else in_motion[1:]
         yield Link(last, 0, redundant, orders)
     if not has_law:
@@ -176,9 +177,9 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
 
 
 def breaks_of(problem: Problem) -> np.ndarray:
-    """Return the ends of a phase's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
+    """Return the ends, (N + 1,), of a phase's uniform intervals; for "auto", those of the first mesh."""
     count = problem.task.spline.intervals
     if count == "auto":
-        # The way to a given speed may be short: over few intervals no motion reaches it.
+        # The distance up to a given speed may be short, and over few intervals no motion reaches that speed.
         count = _FOR_SPEEDS if any(problem.time_laws) else COARSE_INTERVALS
     return np.linspace(0.0, 1.0, count + 1)

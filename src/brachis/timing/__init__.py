@@ -1,4 +1,4 @@
-"""The fastest timing of a joint path that is given: the phase plane."""
+"""The fastest timing of a given joint path, found in the phase plane."""
 
 from brachis.timing.course import Course, TimedCourse
 from brachis.timing.gap import SlowTimingWarning, TimingGap, find_timing_gap

@@ -1,4 +1,4 @@
-"""The curves y(p) of a joint map along a path parameter, and the fastest timing of the joint path that they make."""
+"""The curves y(p) of a joint map along a path parameter, and the fastest timing of the joint path that they define."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from brachis.timing.phase_plane import AGREEMENT, PhasePlane
 
 @dataclass(frozen=True)
 class Course:
-    """Curves of a joint map at stations, with their derivatives by a path parameter p.
+    """Curves of a joint map at stations, with their derivatives with respect to a path parameter p.
 
     Attributes
     ----------
     p : (P,) ndarray
-        For example the time of a known motion, s.
+        Path parameter, for example the time of a known motion, s.
     y, y_dp, y_ddp : (P, c) ndarray
     """
 
@@ -34,18 +34,18 @@ class Course:
 
     @classmethod
     def through(cls, curves: np.ndarray, s: np.ndarray) -> Course:
-        """Lay cubic splines through curves, (S, c), the first of them the path coordinate, and take them at s, (P,)."""
+        """Evaluate cubic splines through curves, (S, c), of which the first is the path coordinate, at s, (P,)."""
         spline = Spline.through(curves[:, 0], curves[:, 1:])
         return cls.over_path(s, [spline(s, nu) for nu in range(3)])
 
     @classmethod
     def over_path(cls, s: np.ndarray, other_curves: Iterable[np.ndarray]) -> Course:
-        """Join path coordinates, (P,), and other curves with two derivatives by these, (3, P, c - 1)."""
-        s_orders = (s, np.ones_like(s), np.zeros_like(s))  # s and its derivatives by s
+        """Combine path coordinates, (P,), with other curves and their two derivatives in s, (3, P, c - 1)."""
+        s_orders = (s, np.ones_like(s), np.zeros_like(s))  # s, ds/ds, d2s/ds2
         return cls(s, *map(np.column_stack, zip(s_orders, other_curves, strict=True)))
 
     def state(self, joint_map: JointMap) -> JointState:
-        """Joint motion at the stations if p is the time; raises UnreachableError where the joint map has no posture."""
+        """Return joint states at the stations, with p as the time; raise UnreachableError where there is no posture."""
         still = np.zeros_like(self.y)
         t = self.p - self.p[0]
         return joint_map.state(self.y, self.y_dp, self.y_ddp, still, t=t)
@@ -58,19 +58,19 @@ class TimedCourse:
     ----------
     course : Course
     joint_map : JointMap
-        Of its curves.
+        Joint map of the curves.
     limits : sequence of Limit
     rate : (P,) ndarray, optional
-        About how fast the parameter of the course will grow at its stations, 1/s.
+        Estimate of the rate of the course's parameter at its stations, 1/s.
 
     Attributes
     ----------
     path : JointPath
-        By its length, at the stations at which the joints move.
+        The joint path, with its length as the parameter, at the stations at which the joints move.
     places : (P',) ndarray
-        Values of the parameter of the course at these.
+        Values of the course's parameter at these stations.
     speeds : (P,) ndarray
-        How fast its length grows with the parameter of the course, at all stations of this.
+        Derivative of the path's length with respect to the course's parameter, at all stations of the course.
 
     Raises
     ------
@@ -96,7 +96,8 @@ class TimedCourse:
             by_length = speeds * np.interp(places, course.p, rate)
         self._plane = PhasePlane(limits, self.path, by_length)
         y_dp = interpolate_columns(places, course.p, course.y_dp)
-        # Where the joints stand still slopes are those of the station behind it, or before the end.
+        # Where the joints stand still, use the slopes of the next station at which they move, or of the last such
+        # station.
         moving = np.flatnonzero(speeds > 0.0)
         behind = np.searchsorted(moving, np.arange(len(speeds)))
         beside = moving[behind.clip(max=len(moving) - 1)]
@@ -109,12 +110,12 @@ class TimedCourse:
         narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
         agreement: float = AGREEMENT,
     ) -> Timing | None:
-        """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane`."""
+        """Find the fastest timing with given rates of the path's length at both ends, 1/s; see `PhasePlane`."""
         self._plane.narrow(narrower)
         return self._plane.solve(rates, agreement)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Curves and their rates, (K, c), at times (K,), s: cubics between stations, lines beyond the ends."""
+        """Return curves and their rates, (K, c), at times, (K,), s: cubic between stations, linear beyond the ends."""
         beyond = t - np.clip(t, 0.0, timing.t_end)
         t = t - beyond
         i = np.searchsorted(timing.times, t, side="right") - 1
@@ -138,6 +139,6 @@ class TimedCourse:
         return y + ydot * beyond[:, None], ydot
 
     def accelerations(self, timing: Timing) -> np.ndarray:
-        """Joint accelerations half-way between the stations, (P - 1, n), each as what it takes of a limit."""
+        """Return joint accelerations midway between the stations, (P - 1, n), each as a fraction of a limit."""
         motion = Passage(self.path.middles(), timing.middle_rate, timing.acceleration)
         return motion.qddot * self._plane.weights

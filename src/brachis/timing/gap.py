@@ -1,4 +1,4 @@
-"""The timing gap: by how much another timing of a motion's own joint path could be faster."""
+"""The timing gap: how much faster a motion's own joint path could be travelled."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from brachis.timing.phase_plane import PhasePlane, is_left_out
 from brachis.trajectory import MotionPhase, Trajectory
 
 PLACES = 2000
-"""Places at which the joint path of a motion is timed, no fewer."""
+"""Minimum number of places at which the joint path of a motion is timed."""
 _LEAST_PLACES = 4
-"""Places in every knot interval, about."""
+"""Approximate number of places in each knot interval."""
 _MOST_PLACES = 40_000
-"""Places for all of these, about."""
+"""Approximate maximum number of places in all knot intervals together."""
 WORTH_A_WARNING = 0.02
-"""Gap from which on a plan warns."""
+"""Gap above which a plan gives a warning."""
 _STILL = 1e-9
-"""Part of the largest speed below which a phase begins or ends at rest."""
+"""Fraction of the largest speed below which a phase is taken to begin or end at rest."""
 _SHARE = 0.8
-"""Part of the lost time that lies in the s-interval that is named."""
+"""Fraction of the lost time that lies in the s-interval that the message names."""
 _EVERYWHERE = 0.7
-"""Length of an s-interval from which on it is not named: the time is lost along the whole path."""
+"""Length of an s-interval from which it is not named, because the time is lost along the whole path."""
 
 
 class SlowTimingWarning(BrachisWarning):
     """Another timing of the same joint path is much faster than the plan.
 
-    The message says how much, where on the path the time is lost, and what would do. The same stands in
-    ``result.warnings``, and the figures in ``result.timing_gap``.
+    The message says by how much, where on the path the time is lost, and what would help. It is also in
+    ``result.warnings``, and the figures are in ``result.timing_gap``.
 
     Examples
     --------
@@ -55,20 +55,21 @@ class SlowTimingWarning(BrachisWarning):
 
 @dataclass(frozen=True, repr=False)
 class TimingGap(Summary):
-    """A motion beside the fastest timing of its own joint path.
+    """A motion compared with the fastest timing of its own joint path.
 
     Attributes
     ----------
     t_end : float
-        Of the motion, s.
+        End time of the motion, s.
     least_time : float
-        Of its joint path, s: between the same speeds at the ends of its phases, with accelerations that may jump.
+        Shortest time for its joint path, s, with the same speeds at the ends of its phases, and accelerations that may
+        jump.
     places : int
-        Places of the grid on which that is known.
+        Number of grid places for which the least time was computed.
     left_out : tuple of str
-        Kinds of the limits that the least time leaves out: it is a bound then.
+        Kinds of the limits that the least time leaves out. If there are any, the least time is only a lower bound.
     s_interval : tuple of float
-        Shortest part of the path on which four fifths of the difference are lost.
+        Shortest interval of the path in which four fifths of the difference are lost.
     """
 
     t_end: float
@@ -79,11 +80,11 @@ class TimingGap(Summary):
 
     @property
     def gap(self) -> float:
-        """How much longer the motion takes, as a fraction of the least time."""
+        """Extra time that the motion takes, as a fraction of the least time."""
         return self.t_end / self.least_time - 1.0
 
     def __str__(self) -> str:
-        """Say how much faster another timing could be."""
+        """Return a sentence that says how much faster another timing could be."""
         saved = 100.0 * max(1.0 - self.least_time / self.t_end, 0.0)
         without = ""
         if self.left_out:
@@ -95,7 +96,7 @@ class TimingGap(Summary):
         )
 
     def issues(self, *, has_fixed_intervals: bool) -> tuple[Issue, ...]:
-        """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
+        """Say where time is lost and what would help; return nothing if the gap is small, or is only a bound."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
         low, high = (round(s, 4) for s in self.s_interval)
@@ -107,15 +108,15 @@ class TimingGap(Summary):
         if has_fixed_intervals:
             advice = "set spline.intervals: auto, or a larger number"
         message = (
-            f"the same joint path can be passed in {self.least_time:.4g} s, {saved:.1f} % faster; the motion loses "
-            f"this time {where}; for a faster motion, {advice}"
+            f"the same joint path can be passed in {self.least_time:.4g} s, which is {saved:.1f} % faster; the motion "
+            f"loses this time {where}; for a faster motion, {advice}"
         )
         motion_text = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
         return (Issue("spline.intervals", message, motion_text, usual),)
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
+        """Return the figures shown to the user."""
         return {"t_end": f"{self.t_end:.4f} s", "timing": str(self)}
 
     def to_dict(self) -> dict[str, Any]:
@@ -134,13 +135,13 @@ def find_timing_gap(
 ) -> TimingGap | None:
     """Compare a motion with the fastest timing of its own joint path.
 
-    Phases of given speed, and pauses, take as long as they do.
+    Phases of given speed and pauses count with their own durations.
 
     Parameters
     ----------
     trajectory : Trajectory
     limits : sequence of Limit
-        Of its task.
+        Limits of the trajectory's task.
 
     Returns
     -------
@@ -174,11 +175,11 @@ def _time_phase(
     intervals: int,
     limits: Sequence[Limit],
 ) -> tuple[JointPath, np.ndarray, np.ndarray] | None:
-    """Stations of a phase's joint path, when the motion passes them, and when the fastest timing does, (P,), s."""
+    """Return a phase's joint path, and the times, (P,), s, of the motion and of the fastest timing at its stations."""
     count = max(PLACES, min(_LEAST_PLACES * intervals, _MOST_PLACES))
     ends = np.unique(np.clip(trajectory.times, phase.begin, phase.end))
     ends = ends[np.append(np.diff(ends) > _STILL * phase.duration, True)]
-    # Of very many nodes not all.
+    # Of very many nodes, use only some.
     ends = np.append(ends[: -1 : -(-len(ends) // count)], ends[-1])
     steps = np.ceil(count * np.diff(ends) / phase.duration).astype(int)
     t = spread(ends, steps)
@@ -196,7 +197,7 @@ def _time_phase(
 
 
 def _narrowest(s: np.ndarray, lost: np.ndarray) -> tuple[float, float]:
-    """Shortest part of the path, (P,), on which most of the time, (P,), is lost."""
+    """Find the shortest interval of s, (P,), in which most of the lost time, (P,), is lost."""
     total = np.append(0.0, np.cumsum(np.maximum(lost, 0.0)))
     if np.isnan(s).any() or not total[-1] > 0.0:
         return 0.0, 1.0

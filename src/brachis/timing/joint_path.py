@@ -1,8 +1,9 @@
-"""A joint path q(p) at stations, with its first and second derivatives by the path parameter p.
+"""A joint path q(p) at stations, with its first and second derivatives with respect to the path parameter p.
 
 The parameter may be the path coordinate s, the time of a known motion, or the length of the joint path. The least time
-does not depend on which it is. By its length a path is regular where a motion along it starts from rest: there both s
-and q depend on time by powers, and derivatives by time vanish.
+does not depend on this choice. With its length as the parameter, a path is regular where a motion along it starts from
+rest. With time as the parameter it is not, because there both s and q grow with powers of time, and their derivatives
+vanish.
 """
 
 from __future__ import annotations
@@ -16,27 +17,28 @@ from brachis.kernel import Spline
 from brachis.robot.dynamics import SharedTorques
 
 _STANDING = 1e-7
-"""Part of the largest speed below which a motion is taken to stand still."""
+"""Fraction of the largest speed below which a motion is taken to stand still."""
 
 
 _SHORTEST = 1e-13
-"""Shortest step between stations, as a part of the path."""
+"""Shortest step between stations, as a fraction of the path."""
 _TURN = 0.02
-"""Largest change of a unit tangent between stations, rad: a path that turns may speed up or brake at once."""
+"""Largest change of a unit tangent between stations, rad. Where a path turns, the motion may speed up or brake at
+once."""
 _MOST_PARTS = 64
-"""Parts of one step, no more."""
+"""Maximum number of parts of one step."""
 _CORNER = 1.9
-"""Change of a unit tangent from one station to the next from which on it reverses, as at a cusp: the arm stands. On
-coarse stations a path that passes a branch boundary turns by up to 1.5; a reversal is 2."""
+"""Change of a unit tangent between two stations above which the tangent reverses, as at a cusp, and the arm stops. With
+coarse stations a path that passes a branch boundary changes by up to 1.5; a reversal is 2."""
 
 
 def halfway(values: np.ndarray) -> np.ndarray:
-    """Means of neighbours, (P - 1, ...), of values at stations, (P, ...)."""
+    """Return means of neighbouring values, (P - 1, ...), from values at stations, (P, ...)."""
     return np.asarray(0.5 * (values[1:] + values[:-1]))
 
 
 def to_stations(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Interpolate values known half-way between stations, (P - 1, c), at these, (P, c); steps are (P - 1, 1)."""
+    """Interpolate values midway between stations, (P - 1, c), to the stations, (P, c); `steps` are (P - 1, 1)."""
     share = steps[1:] / (steps[1:] + steps[:-1])
     with np.errstate(invalid="ignore"):
         between = share * values[:-1] + (1.0 - share) * values[1:]
@@ -44,9 +46,9 @@ def to_stations(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 
 def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
-    """Divide the steps between stations p, (P,), in which a joint path turns, by its derivatives there, (P, n).
+    """Divide the steps between stations p, (P,), in which a joint path turns, given its derivatives there, (P, n).
 
-    So are those in which its speed changes several times over, as beside a cusp.
+    Steps in which the speed changes by a large factor, as beside a cusp, are divided too.
     """
     speed = np.linalg.norm(q_dp, axis=1)[:, None]
     tangent = np.divide(q_dp, speed, out=np.zeros_like(q_dp), where=speed > 0.0)
@@ -71,9 +73,9 @@ class JointPath:
     s : (P,) ndarray
         Path coordinate of the tool; NaN without a path.
     q, q_dp, q_ddp : (P, n) ndarray
-        Postures, rad or m, and their derivatives by p.
+        Postures, rad or m, and their derivatives with respect to p.
     stops : (k,) int ndarray
-        Numbers of the stations at which dp/dt is zero: those before and behind a corner.
+        Indices of the stations at which dp/dt is zero: those just before and after a corner.
     """
 
     p: np.ndarray
@@ -85,19 +87,20 @@ class JointPath:
 
     @classmethod
     def through(cls, s: np.ndarray, q: np.ndarray) -> JointPath:
-        """Lay cubic splines through postures, (P, n), at path coordinates, (P,)."""
+        """Build a joint path from cubic splines through postures, (P, n), at path coordinates, (P,)."""
         spline = Spline.through(s, q)
         return cls(s, s, q, spline(s, 1), spline(s, 2))
 
     def by_length(self) -> tuple[JointPath, np.ndarray]:
-        """Measure the path by its length in place of p.
+        """Return the path with its length as the parameter in place of p.
 
         Returns
         -------
         path : JointPath
-            Without the stations at which q does not change with p, but with both ends, and with two at each corner.
+            The path without stations at which q does not change with p, except both ends, and with two stations at each
+            corner.
         places : (P',) ndarray
-            Values of p at its stations.
+            Values of p at the stations of the new path.
         """
         speed = np.linalg.norm(self.q_dp, axis=1)
         moves = speed > _STANDING * speed.max()
@@ -123,17 +126,17 @@ class JointPath:
         stops = sides + 1 + 2 * np.arange(len(corners))[:, None]
         places = self.p[index][numbers]
         speed = speed[numbers]
-        # The speed falls to zero and rises again, both evenly.
+        # The speed falls linearly to zero, and rises linearly again.
         ends = places[stops]
         shares = speed[stops] / speed[stops].sum(axis=1, keepdims=True)
         places[stops] = np.sum(ends * shares[:, ::-1], axis=1, keepdims=True)
         speed[stops] = 0.0
         along = along[numbers]
-        # The integral of the speed, by its values and slopes at the stations.
+        # Integrate the speed from its values and slopes at the stations.
         step = np.diff(places)
         lengths = step * halfway(speed)
         lengths += step**2 / 12.0 * (along[:-1] - along[1:])
-        # Stations of their own, also where a path all but stands still.
+        # Keep stations apart, even where a path hardly moves.
         lengths = np.maximum(lengths, _SHORTEST * lengths.sum())
         length = np.append(0.0, np.cumsum(lengths))
         path = JointPath(
@@ -147,7 +150,7 @@ class JointPath:
         return path, places
 
     def middles(self) -> JointPath:
-        """Take the path half-way between its stations, by cubics between these."""
+        """Evaluate the path midway between its stations, by cubic interpolation."""
         steps = np.diff(self.p)[:, None]
         arrays = (self.p, self.s, self.q, self.q_dp, self.q_ddp)
         p, s, q, q_dp, q_ddp = map(halfway, arrays)
@@ -157,7 +160,7 @@ class JointPath:
 
 
 class Passage(SharedTorques):
-    """The motion that passes the stations of a joint path; limits take it as it is.
+    """The motion at the stations of a joint path, in the form that limits evaluate.
 
     Parameters
     ----------
@@ -180,7 +183,7 @@ class Passage(SharedTorques):
 
 @dataclass(frozen=True)
 class Timing:
-    """When the stations of a joint path are passed.
+    """The times at which the stations of a joint path are passed.
 
     Attributes
     ----------
@@ -190,9 +193,10 @@ class Timing:
     acceleration : (P - 1,) ndarray
         Mean d2p/dt2 between the stations, 1/s^2.
     jerk : (P - 1,) ndarray
-        d3p/dt3 there, 1/s^3: as much as it changes smoothly. Accelerations that jump do so at stations.
+        d3p/dt3 between the stations, 1/s^3, for smooth changes of the acceleration. Jumps of the acceleration are at
+        stations.
     times : (P,) ndarray
-        From 0 on, s.
+        Times at the stations, beginning at 0, s.
     """
 
     path: JointPath
@@ -203,12 +207,12 @@ class Timing:
 
     @classmethod
     def of(cls, path: JointPath, rate: np.ndarray) -> Timing:
-        """Integrate a rate, (P,), known at the stations."""
+        """Integrate a rate, (P,), given at the stations."""
         steps = np.diff(path.p)
         mean = halfway(rate)
         durations = steps / mean
         acceleration = np.diff(rate) / durations
-        # The smaller slope of both sides: none beside a jump.
+        # Take the smaller slope of the two sides, so that there is none beside a jump.
         slopes = np.pad(np.diff(acceleration) / halfway(durations), 1)
         smaller = np.minimum(np.abs(slopes[1:]), np.abs(slopes[:-1]))
         max_jerk = np.abs(acceleration) / durations
@@ -228,5 +232,5 @@ class Timing:
 
     @property
     def middle_rate(self) -> np.ndarray:
-        """dp/dt half-way between the stations, (P - 1,), 1/s."""
+        """dp/dt midway between the stations, (P - 1,), 1/s."""
         return np.sqrt(halfway(self.rate**2))

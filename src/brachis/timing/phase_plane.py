@@ -1,22 +1,23 @@
-"""The fastest timing of a joint path: the phase plane of the path parameter p and its rate dp/dt.
+"""The fastest timing of a joint path, found in the phase plane of the path parameter p and its rate dp/dt.
 
-With u = d2p/dt2 and x = (dp/dt)^2 the motion along q(p) is
+With u = d2p/dt2 and x = (dp/dt)^2, the motion along q(p) is
 
     qdot = q_dp sqrt(x),        qddot = q_dp u + q_ddp x,        dx/dp = 2 u.
 
-Every limit on velocities, accelerations and torques is a row in (u, x) half-way between stations,
+Every limit on velocities, accelerations and torques becomes a row in (u, x) midway between stations,
 
     lower <= a u + b x + c <= upper,        a = v_a q_dp,   b = v_a q_ddp + v_v q_dp / (2 sqrt(x)),
 
-where v_v and v_a are the partial derivatives of its value by qdot and qddot. For rigid bodies and for accelerations the
-rows are exact. Friction, torque that falls with speed, power and the size of the tool's acceleration are linearised at
-the last timing, again and again until the rows agree with the values. A limit without acceleration bounds x alone.
+where v_v and v_a are the partial derivatives of its value with respect to qdot and qddot. For torques of rigid bodies
+and for accelerations the rows are exact. Friction, torque that falls with speed, power and the magnitude of the tool's
+acceleration are linearised at the last timing. This is repeated until the rows agree with the values. A limit that does
+not depend on acceleration bounds only x.
 
-Between two stations u is constant and x is linear in p, and the rows half-way between them hold. Backwards from the
-end, the interval of x is kept from which the next station's interval can be reached; forwards, the largest u is taken
-(Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
+Between two stations u is constant and x is linear in p, and the rows are met midway between them. A backward pass from
+the end finds, at each station, the interval of x from which the next station's interval can be reached. A forward pass
+then takes the largest u (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
 
-Limits on the third derivative and on means have no such rows, and are left out: without them the time is a bound.
+Limits on the third derivative and on means have no such rows and are left out. The time is then a lower bound.
 """
 
 from __future__ import annotations
@@ -34,48 +35,49 @@ from brachis.limits import Limit
 from brachis.timing.joint_path import JointPath, Passage, Timing, halfway, to_stations
 
 _TINY = 1e-9
-"""Coefficients and slopes below this are taken for zero."""
+"""Magnitude of coefficients and slopes below which they are treated as zero."""
 _ROUNDING = 1e-6
-"""Part of (dp/dt)^2 at the ends by which rounding may exceed a limit."""
+"""Fraction of (dp/dt)^2 at the ends by which rounding may exceed a limit."""
 _SLOWEST = 1e-3
-"""Part of the median rate below which rows are not linearised."""
+"""Lowest rate at which rows are linearised, as a fraction of the median rate."""
 _STOPPED = 1e-6
-"""Part of the median rate below which no station but the ends is passed."""
+"""Lowest rate at the stations between the ends, as a fraction of the median rate."""
 _ROUNDS = 20
-"""Linearisations, no more."""
+"""Maximum number of linearisations."""
 _EXACT = 1e-9
-"""Largest difference of rows from values, as a part of the limit, with which rows stay: it is rounding."""
+"""Largest difference between rows and values, as a fraction of the limit, that is due to rounding. Such rows are
+kept."""
 _LOOKS_AT_END = 4
-"""Linearisations for the largest rate at an end."""
+"""Maximum number of linearisations for the largest rate at an end."""
 _CREDIBLE = 1e-2
-"""Difference of rows from values, as a part of the limit, above which a timing is not believed."""
+"""Difference between rows and values, as a fraction of the limit, above which a timing is rejected."""
 AGREEMENT = 1e-6
-"""Change of the time, as a part of it, with which linearisations end, unless stated."""
+"""Relative change of the time with which linearisations end by default."""
 _AT_ONCE = 2048
-"""Steps whose bounds are found together: their rows stay in the processor's cache."""
+"""Number of steps whose bounds are found together: their rows stay in the processor's cache."""
 _HELD_BACK = 0.8
-"""Part of what a limit leaves at rest that may be taken."""
+"""Largest fraction of a limit's remaining range at rest by which it may be narrowed."""
 
 
 Narrower = np.ndarray | float
-"""By how much the bounds of a limit are nearer, (P, c); or its lower and its upper ones, (2, P, c)."""
+"""Amount by which both bounds of a limit move inwards, (P, c), or its lower and its upper bounds, (2, P, c)."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """A limit as a block of rows: lower <= a u + b x <= upper at every station, or largest x if it has no acceleration.
+    """A limit as a block of rows: lower <= a u + b x <= upper at every place, or a largest x if a is missing.
 
     Attributes
     ----------
     limit : Limit
     by_u : (P, c) ndarray or None
-        a; None without acceleration.
+        The coefficients a; None if the limit does not depend on acceleration.
     by_x : (P, c) ndarray
-        b; without acceleration the slope by dp/dt.
+        The coefficients b; without acceleration, the slope with respect to dp/dt.
     constant : (P, c) ndarray
         The value at u = x = 0.
     lower, upper : (P, c) ndarray
-        Bounds; without acceleration of x.
+        Bounds of the rows; without acceleration, bounds on x.
     """
 
     limit: Limit
@@ -87,7 +89,7 @@ class _Rows:
 
     @classmethod
     def of(cls, limit: Limit, path: JointPath, motion: Passage) -> _Rows:
-        """Linearise a limit at a motion; bounds are not set."""
+        """Linearise a limit at a motion, without setting bounds."""
         partials = limit.partials(motion)
         constant = limit.values(motion)
         rate = motion.rate[:, None]
@@ -104,7 +106,7 @@ class _Rows:
         return cls(limit, by_u, by_x, constant, constant, constant)
 
     def within(self, narrower: Narrower) -> _Rows:
-        """Set bounds, nearer than those of the limit."""
+        """Return the rows with bounds narrower than those of the limit."""
         below, above = np.broadcast_to(narrower, (2, *self.constant.shape))
         lower = self.limit.lower + below - self.constant
         upper = self.limit.upper - above - self.constant
@@ -118,17 +120,17 @@ class _Rows:
         return replace(self, lower=lower, upper=upper)
 
     def is_tangent_below(self, motion: Passage) -> bool:
-        """Tell whether the rows, from another motion, may be kept: those of sizes of vectors, which are convex."""
+        """Tell whether rows from another motion stay valid: those of magnitudes of vectors, which are convex."""
         if self.by_u is None or np.isfinite(self.limit.lower).any():
             return False
         return bool((self._excess(motion) <= _TINY).all())
 
     def error(self, motion: Passage) -> float:
-        """How far the rows are from the values along a motion."""
+        """Return the largest difference between the rows and the values along a motion."""
         return float(np.abs(self._excess(motion)).max(initial=0.0))
 
     def _excess(self, motion: Passage) -> np.ndarray:
-        """How much larger values are by the rows than by the limit along a motion, (P, c)."""
+        """Return by how much the rows exceed the limit's values along a motion, (P, c)."""
         rate = motion.rate[:, None]
         if self.by_u is None:
             values = self.by_x * rate
@@ -144,10 +146,10 @@ class PhasePlane:
     ----------
     limits : sequence of Limit
     path : JointPath
-        At least three stations.
+        Joint path with at least three stations.
     rate : (P,) ndarray, optional
-        Estimate of dp/dt at the stations, 1/s. The limits are first linearised there. Default: constant; the path takes
-        1 s.
+        Estimate of dp/dt at the stations, 1/s, at which the limits are first linearised. By default it is constant, and
+        the path takes 1 s.
     """
 
     def __init__(
@@ -173,14 +175,14 @@ class PhasePlane:
         self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
     def _linearise(self, motion: Passage, agreeing: Sequence[_Rows] = ()) -> None:
-        """Write the limits at a motion half-way between the stations as rows, and these as bounds.
+        """Linearise the limits at a motion midway between the stations, and derive bounds from the rows.
 
         Parameters
         ----------
         motion : Passage
-            Half-way between the stations.
+            Motion midway between the stations.
         agreeing : sequence of _Rows, optional
-            Those of the last linearisation that agree with the limits at the motion.
+            Rows of the last linearisation that agree with the limits at the motion.
         """
         known = {block.limit: block for block in agreeing}
         rows = [
@@ -214,7 +216,7 @@ class PhasePlane:
     def _set_bounds(
         self, rows: Sequence[_Rows], changed: np.ndarray | None = None
     ) -> None:
-        """Find the bounds on u and x that rows set; they stay where no step beside is `changed`, (P - 1,) bool."""
+        """Find the bounds on u and x from rows; they are kept where no adjacent step is `changed`, (P - 1,) bool."""
         self._sloped = [block for block in rows if block.by_u is not None]
         ordered = self._sloped + [block for block in rows if block.by_u is None]
         labels = [str(label) for block in ordered for label in block.limit.labels]
@@ -228,13 +230,13 @@ class PhasePlane:
         self._labels = labels
         for begin in range(0, count, _AT_ONCE):
             end = min(begin + _AT_ONCE, count)
-            # A step bounds x at both its ends.
+            # A step bounds x at both of its ends.
             if changed[max(begin - 1, 0) : end].any():
                 self._set_part(begin, end)
         self._ceiling[self.path.stops] = 0.0
 
     def _stack(self, steps: slice) -> tuple[np.ndarray, ...]:
-        """Put a, b and the bounds of rows with acceleration side by side in some steps, (S, c) each."""
+        """Stack a, b and the bounds of rows with acceleration side by side for some steps, (S, c) each."""
         blank = [np.empty((len(self._steps[steps]), 0))]
         return tuple(
             np.hstack(
@@ -244,19 +246,19 @@ class PhasePlane:
         )
 
     def _set_part(self, begin: int, end: int) -> None:
-        """Find the bounds in steps, and at the stations where these begin; at the last station with the last step."""
+        """Find the bounds in steps and at the stations where these begin; the last step includes the last station."""
         first = max(begin - 1, 0)
         steps = self._steps[first:end, None]
         a, b, low, high = self._stack(slice(first, end))
         chunk = slice(begin, end)
         inside = slice(begin - first, None)
-        # Half-way x is x + step u, seen from the station before, and x + 2 step u is x at the next station.
+        # Midway, x is x + step u, seen from the station before; x at the next station is x + 2 step u.
         lines = _as_lines(a + steps * b, b, low, high)
         self._next[:, chunk] = 2.0 * steps[inside] * np.array(lines)[:, inside]
         self._next[0, chunk] += 1.0
         floor, ceiling = kernel.bounds_of_pairs(*lines, _TINY)
         self._floor[chunk] = floor[inside]
-        # The rows at the stations themselves keep u from swinging between its neighbours.
+        # The rows at the stations themselves keep u from oscillating between neighbouring steps.
         lines = _as_lines(*(to_stations(term, steps) for term in (a, b, low, high)))
         at_stations = kernel.bounds_of_pairs(*lines, _TINY)[1]
         last = end + 1 if end == len(self._steps) else end
@@ -267,7 +269,7 @@ class PhasePlane:
         self._ceiling[stations] = np.min(ceilings, axis=0)
 
     def _set_levels(self) -> None:
-        """Find the largest x at the stations, (P, c), by limits without acceleration."""
+        """Find the largest x at the stations, (P, c), from limits without acceleration."""
         levels = [np.empty((len(self.path.p), 0))]
         for block in self._level_rows:
             narrower: Narrower = 0.0
@@ -280,15 +282,15 @@ class PhasePlane:
         self._levels = np.hstack(levels)
 
     def narrow(self, narrower: Mapping[Limit, np.ndarray]) -> None:
-        """Bring the bounds of limits nearer half-way between the stations.
+        """Narrow the bounds of limits midway between the stations.
 
-        Where the arm can hold a posture at rest, it still can.
+        Postures in which the arm can stay at rest remain possible.
 
         Parameters
         ----------
         narrower : mapping of Limit to (P - 1, c) ndarray
-            Or (2, P - 1, c): for the lower and for the upper bounds. Negative numbers move them outwards. Limits that
-            are missing keep their bounds.
+            Amounts; shape (2, P - 1, c) for separate lower and upper bounds. Negative numbers move bounds outwards.
+            Limits that are missing keep their bounds.
         """
         if not (narrower or self._narrower):
             return
@@ -315,7 +317,7 @@ class PhasePlane:
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Largest part of a limit that a unit of each joint's acceleration takes on most of the path, (n,)."""
+        """Largest fraction of a limit that a unit of each joint's acceleration uses on most of the path, (n,)."""
         weights = [np.zeros(self.path.q.shape[1])]
         for limit in self._limits:
             by_qddot = limit.partials(self._motion).qddot
@@ -326,10 +328,10 @@ class PhasePlane:
     def solve(
         self, rates: tuple[float, float] = (0.0, 0.0), agreement: float = AGREEMENT
     ) -> Timing | None:
-        """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed.
+        """Find the fastest timing with dp/dt given at both ends, 1/s; return None if the joint path cannot be followed.
 
-        An infinite rate leaves it free: the fastest timing of all. Linearisations end when they change the time, or
-        differ from the limits, by no more than a part of these, `agreement`.
+        An infinite rate leaves dp/dt free at that end, which gives the fastest timing of all. Linearisations end when
+        the time changes, or the rows differ from the limits, by no more than a fraction `agreement`.
         """
         best: Timing | None = None
         error = np.inf
@@ -337,7 +339,7 @@ class PhasePlane:
         for _ in range(_ROUNDS):
             rate = self.fastest(rates)
             if rate is None:
-                # Rows that are linearised at too fast a motion may allow none.
+                # Rows linearised at a motion that is too fast may allow no motion.
                 if not self._is_curved:
                     return None
                 factor *= 0.5 if best is None else 0.8
@@ -360,30 +362,30 @@ class PhasePlane:
         return best if error < _CREDIBLE else None
 
     def _pass(self, timing: Timing) -> Passage:
-        """Pass the path half-way between its stations; nowhere so slow that friction vanishes."""
+        """Return the motion midway between the stations, nowhere so slow that friction vanishes."""
         rate = _not_too_slow(timing.middle_rate)
         return Passage(self._middles, rate, timing.acceleration)
 
     def _slow_down(self, motion: Passage, factor: float) -> Passage:
-        """Pass the path more slowly, by a factor below 1."""
+        """Return a motion slower by a factor below 1."""
         acceleration = factor**2 * motion.acceleration
         return Passage(self._middles, factor * motion.rate, acceleration)
 
     @cached_property
     def _is_curved(self) -> bool:
-        """Whether another linearisation would give other rows."""
+        """Whether another linearisation would give different rows."""
         motion = self._slow_down(self._motion, 0.5)
         rows = (block for block in self._rounds[0] if block.by_u is not None)
         return any(block.error(motion) > AGREEMENT for block in rows)
 
     def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
-        """Largest dp/dt at the stations, (P,), 1/s, within the rows as they are; see `solve`."""
+        """Find the largest dp/dt at the stations, (P,), 1/s, within the current rows; see `solve`."""
         first, last = (rate**2 for rate in rates)
         rows = self._next
         floor = self._floor
         ceiling = self._ceiling
         if math.isinf(last):
-            # One step more, from any x to any other one, leaves x at the end free.
+            # One more step, from any x to any other x, leaves x at the end free.
             last = 0.0
             floor = np.append(floor, 0.0)
             step = np.array([1.0, -np.inf, np.inf])[:, None, None]
@@ -407,7 +409,7 @@ class PhasePlane:
         squares = kernel.go_forwards(factor, next_upper, (low, high), first)
         if not squares.max() > 0.0:
             return None
-        # Between stations nothing stops; a station where the grid says so is an artefact of its width.
+        # The motion does not stop on the way; a stop at a station is an artefact of the grid's width.
         slowest = (_STOPPED * np.median(np.sqrt(squares))) ** 2
         squares[1:-1] = np.maximum(squares[1:-1], slowest)
         return np.sqrt(squares)
@@ -415,7 +417,7 @@ class PhasePlane:
     def speed_factor(
         self, rate: np.ndarray, acceleration: np.ndarray
     ) -> tuple[float, float, str]:
-        """Find by how much a motion may be faster, or has to be slower.
+        """Find the factor by which a motion may be faster, or has to be slower.
 
         Parameters
         ----------
@@ -425,21 +427,22 @@ class PhasePlane:
         Returns
         -------
         tuple of float, float and str
-            The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
+            The largest factor on its speed; the place, as path coordinate, and the label of the limit that prevents a
+            larger one.
         """
         rate = np.sqrt(halfway(rate**2))
         acceleration = halfway(acceleration)
         self._linearise(Passage(self._middles, rate, acceleration))
         factors = self._factors(rate, acceleration)
         least = factors.min(axis=1)
-        # The first place of equal ones.
+        # Take the first of several equal places.
         number = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
         column = int(np.argmin(factors[number]))
         place = float(self.path.s[number])
         return float(least[number]), place, self._labels[column]
 
     def _factors(self, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-        """Largest factor, (P - 1, c), of the speed of a motion half-way between the stations for each limit alone."""
+        """Return the largest factor, (P - 1, c), on a motion's speed midway between stations, for each limit alone."""
         x = rate[:, None] ** 2
         slope, lower, upper = _as_lines(*self._stack(slice(None)))
         beside = acceleration[:, None] - slope * x
@@ -452,14 +455,14 @@ class PhasePlane:
         return np.sqrt(np.maximum(squares, 0.0))
 
     def active_limit(self, rate: np.ndarray) -> str:
-        """Name the limit that a motion, dp/dt (P,), 1/s, as fast as possible, is at for most of its way."""
+        """Name the limit that is active on most of the way of a fastest motion, with dp/dt (P,), 1/s."""
         timing = Timing.of(self.path, rate)
         factors = self._factors(timing.middle_rate, timing.acceleration)
         columns = np.argmin(factors, axis=1)
         return self._labels[int(np.argmax(np.bincount(columns, self._steps)))]
 
     def largest_rate(self, end: int) -> tuple[float, str]:
-        """Find the largest dp/dt, 1/s, that the limits allow beside an end (0 or -1), and which one allows no more."""
+        """Find the largest dp/dt, 1/s, that the limits allow next to an end (0 or -1), and the limit that sets it."""
         for _ in range(_LOOKS_AT_END):
             lines = _as_lines(*self._stack(slice(None)))
             slope, lower, upper = (line[end] for line in lines)
@@ -481,12 +484,12 @@ class PhasePlane:
 
 
 def _not_too_slow(rate: np.ndarray) -> np.ndarray:
-    """Return rates nowhere so slow that friction vanishes."""
+    """Return the rates, raised so that friction does not vanish."""
     return np.maximum(rate, _SLOWEST * np.median(rate))
 
 
 def is_left_out(limit: Limit) -> bool:
-    """Tell whether the phase plane leaves a limit out that a slower timing relieves: jerks, torque rates and means."""
+    """Tell whether the phase plane leaves out a limit: limits on jerks, torque rates and means."""
     return limit.order > 2 or limit.guarantee.is_mean
 
 
@@ -494,7 +497,7 @@ def _as_lines(
     a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Turn low <= a u + b x <= high, (P, c) each, into slope x + lower <= u <= slope x + upper."""
-    # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
+    # A coefficient of zero would give a vertical line; a tiny one gives bounds so far out that they do no harm.
     a = np.where(np.abs(a) < _TINY, _TINY, a)
     ends = low / a, high / a
     return -b / a, np.minimum(*ends), np.maximum(*ends)

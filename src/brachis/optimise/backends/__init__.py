@@ -1,4 +1,4 @@
-"""Solver backends: a file for each, and a line in `TABLE`; libraries are imported when used."""
+"""Solver backends: each has a file and a line in `TABLE`. Their libraries are imported when used."""
 
 from importlib.util import find_spec
 
@@ -35,12 +35,12 @@ TABLE = {
     backend.NAME: Solver(backend.NAME, backend.run, backend in (ipopt, uno_interior))
     for backend in (uno, ipopt, uno_interior)
 }
-"""Backends by name, in the order in which ``auto`` tries them; of the two interior-point methods it takes one."""
+"""Backends by name, in the order in which ``auto`` tries them; it uses only one of the two interior-point methods."""
 NAMES = ("auto", *TABLE)
 
 
 def solvers_for(name: str) -> tuple[Solver, ...]:
-    """Backends to try for a name, in order: one, or for ``auto`` one of each method.
+    """Return the backends to try for a name, in order: one backend, or for ``auto`` one for each method.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
     ------
     UnknownNameError
     NotInstalledError
-        It is ``ipopt``, whose package has wheels for one platform alone.
+        The name is ``ipopt``, and its package, which has wheels for one platform only, is not installed.
     """
     if name == "auto":
         return TABLE["uno"], _interior()
     if name not in TABLE:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
     if name == "ipopt" and _interior() is not TABLE[name]:
-        library = "ipyopt (it has wheels for Linux on x86_64 alone)"
+        library = "ipyopt (it has wheels only for Linux on x86_64)"
         error = NotInstalledError("solver.name: ipopt", library, "ipopt")
         error.put_advice("Set solver.name: auto, uno or uno_interior")
         raise error
@@ -65,14 +65,14 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
 
 
 def _interior() -> Solver:
-    """Return IPOPT where it is installed, else Uno's interior-point method."""
+    """Return IPOPT if it is installed, otherwise Uno's interior-point method."""
     return TABLE["ipopt" if find_spec("ipyopt") else "uno_interior"]
 
 
 def solver_for_large(name: str) -> Solver | None:
-    """Return what ``auto`` tries first for large, sparse programs; None for the name of a single solver.
+    """Return the solver that ``auto`` tries first for large, sparse programs; None for the name of a single solver.
 
-    The effort of an interior-point method grows with the entries of the Jacobian, that of an active-set method with the
-    square of the variables at least.
+    The effort of an interior-point method grows with the number of entries of the Jacobian, that of an active-set
+    method at least with the square of the number of variables.
     """
     return _interior() if name == "auto" else None

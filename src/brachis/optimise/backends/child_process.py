@@ -1,8 +1,8 @@
-"""A solver: a backend, run only with numbers that it can be trusted with, one solve at a time, and large ones apart.
+"""A solver: a backend that gets only safe numbers, runs one solve at a time, and solves large programs in a process.
 
-A backend sees the time between its iterations and evaluations. An active-set method may spend minutes within a single
-quadratic subproblem of thousands of variables, where nothing of ours is called. Such solves run in a process of their
-own, which can be ended. So do those that ask for it: where a speed is given, Uno's BQPD may pivot for ever in a
+A backend checks the time only between its iterations and evaluations. An active-set method may spend minutes in a
+single quadratic subproblem of thousands of variables, without calling our code. Such solves run in a separate process,
+which can be ended. Solves with the option `apart` do too: where a speed is given, Uno's BQPD may pivot forever in a
 restoration.
 """
 
@@ -40,20 +40,25 @@ from brachis.optimise.backends.protocol import (
 )
 
 ENTRIES = 1_000_000
-"""Variables times rows above which a solve runs apart: an iteration takes Uno 0.2 s there, 18 s at nine times that.
+"""Number of variables times rows above which a solve runs in a separate process. At this size an iteration takes Uno
+0.2 s, and 18 s at nine times this size.
 
-Below a time limit of 10 s smaller problems, too, are solved apart: one iteration may take all of it.
+If the time limit is below 10 s, smaller problems are solved in a process too, because one iteration may take all of the
+time.
 """
 _GRACE = 0.25
-"""Seconds after its time limit at which a process is ended; a backend that sees the limit answers before."""
+"""Seconds after its time limit at which a process is ended. A backend that checks the limit returns before that."""
 _SILENCE = 5.0
-"""Seconds without an iteration after which a small program's process is ended: an iteration takes hundredths."""
+"""Seconds without an iteration after which the process of a small program is ended. An iteration takes hundredths of a
+second."""
 _LONGEST = 1e6
-"""Seconds without an iteration after which any process is ended: the system cannot wait for ever."""
+"""Seconds without an iteration after which any process is ended, because the system cannot wait forever."""
 Run = Callable[[SolveMonitor, np.ndarray], SolverReport]
-"""What a backend does: ``run(monitor, x)`` solves the monitor's program from x, and returns ``monitor.report(...)``."""
+"""Type of a backend's function: ``run(monitor, x)`` solves the monitor's program from x and returns
+``monitor.report(...)``."""
 solve_lock = threading.RLock()
-"""Uno's BQPD and IPOPT's MUMPS keep their state in memory that all threads share: two solves at once crash."""
+"""Lock for all solves. Uno's BQPD and IPOPT's MUMPS keep their state in memory shared by all threads, so two solves at
+once would crash."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,8 @@ class Solver:
     run : callable
         ``run(monitor, x)`` solves the monitor's program from x; see `SolveMonitor`.
     is_interior : bool, optional
-        Whether it is an interior-point method. It leaves the bounds at first: a start near the optimum does not help.
+        Whether it is an interior-point method. Such a method moves away from the bounds at first, so a start close to
+        the optimum does not help.
     """
 
     name: str
@@ -80,15 +86,16 @@ class Solver:
         options: SolverOptions,
         progress: Progress | None,
     ) -> SolverReport:
-        """Solve `program` from the start `x`.
+        """Solve `program` from the starting point `x`.
 
-        A large program that is not solved in time has Uno's best feasible iterate as its `x`, or the start if none is
-        known, and the status `TIME_LIMIT`; one whose solve is ended for its silence, the status `STALLED`.
+        If a large program is not solved in time, the report has the status `TIME_LIMIT`, and Uno's best feasible
+        iterate as its `x`, or the starting point if there is none. If a solve is ended because it sent nothing, the
+        status is `STALLED`.
 
         Raises
         ------
         KeyboardInterrupt
-            The user interrupted; passed on once the backend has returned.
+            The user interrupted. It is raised once the backend has returned.
         """
         bounds = (program.lower, program.upper, program.x_lower, program.x_upper)
         refuse = partial(_report_point, self.name, program, x)
@@ -99,7 +106,7 @@ class Solver:
             return refuse(SolveStatus.EVALUATION_ERROR, message)
         with solve_lock:
             max_entries = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
-            # A daemonic process may have no children; the limit then holds between iterations alone.
+            # A daemonic process may not have children; the limit is then checked only between iterations.
             alone = multiprocessing.current_process().daemon
             entries = len(x) * len(program.lower)
             if (options.apart or entries > max_entries) and not alone:
@@ -115,7 +122,7 @@ def _report_point(
     message: str,
     wall_time: float = 0.0,
 ) -> SolverReport:
-    """Report a solve without an answer; `x`, (v,), takes its place."""
+    """Report a solve without a solution; `x`, (v,), takes its place."""
     values = (objective_at(program, x), residual(program, x))
     none = np.zeros(len(program.lower))
     return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
@@ -128,10 +135,10 @@ def subprocess_solve(
     options: SolverOptions,
     progress: Progress | None,
 ) -> SolverReport:
-    """Start a process that solves, pass on its progress, and end it."""
+    """Solve in a separate process: start it, pass on its progress, and end it."""
     began = time.monotonic()
     until = began + options.time_limit
-    # A fork has the program at once; beyond Linux the system's libraries do not bear it.
+    # A fork has the program at once, but only the system libraries of Linux support it safely.
     method = "fork" if sys.platform.startswith("linux") else "spawn"
     context: Any = multiprocessing.get_context(method)
     receiver, sender = context.Pipe(duplex=False)
@@ -175,14 +182,15 @@ def subprocess_solve(
 def _receive(
     receiver: Connection, until: float, silence: float, progress: Progress | None
 ) -> tuple[SolverReport | Exception | SolveStatus | None, np.ndarray | None]:
-    """Pass on the progress until the answer comes.
+    """Pass on the progress until the result arrives.
 
     Returns
     -------
     answer : SolverReport, Exception, SolveStatus or None
-        None where none comes in time, or at all; `SolveStatus.STALLED` where nothing is heard for `silence`, s.
+        The result; None if it does not arrive in time or at all; `SolveStatus.STALLED` if nothing arrives for
+        `silence`, s.
     best : (v,) ndarray or None
-        The best feasible iterate that was heard of.
+        The best feasible iterate that was received.
     """
     best = None
     while receiver.poll(max(min(until - time.monotonic(), silence, _LONGEST), 0.0)):
@@ -206,9 +214,9 @@ def _work(
     x: np.ndarray,
     options: SolverOptions,
 ) -> None:
-    """Solve within the process.
+    """Solve within the separate process.
 
-    The system ends it when its time is up, wherever it is then, even if nobody waits for it any more.
+    The system ends the process when its time is up, whatever it is doing, even if nothing waits for it any more.
     """
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     if np.isfinite(options.time_limit):
@@ -217,7 +225,7 @@ def _work(
     sent: np.ndarray | None = None
 
     def progress(iteration: int, objective: float) -> None:
-        """Tell the other process of an iteration, and of a better feasible iterate."""
+        """Send an iteration to the parent process, with any better feasible iterate."""
         nonlocal sent
         best = None if monitor.best is None else monitor.best[1]
         sender.send((iteration, objective, None if best is sent else best))
@@ -227,14 +235,14 @@ def _work(
     try:
         with use_one_thread():
             sender.send(run(monitor, x))
-    except Exception as error:  # noqa: BLE001  (raised where the solve was asked for)
+    except Exception as error:  # noqa: BLE001  (raised in the parent process)
         sender.send(_make_sendable(error))
 
 
 def _make_sendable(error: Exception) -> Exception:
-    """Return an error as it is, or one with its text if it cannot be sent to another process."""
+    """Return an error unchanged, or a RuntimeError with its text if it cannot be sent to another process."""
     try:
-        pickle.loads(pickle.dumps(error))  # noqa: S301  (its own)
-    except Exception:  # noqa: BLE001  (whatever a class of the user's own does)
+        pickle.loads(pickle.dumps(error))  # noqa: S301  (our own data)
+    except Exception:  # noqa: BLE001  (whatever a user-defined class does)
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error

@@ -1,4 +1,4 @@
-"""IPOPT through the ipyopt wheel: an interior-point method, the second opinion where Uno fails.
+"""IPOPT through the ipyopt wheel: an interior-point method, used as a second opinion where Uno fails.
 
 The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
 """
@@ -36,14 +36,14 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     def or_nan(
         function: Function, at_stop: float = np.nan
     ) -> Callable[[np.ndarray, np.ndarray], None]:
-        """Write what a function gives, NaN where it has no value, or `at_stop` once the solve has to stop."""
+        """Wrap a function so that it writes NaN where it has no value, and `at_stop` once the solve has to stop."""
 
         def write(point: np.ndarray, out: np.ndarray) -> None:
             """Write the values at a point."""
             try:
                 out[:] = function(point)
             except UnreachableError:
-                # After NaN IPOPT shortens the step.
+                # After NaN, IPOPT shortens the step.
                 out[:] = at_stop if monitor.must_stop() else np.nan
 
         return write
@@ -57,12 +57,12 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         barrier: float,
         *_: float,
     ) -> bool:
-        """Tell whether to go on after an iteration."""
+        """Tell whether to continue after an iteration."""
         return not monitor.ends_interior(objective, infeasibility, barrier)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
-        """Write infinite bounds as IPOPT has them."""
-        return np.clip(bounds, -2e19, 2e19)  # IPOPT takes 1e19 for infinity
+        """Convert infinite bounds to IPOPT's form."""
+        return np.clip(bounds, -2e19, 2e19)  # IPOPT treats 1e19 as infinity
 
     nothing = np.array([], dtype=int)
     backend = ipyopt.Problem(
@@ -86,7 +86,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             "constr_viol_tol": options.tolerance,
             "max_iter": options.max_iterations,
             "hessian_approximation": "limited-memory",
-            # Columns of the approximation in the system take half the time of a correction of its solution.
+            # Including the approximation in the linear system takes half the time of correcting its solution.
             "limited_memory_aug_solver": "extended",
             "mu_strategy": "adaptive",
             "bound_relax_factor": 0.0,

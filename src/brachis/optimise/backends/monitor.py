@@ -1,4 +1,4 @@
-"""What stands between a program and a backend: it counts, interrupts, keeps the time, and judges the answer."""
+"""The layer between a program and a backend: it counts, interrupts, measures the time, and judges the solution."""
 
 from __future__ import annotations
 
@@ -21,23 +21,25 @@ from brachis.optimise.backends.protocol import (
 )
 
 _LARGEST = 1e30
-"""Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
+"""Largest number passed to a backend. Backends multiply values, and the square of a larger number may overflow and
+crash the interpreter."""
 
 _SMALL_BARRIER = 1e-5
 """Largest barrier parameter at which iterates show whether the solve has settled."""
 _NEARLY_FEASIBLE = 1e-3
-"""Violation of rows up to which an iterate counts, or ten times the tolerance if that is larger."""
+"""Violation of rows up to which an iterate counts; ten times the tolerance applies instead if that is larger."""
 
 Function = Callable[[np.ndarray], float | np.ndarray]
-"""Of the variables of a program."""
+"""A function of the variables of a program."""
 
 
 class SolveMonitor:
     """Watches one solve.
 
-    A backend written in another language must not see a KeyboardInterrupt, which Python would raise at the first line
-    of any callback, nor any other error than UnreachableError: it may lose them. Used as a context manager around the
-    backend, it keeps them; the backend then has to stop, and `report` raises them.
+    A backend written in another language may lose Python exceptions. This includes a KeyboardInterrupt, which Python
+    would raise at the first line of any callback. The backend must therefore see no error other than UnreachableError.
+    The monitor is a context manager around the backend that stores such errors. The backend then has to stop, and
+    `report` raises the error.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ class SolveMonitor:
     Attributes
     ----------
     best : tuple of (float, (v,) ndarray) or None
-        Objective and variables of the best feasible iterate that the backend told of; None before the first.
+        Objective and variables of the best feasible iterate that the backend has reported; None before the first.
     """
 
     def __init__(
@@ -74,18 +76,18 @@ class SolveMonitor:
         self._began = time.perf_counter()
 
     def __enter__(self) -> Self:
-        """Take over SIGINT where this thread may, and where it is not ignored."""
+        """Take over SIGINT if this thread is allowed to and the signal is not ignored."""
         ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         if threading.current_thread() is threading.main_thread():
             self._during = signal.SIG_IGN if ignored else self._keep_interrupt
             self._handler = signal.signal(signal.SIGINT, self._during)
             remembers = isinstance(self._handler, SigintHandler)
-            if remembers and self._handler.pending:  # nobody has looked until now
+            if remembers and self._handler.pending:  # not checked until now
                 self.failure = KeyboardInterrupt()
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Give SIGINT back."""
+        """Restore the handler of SIGINT."""
         if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
 
@@ -96,11 +98,11 @@ class SolveMonitor:
 
     @property
     def elapsed(self) -> float:
-        """Wall time since the beginning, s."""
+        """Wall time since the monitor was created, s."""
         return time.perf_counter() - self._began
 
     def between_iterations(self, objective: float) -> bool:
-        """Count an iteration, tell the user, and answer whether the backend has to stop."""
+        """Count an iteration, inform the user, and tell whether the backend has to stop."""
         self.iterations += 1
         if self._progress is not None:
             try:
@@ -110,16 +112,16 @@ class SolveMonitor:
         return self.must_stop()
 
     def keep(self, x: np.ndarray, objective: float, infeasibility: float) -> None:
-        """Keep an iterate if it is the best feasible one so far."""
+        """Store an iterate if it is the best feasible one so far."""
         is_feasible = infeasibility <= self._feasible_below
         if is_feasible and (self.best is None or objective < self.best[0]):
             self.best = objective, x
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
-        """Tell whether iterates have been no better for long; kept in `stagnated`.
+        """Tell whether iterates have stopped getting better; the result is stored in `stagnated`.
 
-        A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
-        within which a solver wanders without ever seeing its conditions of optimality hold. An iterate counts with its
+        If no limit affects a redundant joint, for example the roll of a tool, there is a set of equally fast motions. A
+        solver wanders within this set without ever meeting its optimality conditions. An iterate counts with its
         objective times 1 + violation. The last one has to be feasible.
         """
         needed = objective * (1.0 + infeasibility)
@@ -138,38 +140,39 @@ class SolveMonitor:
     ) -> bool:
         """Tell whether an interior-point method has to stop after an iteration, or has settled.
 
-        With a large barrier the motion is slower than its start: no sign that the solve has settled.
+        With a large barrier parameter the motion is slower than at its start, which is no sign that the solve has
+        settled.
         """
         stop = self.between_iterations(objective)
         violation = infeasibility if barrier <= _SMALL_BARRIER else np.inf
         return self.has_settled(objective, violation) or stop
 
     def must_stop(self) -> bool:
-        """Tell whether the user has interrupted or the time is over."""
+        """Tell whether the user has interrupted or the time or the evaluations are used up."""
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
-        # A solver that needs more cannot leave a point out of reach.
+        # A solver that needs more evaluations is stuck at a point out of reach.
         self.exhausted = self._evaluations > 10 * self.options.max_iterations
         return self.timed_out or self.exhausted or self.failure is not None
 
     def objective(self, x: np.ndarray) -> float:
-        """Objective at x, finite; raises UnreachableError else."""
+        """Return the objective at x; raise UnreachableError if it is not finite."""
         return float(self._finite(self.program.objective, x))
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Gradient of the objective at x, finite; raises UnreachableError else."""
+        """Return the gradient of the objective at x; raise UnreachableError if it is not finite."""
         return self._finite(self.program.gradient, x)
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Rows at x, all finite; raises UnreachableError else, and everywhere once the solve has to stop."""
+        """Return the rows at x; raise UnreachableError if one is not finite, or once the solve has to stop."""
         return self._evaluate(self.program.rows, x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Jacobian entries at x; raises as `rows` does."""
+        """Return the Jacobian entries at x; raise as `rows` does."""
         return self._evaluate(self.program.jacobian, x)
 
     def _evaluate(self, function: Function, x: np.ndarray) -> np.ndarray:
         if self._handler is not None:
-            # A backend may have put a handler of its own in place since.
+            # A backend may have installed its own handler since.
             signal.signal(signal.SIGINT, self._during)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
@@ -179,7 +182,7 @@ class SolveMonitor:
     def hessian(
         self, function: Callable[..., np.ndarray], x: np.ndarray, *multipliers: Any
     ) -> np.ndarray:
-        """Hessian at x by a function of x and multipliers; raises as `rows` does."""
+        """Return the Hessian at x from a function of x and multipliers; raise as `rows` does."""
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
         return self._finite(lambda at: function(at, *multipliers), x)
@@ -193,11 +196,11 @@ class SolveMonitor:
         except UnreachableError:
             raise
         except (KeyboardInterrupt, Exception) as error:
-            # Compiled backends lose what is raised within them, for example by a limit of the user's own.
+            # Compiled backends lose exceptions raised within them, for example by a user-defined limit.
             self.failure = error
             raise UnreachableError("the solve has to stop") from error
         if not is_usable(values):
-            raise UnreachableError("a value or a slope is not a finite number there")
+            raise UnreachableError("a value or a slope is not finite at this point")
         return values
 
     def report(
@@ -208,12 +211,12 @@ class SolveMonitor:
         multipliers: np.ndarray,
         message: str,
     ) -> SolverReport:
-        """Judge the answer by its own residuals.
+        """Judge the solution by its residuals and report it.
 
         Raises
         ------
         BaseException
-            The error, or the KeyboardInterrupt, that was kept.
+            The stored error or KeyboardInterrupt.
         """
         if self.failure is not None:
             raise self.failure
@@ -239,14 +242,14 @@ class SolveMonitor:
 
 
 def is_usable(values: np.ndarray) -> bool:
-    """Tell whether all values are finite, and not so large that products of them are not; NaN is neither."""
+    """Tell whether all values are finite and small enough that their products are finite too; NaN is not."""
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
 
 def objective_at(
     program: NonlinearProgram, x: np.ndarray, otherwise: float = np.inf
 ) -> float:
-    """Objective at x; another value where x cannot be evaluated."""
+    """Return the objective at x, or `otherwise` if x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             value = program.objective(x)
@@ -256,14 +259,14 @@ def objective_at(
 
 
 def residual(program: NonlinearProgram, x: np.ndarray) -> float:
-    """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
+    """Return the largest violation of rows and bounds at x; infinite if x cannot be evaluated."""
     of_bounds = np.minimum(x - program.x_lower, program.x_upper - x)
     least = float(np.append(row_slack(program, x), of_bounds).min(initial=0.0))
     return np.inf if np.isnan(least) else 0.0 - least
 
 
 def row_slack(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
-    """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
+    """Return distances of rows from their nearer bound, (c,): negative if violated, -inf if x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             rows = program.rows(x)

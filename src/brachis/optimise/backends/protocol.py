@@ -1,4 +1,4 @@
-"""What a solver gets and gives: problem and options in, report out."""
+"""The interface of a solver: it gets a problem and options, and returns a report."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ import numpy as np
 from brachis.common.summary import Summary
 
 FEASIBLE = 1e-5
-"""Violation of rows and bounds, dimensionless, that refinement mends."""
+"""Violation of rows and bounds, dimensionless, that refinement can repair."""
 
 
 class SolveStatus(enum.Enum):
     """How a solve ended; the value is the advice to the user."""
 
-    OPTIMAL = "optimal: first-order conditions hold"
+    OPTIMAL = "optimal: the first-order conditions are met"
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
-    STAGNATED = "stagnated: feasible, and the last iterations made it no faster; other motions take as long"
+    STAGNATED = "stagnated: feasible, and the last iterations gained no time; other motions take just as long"
     FOLLOWED = "followed: feasible, along the fastest timing of the best joint path that was found"
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
     STALLED = "the solver made no progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached"
-    INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
+    INFEASIBLE = "no feasible point near this start; check the limits, choose another redundant joint or start posture"
     EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
     FAILED = "the solver failed; choose another solver"
 
     @property
     def usable(self) -> bool:
-        """True where the answer satisfies the rows."""
+        """Whether the solution satisfies the rows."""
         return self in (
             SolveStatus.OPTIMAL,
             SolveStatus.STAGNATED,
@@ -42,15 +42,15 @@ class SolveStatus(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Curvature:
-    """What is known of the Hessian of a problem's Lagrangian, L = objective - multipliers . rows.
+    """The known part of the Hessian of a problem's Lagrangian, L = objective - multipliers . rows.
 
     Attributes
     ----------
     hessian : callable
-        ``hessian(x, objective_multiplier, multipliers)`` returns the known part, (v, v), by the multipliers of the
+        ``hessian(x, objective_multiplier, multipliers)`` returns the known part, (v, v), for multipliers of the
         objective, 0 in a restoration, and of the rows, (c,).
     multipliers : (c,) ndarray
-        A first guess. It serves until those of a solver give the known part some size.
+        A first guess. It is used until the solver's multipliers give the known part a significant size.
     """
 
     hessian: Callable[[np.ndarray, float, np.ndarray], np.ndarray]
@@ -80,50 +80,51 @@ class NonlinearProgram(Protocol):
         """Upper bounds of the rows."""
 
     def objective(self, x: np.ndarray) -> float:
-        """Value to be minimised; raises UnreachableError where it does not exist."""
+        """Return the value to minimise; raise UnreachableError where it does not exist."""
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Gradient of the objective; raises UnreachableError as `objective` does."""
+        """Return the gradient of the objective; raise UnreachableError as `objective` does."""
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows; raises UnreachableError where they do not exist."""
+        """Return the values of the rows; raise UnreachableError where they do not exist."""
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian on its pattern; raises UnreachableError as `rows` does."""
+        """Return the entries of the Jacobian on its pattern; raise UnreachableError as `rows` does."""
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
-        """Return what is known of the Lagrangian's Hessian in a solve from x; None if that is nothing."""
+        """Return the known part of the Lagrangian's Hessian in a solve from x; None if no part is known."""
 
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """Bounds on a solve.
+    """Options of a solve.
 
     Attributes
     ----------
     tolerance : float
-        On constraint violation and optimality, dimensionless.
+        Tolerance on constraint violation and optimality, dimensionless.
     max_iterations : int
     time_limit : float
-        s; no solve is begun where it is 0.
+        Time limit, s. With 0 no solve is started.
     progress : float
-        Least relative gain of the last iterates over the best one before; with less a solve has stagnated. An iterate
-        counts with its objective times 1 + violation, if it violates rows by no more than 1e-3 or ten tolerances.
+        Smallest relative gain of the last iterates over the best earlier one; with less, a solve has stagnated. An
+        iterate counts with its objective times 1 + violation, provided that it violates rows by no more than 1e-3 or
+        ten tolerances.
     patience : int
-        How many iterates the last ones are.
+        Number of iterates that count as the last ones.
     first_step : float
-        Factor on the first radius of a trust region, for starts that are near the answer. Uno asks.
+        Factor on the initial radius of the trust region, for starts close to the solution. Used by Uno.
     widening : float
-        Largest widening of a row's bound, as a part of it; no more than the tolerance. Uno asks.
+        Largest widening of a row's bound, as a fraction of it; at most the tolerance. Used by Uno.
     anywhere : bool
-        Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
-        asks; IPOPT counts all iterates in any case.
+        Whether iterates far from stationarity count too. This suits solves that need only an approximate solution, but
+        not those in which the solver creeps. Used by Uno; IPOPT always counts all iterates.
     apart : bool
-        Whether the solve runs in a process of its own, which is ended when nothing is heard of it for long. That takes
-        some 0.07 s more.
+        Whether the solve runs in a separate process, which is ended if it sends nothing for a long time. This takes
+        about 0.07 s more.
     learnt : (v, v) ndarray, optional
-        `SolverReport.learnt` of an earlier solve with the same variables. Uno starts with it if the problem knows a
-        part of its Hessian.
+        `SolverReport.learnt` of an earlier solve with the same variables. Uno starts with it if part of the problem's
+        Hessian is known.
     """
 
     tolerance: float = 1e-6
@@ -140,27 +141,27 @@ class SolverOptions:
 
 @dataclass(frozen=True, repr=False)
 class SolverReport(Summary):
-    """Answer of a solver.
+    """Result of a solver.
 
     Attributes
     ----------
     solver : str
     status : SolveStatus
-        Judged by the residuals below, not by the backend's word alone.
+        Status, judged by the residuals below and not only by the backend's own report.
     x : (v,) ndarray
     objective : float
-        s, where it is the end time; infinite if `x` cannot be evaluated.
+        Objective, in s if it is the end time; infinite if `x` cannot be evaluated.
     violation : float
         Largest violation of rows and bounds, recomputed by brachis; infinite if `x` cannot be evaluated.
     multipliers : (c,) ndarray
-        Of the rows, L = objective - multipliers . rows; zeros where the backend gives none.
+        Multipliers of the rows, with L = objective - multipliers . rows; zeros if the backend gives none.
     iterations : int
     wall_time : float
         s.
     message : str
-        The backend's own words.
+        Message of the backend.
     learnt : (v, v) ndarray or None
-        The Hessian of the Lagrangian, without the part that the problem knows, where the backend learnt it.
+        Approximation of the Lagrangian's Hessian without its known part, if the backend built one.
     """
 
     solver: str
@@ -176,7 +177,7 @@ class SolverReport(Summary):
 
     @property
     def feasible(self) -> bool:
-        """True where the answer is a motion within the limits at the collocation points, however the solve ended."""
+        """Whether the solution is within the limits at the collocation points, however the solve ended."""
         return self.violation <= FEASIBLE
 
 

@@ -1,17 +1,18 @@
-"""The Hessian of the Lagrangian of a program that knows a part of it.
+"""The Hessian of the Lagrangian of a program for which part of it is known.
 
-A mean of squares over the motion is curved in as many directions as there are variables; an approximation from the last
-few steps learns too few of them. First derivatives give its Gauss-Newton part B. A matrix A approximates the rest. Let
-the gradient of the Lagrangian change by y in a step s, and let B belong to the new point. A is first scaled by
-min(1, |s.(y - B s)| / |s.A s|), and then changed by a symmetric update of rank two, so that
+A mean of squares over the motion is curved in as many directions as there are variables. An approximation from the last
+few steps captures too few of them. First derivatives give the Gauss-Newton part B, and a matrix A approximates the
+rest. Let the gradient of the Lagrangian change by y in a step s, and let B belong to the new point. A is first scaled
+by min(1, |s.(y - B s)| / |s.A s|), and then changed by a symmetric update of rank two, so that
 
     A s = y - B s.
 
 Scaling and update are those of J. E. Dennis, D. M. Gay and R. E. Welsch, An adaptive nonlinear least-squares algorithm,
-ACM Transactions on Mathematical Software 7, 1981. They have residuals alone, and ask for another A s; here other rows
-are curved as well.
+ACM Transactions on Mathematical Software 7, 1981. Their problems have residuals only, and they require a different A s;
+here other rows are curved as well.
 
-Negative eigenvalues of A + B change their sign: subproblems are convex, and steps along such directions short.
+Negative eigenvalues of A + B are made positive, so that subproblems are convex and steps along such directions are
+short.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ import numpy as np
 from brachis.optimise.backends.protocol import Curvature, NonlinearProgram
 
 _ENOUGH = 0.01
-"""Trace of B, as a part of that by the first guess, from which on a solver's multipliers are used."""
+"""Trace of B, as a fraction of its trace with the first guess, above which the solver's multipliers are used."""
 _LEAST_COSINE = 1e-8
-"""Cosine between s and y below which a step changes nothing: the update divides by s.y."""
+"""Cosine between s and y below which A is not updated, because the update divides by s.y."""
 
 
 class SecantHessian:
@@ -34,12 +35,12 @@ class SecantHessian:
     program : NonlinearProgram
     known : Curvature
     learnt : (v, v) ndarray, optional
-        A at first; by default zero.
+        Initial A; zero by default.
 
     Attributes
     ----------
     learnt : (v, v) ndarray
-        A.
+        The matrix A.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class SecantHessian:
     def of(
         cls, program: NonlinearProgram, x: np.ndarray, learnt: np.ndarray | None
     ) -> SecantHessian | None:
-        """Begin a solve from x, (v,), of a program that knows a part of its Hessian; None for one that does not."""
+        """Create the Hessian for a solve from x, (v,); return None if no part of the program's Hessian is known."""
         known = program.curvature(x)
         return None if known is None else cls(program, known, learnt)
 
@@ -73,26 +74,26 @@ class SecantHessian:
         ----------
         x : (v,) ndarray
         objective_multiplier : float
-            0 in a restoration.
+            Multiplier of the objective; 0 in a restoration.
         multipliers : (c,) ndarray
-            L = objective_multiplier objective - multipliers . rows.
+            Multipliers of the rows, with L = objective_multiplier objective - multipliers . rows.
 
         Returns
         -------
         (v, v) ndarray
-            Symmetric, without negative eigenvalues.
+            Symmetric matrix without negative eigenvalues.
         """
         known = self._known.hessian(x, objective_multiplier, multipliers)
         if self._least_trace is None:
             guess = self._known.hessian(x, 1.0, self._multipliers)
             self._least_trace = float(_ENOUGH * np.trace(guess))
         if np.trace(known) < self._least_trace:
-            # Without curvature steps are too long: the last multipliers that gave enough do for now.
+            # Without curvature, steps are too long: use the last multipliers that gave enough.
             multipliers = self._multipliers
             factor = objective_multiplier or 1.0
             known = self._known.hessian(x, factor, multipliers)
             if objective_multiplier == 0.0:
-                # In a restoration more curvature would keep steps short, and feasible points may be far.
+                # In a restoration, more curvature would keep steps short, and feasible points may be far away.
                 known *= self._least_trace / np.trace(known)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers
@@ -107,7 +108,7 @@ class SecantHessian:
         multipliers: np.ndarray,
         known: np.ndarray,
     ) -> None:
-        """Update A by the step from the last iterate to x."""
+        """Update A after the step from the last iterate to x."""
         gradient = self._program.gradient(x)
         jacobian = self._program.jacobian(x)
         if self._last is not None:
@@ -118,7 +119,7 @@ class SecantHessian:
         self._last = x, gradient, jacobian
 
     def _sum_rows(self, jacobian: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Add up the rows of a Jacobian, (nnz,), with multipliers: (v,)."""
+        """Add up the rows of a Jacobian, (nnz,), weighted by multipliers; return (v,)."""
         terms = jacobian * multipliers[self._program.jacobian_rows]
         columns = self._program.jacobian_columns
         return np.bincount(columns, terms, len(self.learnt))

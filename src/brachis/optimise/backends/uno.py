@@ -1,8 +1,8 @@
-"""Uno (Vanaret and Leyffer): an active-set SQP with a filter and a trust region, the default.
+"""Uno (Vanaret and Leyffer): an active-set SQP method with a filter and a trust region, the default solver.
 
 Bang-bang optima are vertices of the feasible set, which an active-set method reaches in a few steps. The Hessian is
-Uno's limited-memory approximation, or, where a program knows a part of it, that of `secant`; the subproblem solver is
-its BQPD. https://github.com/cvanaret/Uno
+Uno's limited-memory approximation, or that of `secant` where part of it is known. Subproblems are solved by Uno's BQPD.
+https://github.com/cvanaret/Uno
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from brachis.optimise.backends.secant import SecantHessian
 NAME = "uno"
 
 _RESTARTS = ((1.0, False), (1.0, True), (0.2, True))
-"""First trust region radius, and whether the variables are scaled: at first, and after a stall or a breakdown.
+"""Initial trust region radius, and whether the variables are scaled: for the first run, and after stalls or breakdowns.
 
-Uno's own radius of 10 stalls on 1 of 8 random lines. Scaled variables are slower by a tenth where nothing fails.
+Uno's default radius of 10 stalls on 1 of 8 random lines. Where nothing fails, scaled variables are a tenth slower.
 """
 _STATUS = {
     "FEASIBLE_KKT_POINT": SolveStatus.OPTIMAL,
@@ -46,11 +46,11 @@ _STOPPED = {
 
 
 _FAR = 0.5
-"""Violation of a limit beyond which a restoration is far from feasible motions, as a part of the limit."""
+"""Violation of a limit, as a fraction of it, above which a restoration is far from feasible motions."""
 _LOST_AFTER = 15
-"""Iterations of a restoration after which it is given up,"""
+"""Iterations after which a restoration is abandoned,"""
 _LOST = 0.9
-"""if more than this part of the violation is left."""
+"""if more than this fraction of the violation is left."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of this, modulo 1, are spread evenly."""
 
@@ -63,7 +63,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             units = _units(monitor.program, x) if scaled else np.ones(len(x))
             stall = _Stall(monitor, units)
             hessian = SecantHessian.of(monitor.program, x, learnt)
-            learnt = None  # it may be what has failed
+            learnt = None  # it may have caused the failure
             settings = {"TR_radius": radius * monitor.options.first_step}
             result = call_uno(monitor, x, units, settings, stall, hessian)
             x = units * np.array(result.primal_solution)
@@ -91,7 +91,7 @@ def report_result(
     x: np.ndarray,
     status: SolveStatus | None = None,
 ) -> SolverReport:
-    """Report Uno's result, with x, (v,), as the answer; `status` replaces Uno's own."""
+    """Report Uno's result, with x, (v,), as the solution; `status` replaces Uno's own status."""
     ending = result.optimization_status.name
     solution = result.solution_status.name
     if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
@@ -104,10 +104,10 @@ def report_result(
 
 @cache
 def _solve_first_program() -> None:
-    """Minimise x^2, once in a process.
+    """Minimise x^2, once per process.
 
-    Rounding within Uno depends on the first program that a process has solved: without this one, answers would
-    differ with what was planned before them.
+    Rounding within Uno depends on the first program that a process solves. Without this program, results would depend
+    on what was planned before.
     """
     import unopy
 
@@ -123,7 +123,7 @@ def _solve_first_program() -> None:
 
 
 def _backend(settings: dict[str, Any]) -> Any:
-    """Uno's own solver with settings, silent."""
+    """Return Uno's solver with settings and without output."""
     import unopy
 
     backend = unopy.UnoSolver()
@@ -136,9 +136,10 @@ def _backend(settings: dict[str, Any]) -> Any:
 
 
 def _units(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
-    """Units of the variables, (v,), in which the largest slopes of rows at x are the square roots of what they are.
+    """Return units of the variables, (v,), in which the largest slopes of rows at x become their square roots.
 
-    Uno's subproblem solver breaks down where slopes differ by four orders of magnitude: 100 intervals, a short time.
+    Uno's subproblem solver breaks down if slopes differ by four orders of magnitude, as with 100 intervals in a short
+    time.
     """
     slopes = np.ones(len(x))
     np.maximum.at(slopes, program.jacobian_columns, np.abs(program.jacobian(x)))
@@ -146,13 +147,14 @@ def _units(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
 
 
 class _Stall:
-    """Uno's termination callback, which also stops a solve that creeps.
+    """Uno's termination callback, which also stops solves that creep.
 
-    Now and then the first steps wreck the Hessian approximation: steps then stay tiny for hundreds of iterations, far
-    from stationarity. Or a subproblem fails, and Uno restores at a feasible point for ever, where its stationarity says
-    nothing. A new approximation, scaled variables and a smaller trust region cure it.
+    Occasionally the first steps spoil the Hessian approximation. Steps then stay tiny for hundreds of iterations, far
+    from stationarity. Or a subproblem fails, and Uno stays in restoration at a feasible point forever, where its
+    stationarity measure means nothing. A new approximation, scaled variables and a smaller trust region solve both
+    problems.
 
-    Nothing cures a restoration that creeps far beyond a limit: no motion near the start is feasible.
+    Nothing helps a restoration that creeps while a limit is far exceeded: no motion close to the start is feasible.
     """
 
     def __init__(self, monitor: SolveMonitor, units: np.ndarray) -> None:
@@ -168,7 +170,7 @@ class _Stall:
         monitor = self._monitor
         restores = objective_multiplier == 0.0
         is_near = stationarity <= 0.1 and not restores
-        # In restoration Uno appends elastic variables.
+        # In a restoration Uno appends elastic variables.
         x = self._units * point[: len(self._units)]
         objective = objective_at(monitor.program, x)
         self._objectives.append(objective)
@@ -197,7 +199,7 @@ def call_uno(
     terminate: Callable[..., bool],
     hessian: SecantHessian | None = None,
 ) -> Any:
-    """One call of Uno, which is untyped, from x, (v,); its variables are x in units."""
+    """Call Uno, which is untyped, once from x, (v,); its variables are x in `units`."""
     import unopy
 
     _solve_first_program()
@@ -212,7 +214,7 @@ def call_uno(
     )
 
     def scale(function: Function, factors: np.ndarray | float) -> Callable[..., None]:
-        """Write what a function of scaled variables gives, times factors."""
+        """Wrap a function so that it accepts scaled variables and writes its values times `factors`."""
 
         def write(point: np.ndarray, out: np.ndarray) -> None:
             out[:] = factors * function(units * point)
@@ -254,12 +256,12 @@ def call_uno(
 def _spread_bounds(
     lower: np.ndarray, upper: np.ndarray, max_widening: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Widen bounds of rows, (c,), by up to a part `max_widening` of themselves, each by another one.
+    """Widen bounds of rows, (c,), by up to a fraction `max_widening`, each by a different amount.
 
     At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take an
     active-set solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason.
-    Bounds of zero stay, for a sign is strict; so do rows whose bounds are equal. Bounds above 1 are widened as if they
-    were 1.
+    Bounds of zero stay, because a condition on a sign is strict. Rows with equal bounds stay as well. Bounds above 1
+    are widened as if they were 1.
     """
     widening = max_widening * (np.arange(1, len(lower) + 1) * _GOLDEN % 1.0)
     widening[lower == upper] = 0.0
@@ -270,7 +272,7 @@ def _spread_bounds(
 def _set_hessian(
     model: Any, hessian: Callable[..., np.ndarray], units: np.ndarray
 ) -> None:
-    """Let Uno take a Hessian in place of its own approximation."""
+    """Make Uno use a given Hessian in place of its own approximation."""
     import unopy
 
     rows, columns = np.tril_indices(len(units))
