@@ -14,7 +14,7 @@ A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that 
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
 What comes out     Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
-Recorded motions   import_motion, from a CSV file; compare it with a plan along its path: Comparison; compare_run: Tracking
+Recorded motions   import_motion, from a CSV file; compare, with a plan along its path; compare_run, with its plan
 To a controller    Result.export, export, plan_for_controller, verify_run, Profile, load_profile, profile_names
 To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
 What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning

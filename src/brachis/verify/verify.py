@@ -32,7 +32,7 @@ from brachis.verify.checks import (
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import CheckedMotion, MotionStates
+from brachis.verify.motion import CheckedMotion
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 

@@ -139,7 +139,7 @@ def export(
     formats = brachis.export
     result, trajectory = _load(result)
     if profile is not None:
-        stated = {"--joints": joints, "--last": last}
+        stated: dict[str, object] = {"--joints": joints, "--last": last}
         stated |= {"--degrees": degrees or None, "--mm": mm or None}
         refuse_options(stated, "a profile", "files without one")
         write_run = partial(

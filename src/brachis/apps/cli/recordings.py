@@ -18,7 +18,6 @@ from brachis.apps.cli.output import (
     print_verification,
     show_progress,
 )
-
 from brachis.errors import InputError
 
 _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")

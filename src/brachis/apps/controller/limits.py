@@ -6,18 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.controller.axes import ControllerAxes, bind_axes
-from brachis.apps.controller.profile import Profile, load_profile
+from brachis.apps.controller.axes import ControllerAxes
+from brachis.apps.controller.profile import Profile
 from brachis.robot import Robot
-from brachis.robot.from_task import robot_from_settings
-from brachis.robot.limits import MAGNITUDES, to_spec
-from brachis.task import LIMIT_KINDS, Source, Task, load_task
+from brachis.robot.limits import MAGNITUDES
+from brachis.task import LIMIT_KINDS
 from brachis.task.limit_models import FROM_URDF, map_by_joint
 
 
-def robot_with_profile(
-    robot: Robot, profile: Profile, axes: ControllerAxes
-) -> Robot:
+def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> Robot:
     """Return a robot with the stricter ones of its limits and a profile's.
 
     Raises
@@ -31,6 +28,7 @@ def robot_with_profile(
         if not is_external
     ]
     changes: dict[str, Any] = {}
+    value: Any
     for kind in MAGNITUDES:
         stated = getattr(profile.limits, kind)
         by_joint = map_by_joint(f"profile.limits.{kind}", stated, arm, None)

@@ -71,10 +71,10 @@ class Language(Model):
     external_axes: Flag = True
     """Whether a position may have external axes."""
     template: Name
-    """Template of Jinja for a program. It may use: name, of the motion; robot and title, of the robot and the
-    controller; report.positions, report.place (m, rad) and report.time (s); t_end (s); is_linear; axes.names, axes.units
-    and axes.external; steps, a list of positions with values (in the units of the axes), duration (s) and speed (m/s)
-    from the position before, percent of the largest joint velocities, zone (m; 0: the arm stops) and event."""
+    """Jinja template of a program. It may use: name, of the motion; robot and title, of the robot and the controller;
+    report.positions, report.place (m, rad) and report.time (s); t_end (s); is_linear; axes.names, axes.units and
+    axes.external; steps, a list of positions with values (in the units of the axes), duration (s) and speed (m/s) from
+    the position before, percent of the largest joint velocities, zone (m; 0: the arm stops) and event."""
 
 
 class Profile(CheckedModel):
@@ -106,7 +106,7 @@ class Profile(CheckedModel):
     axes: tuple[Axis, ...] = ()
     """All axes, in the controller's order. Default: the arm's joints in chain order, then external axes: the sliding
     joints before the first turning one."""
-    coupled: dict[Name, dict[Name, Number]] = {}
+    coupled: dict[Name, dict[Name, Number]] = Field(default_factory=dict)
     """Values of other axes that are added to an axis, times a factor: J3: {J2: 1} where J3 is measured from the
     horizontal."""
     program: Language | None = None
@@ -123,7 +123,7 @@ class Profile(CheckedModel):
     """Time of the last sample; see brachis export."""
     path_tolerance: Positive = 1e-4
     """Largest deviation of the tool from the path, m and rad."""
-    events: dict[Name, Name] = {}
+    events: dict[Name, Name] = Field(default_factory=dict)
     """Instructions at the beginning and end of sections with a process speed: {process_on: ..., process_off: ...}."""
 
     def _mistakes(self) -> Iterator[Mistake]:

@@ -39,6 +39,8 @@ from brachis.verify.verify import path_errors
 
 _STILL = 1e-9
 """A joint that moves less than this stands still, rad or m."""
+_REST = 1e-6
+"""Largest acceleration at rest, as a fraction of the largest of the motion."""
 _CHORD_STEPS = 4
 """Steps on a straight joint line between two samples."""
 _SAMPLED = ("hold", "linear")
@@ -231,7 +233,7 @@ class _Run:
         checked = kind(run, robot, task_map, path, options)
         ratios = [*check_limits(checked, self.own_limits), *differences]
         path_check = _check_path(checked, self.profile)
-        checks = (path_check, *ratios, *_check_rest(run, self.profile))
+        checks = (path_check, *ratios, *_check_rest(self.motion, self.profile))
         worst = max((check.value for check in ratios), default=0.0)
         return Verification(checks, len(checked.states.t), worst, path_check.value)
 
@@ -371,19 +373,19 @@ def _check_differences(
         yield Check(name, ratio, allowed, "-", subject, time, of_limit=True)
 
 
-def _check_rest(run: Trajectory, profile: Profile) -> Iterator[Check]:
+def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:
     """Check that the plan begins and ends as the controller requires."""
     if profile.rest != "full":
         return
-    ends = np.abs(run.qddot[[0, -1]])
+    ends = np.abs(motion.qddot[[0, -1]])
     joint = int(np.argmax(ends.max(axis=0)))
-    scale = 1e-3 * max(np.abs(run.qddot).max(), 1.0)
+    allowed = _REST * max(np.abs(motion.qddot).max(), 1.0)
     yield Check(
         "acceleration at the ends",
         ends[:, joint].max(),
-        scale,
+        allowed,
         "rad/s^2, m/s^2",
-        run.joint_names[joint],
+        motion.joint_names[joint],
     )
 
 

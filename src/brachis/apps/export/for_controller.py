@@ -99,7 +99,9 @@ def write_for_controller(
     language = profile.program
     is_program = form == PROGRAM
     if language is not None and form is None:
-        known = [name for name in profile.formats if FORMATS[name].suffix == file.suffix]
+        known = [
+            name for name in profile.formats if FORMATS[name].suffix == file.suffix
+        ]
         is_program = file.suffix == language.suffix and not known
     if is_program and language is not None:
         text, deviation = write_program(

@@ -26,11 +26,15 @@ from brachis.trajectory import Trajectory
 
 BLEND = 0.25
 """Half of the time of a corner's parabola, as a fraction of the shorter neighbouring time."""
-_POINTS = 2000
+_POINTS = 1000
 """Number of times at which the motion is compared with the program."""
 _STRICTER = 0.7
 """Factor on the tolerances of single lines if the corners exceed them."""
 _ROUNDS = 12
+_FARTHER = 8
+"""Length of the longest line that is tried, over that of the line before."""
+_MOST = 500
+"""Largest number of positions of a program."""
 _REST = 1e-6
 """Joint velocity at rest, rad/s or m/s."""
 _SLOW = 1e-3
@@ -116,15 +120,16 @@ def write_program(
     for _ in range(_ROUNDS):
         nodes = follower.choose(share * tolerance, share * time_tolerance)
         place, time = follower.deviate(nodes, follower.t)
-        if place <= tolerance and time <= time_tolerance:
+        passes = place <= tolerance and time <= time_tolerance
+        if passes or len(nodes) > _MOST:
             break
         share *= _STRICTER
-    else:
+    if not passes:
         raise InputError(
             "no program of positions keeps the tolerance",
             where="tolerance",
-            found=f"{place:.3g} m, rad and {time:.3g} s with {len(nodes)} positions",
-            allowed=f"{tolerance:g} m, rad and {time_tolerance:g} s",
+            found=f"more than {tolerance:g} m, rad or {time_tolerance:g} s with {len(nodes) - 1} positions",
+            allowed=f"up to {_MOST} positions",
         )
     report = ProgramReport(len(nodes), place, time)
     columns = follower.describe(nodes, axes)
@@ -179,13 +184,18 @@ class _Follower:
 
         nodes = [0]
         for end in np.searchsorted(self.t, self.motion.phase_ends).tolist():
-            while nodes[-1] < end:
+            while nodes[-1] < end and len(nodes) <= _MOST:
                 first = nodes[-1]
-                low = first + 1
-                high = end
-                while low < high:
-                    middle = (low + high + 1) // 2
-                    low, high = (middle, high) if fits(first, middle) else (low, middle - 1)
+                # Longer lines may fit though shorter ones do not: the search begins far away.
+                before = first - nodes[-2] if first else end
+                high = min(end, first + _FARTHER * before)
+                low = high
+                while low > first + 1 and not fits(first, low):
+                    high = low
+                    low = first + max(1, 4 * (low - first) // 5)
+                while low < high - 1:
+                    middle = (low + high) // 2
+                    low, high = (middle, high) if fits(first, middle) else (low, middle)
                 nodes.append(low)
         return np.array(nodes)
 

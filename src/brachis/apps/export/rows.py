@@ -70,7 +70,6 @@ class JointRows:
                 columns[f"{prefix}_{joint}{shown}"] = values
         return columns
 
-
     def in_units(self, *, degrees: bool, mm: bool) -> JointRows:
         """Return the rows with angles in degrees, or lengths in mm."""
         shown = {"rad": "deg" if degrees else "rad", "m": "mm" if mm else "m"}

@@ -1,0 +1,250 @@
+"""Programs of positions, read by parsers and run by a simulation that share nothing with the writers."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+import brachis
+from support.controllers import RAIL_START
+from support.effort import QUICK
+
+NUMBER = r"(-?\d+\.?\d*(?:e-?\d+)?)"
+BLEND = 0.25
+
+
+def numbers(text):
+    """List the numbers of a text."""
+    return [float(word) for word in re.findall(NUMBER, text)]
+
+
+def read_krl(text):
+    """Axes A1 to A6 and E1; no times."""
+    targets = re.findall(r"E6AXIS: ([^}]*)}", text)
+    rows = [dict(re.findall(rf"([AE]\d) {NUMBER}", target)) for target in targets]
+    return np.array(
+        [
+            [float(row[f"A{n}"]) for n in range(1, 7)] + [float(row["E1"])]
+            for row in rows
+        ]
+    ), None
+
+
+def read_rapid(text):
+    """Axes of jointtargets in the order of the moves, and their times."""
+    targets = {
+        name: numbers(arm) + numbers(rail.replace("9E9", ""))
+        for name, arm, rail in re.findall(
+            r"jointtarget (p\d+):=\[\[([^]]*)\],\[([^]]*)\]\]", text
+        )
+    }
+    moves = re.findall(r"Move(?:AbsJ|L CalcRobT\()\s?\(?(p\d+)[^;]*;", text)
+    times = [0.0, *map(float, re.findall(rf"\\T:={NUMBER}", text))]
+    return np.array([targets[name] for name in moves]), np.array(times)
+
+
+def read_tp(text):
+    """Axes of the positions in the order of the moves, and their times."""
+    blocks = re.findall(r"P\[(\d+)\]\{(.*?)\};", text, re.DOTALL)
+    positions = {
+        number: [
+            float(value) for _, value in re.findall(rf"([JE]\d) = {NUMBER}", block)
+        ]
+        for number, block in blocks
+    }
+    moves = re.findall(rf"[JL] P\[(\d+)\] (\d+)(%|msec)", text)
+    times = [0.0 if unit == "%" else 1e-3 * float(time) for _, time, unit in moves]
+    return np.array([positions[number] for number, _, _ in moves]), np.array(times)
+
+
+def read_val3(text):
+    """Axes of the positions that are moved to."""
+    code = ET.fromstring(text).find(".//{*}Code").text
+    return np.array(
+        [numbers(row) for row in re.findall(r"jTarget=\{([^}]*)\}", code)]
+    ), None
+
+
+def read_ur(text):
+    """Joints of the moves, and their times."""
+    rows = re.findall(r"move[jl]\(\[([^]]*)\]", text)
+    times = [0.0, *map(float, re.findall(rf"t={NUMBER}", text))]
+    return np.array([numbers(row) for row in rows]), np.array(times)
+
+
+READERS = {
+    "kuka_rsi_4ms": (".src", read_krl),
+    "abb_egm_4ms": (".mod", read_rapid),
+    "fanuc_stream_8ms": (".ls", read_tp),
+    "staubli_val3": (".pgx", read_val3),
+    "ur_servoj_500hz": (".script", read_ur),
+}
+
+
+@pytest.fixture(scope="module")
+def six():
+    """A line of the tool of six joints; its second half at a process speed."""
+    robot = brachis.robots.tx90l_rail
+    return brachis.plan(
+        robot,
+        path=[
+            {"line": {"by": [0.0, 0.1, 0.0]}},
+            {"line": {"by": [0.0, 0.1, 0.0]}, "speed": 0.2},
+        ],
+        start=RAIL_START[1:],
+        task_space="pose",
+        search=QUICK,
+        locked_joints={"rail": 0.0},
+    ).trajectory
+
+
+def write(motion, profile, folder, **options):
+    """Write a program; return its text and how far it is from the motion."""
+    path = folder / f"seam{READERS[profile][0]}"
+    report = brachis.export.write_for_controller(
+        motion, path, profile, form="program", **options
+    )
+    return path.read_text(), report
+
+
+def axes_of(motion, profile, q):
+    """Positions of the axes by hand: degrees, mm, the arm first; FANUC's J3 from the horizontal."""
+    names = motion.joint_names
+    arm = [i for i, name in enumerate(names) if name != "rail"]
+    values = q[:, arm] if profile == "ur_servoj_500hz" else np.degrees(q[:, arm])
+    if profile == "fanuc_stream_8ms":
+        values[:, 2] += values[:, 1]
+    rail = [1e3 * q[:, i : i + 1] for i, name in enumerate(names) if name == "rail"]
+    return np.hstack([values, *rail])
+
+
+@pytest.mark.parametrize("moves", ["joint", "linear"])
+@pytest.mark.parametrize("profile", READERS)
+def test_positions_and_times_are_those_of_the_motion(
+    profile, moves, six, seam, tmp_path
+):
+    motion = six if profile in ("staubli_val3", "ur_servoj_500hz") else seam
+    text, report = write(motion, profile, tmp_path, moves=moves)
+    positions, durations = READERS[profile][1](text)
+    assert len(positions) == report.positions
+    dense = np.linspace(0.0, motion.t_end, 20_001)
+    values = axes_of(motion, profile, motion.position(dense))
+    scale = np.ptp(values, axis=0).max()
+    rows = [np.argmin(np.abs(values - row).max(axis=1)) for row in positions]
+    np.testing.assert_allclose(values[rows], positions, atol=2e-4 * scale)
+    if durations is not None:
+        digits = 1e-3 if profile == "fanuc_stream_8ms" else 2e-4
+        np.testing.assert_allclose(
+            np.cumsum(durations), dense[rows], atol=digits * len(rows)
+        )
+
+
+def simulate(times, nodes, rests, t):
+    """Run lines of constant velocity with linear changes of it, by integrating the velocity."""
+    h = np.diff(times)
+    ramps = BLEND * h
+    lines = np.diff(nodes, axis=0)
+    constant = h - 0.5 * ramps * rests[:-1] - 0.5 * ramps * rests[1:]
+    speeds = lines / constant[:, None]
+    knots = []
+    for k in range(len(times)):
+        before = speeds[k - 1] if k else 0.0 * speeds[0]
+        after = speeds[k] if k < len(h) else 0.0 * speeds[0]
+        if rests[k]:
+            if k:
+                knots += [(times[k] - ramps[k - 1], before), (times[k], 0.0 * before)]
+            if k < len(h):
+                knots += [(times[k], 0.0 * after), (times[k] + ramps[k], after)]
+        else:
+            half = BLEND * min(h[k - 1], h[k])
+            knots += [(times[k] - half, before), (times[k] + half, after)]
+    knot_times = np.array([time for time, _ in knots])
+    rates = np.array([rate for _, rate in knots])
+    velocity = np.column_stack([np.interp(t, knot_times, column) for column in rates.T])
+    steps = 0.5 * np.diff(t)[:, None] * (velocity[1:] + velocity[:-1])
+    return nodes[0] + np.vstack([np.zeros_like(nodes[:1]), np.cumsum(steps, axis=0)])
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "late"), [(1e-3, 0.01), (1e-4, 0.05), (0.01, 0.003)]
+)
+def test_the_deviation_is_that_of_a_simulation(tolerance, late, seam, tmp_path):
+    options = {"tolerance": tolerance, "time_tolerance": late}
+    text, report = write(seam, "abb_egm_4ms", tmp_path, **options)
+    assert report.place <= tolerance
+    assert report.time <= late
+    positions, durations = read_rapid(text)
+    times = np.cumsum(durations)
+    nodes = np.column_stack([1e-3 * positions[:, 6], np.radians(positions[:, :6])])
+    rests = np.isin(np.arange(len(times)), [0, len(times) - 1])
+    t = np.linspace(0.0, times[-1], 60_001)
+    places, rotations = seam.robot.tool_placements(simulate(times, nodes, rests, t))
+    planned = seam.robot.tool_placements(seam.position(t.clip(max=seam.t_end)))[0]
+    away = np.linalg.norm((places - planned[0])[:, [0, 2]], axis=1)
+    turned = rotations[0].T @ rotations
+    angle = np.arccos(((np.trace(turned, axis1=1, axis2=2) - 1.0) / 2.0).clip(-1, 1))
+    assert report.place == pytest.approx(max(away.max(), angle.max()), rel=0.1)
+    passed = np.interp(places[:, 1], planned[:, 1], t)
+    moving = np.gradient(planned[:, 1], t) > 1e-3 * np.ptp(planned[:, 1]) / seam.t_end
+    assert report.time == pytest.approx(np.abs(passed - t)[moving].max(), rel=0.1)
+
+
+def test_a_wider_tolerance_needs_fewer_positions(seam, tmp_path):
+    counts = [
+        write(seam, "kuka_rsi_4ms", tmp_path, tolerance=tolerance, time_tolerance=0.02)[
+            1
+        ].positions
+        for tolerance in (1e-4, 1e-3, 1e-2)
+    ]
+    assert counts[0] > counts[1] >= counts[2]
+
+
+def test_lines_of_the_tool_keep_a_straight_path(seam, tmp_path):
+    _, report = write(seam, "kuka_rsi_4ms", tmp_path, moves="linear")
+    assert report.place < 1e-9
+
+
+EVENTS = {
+    "kuka_rsi_4ms": ("$OUT[1] = TRUE", "$OUT[1] = FALSE"),
+    "abb_egm_4ms": ("SetDO do_process, 1;", "SetDO do_process, 0;"),
+    "fanuc_stream_8ms": ("DO[1]=ON", "DO[1]=OFF"),
+    "staubli_val3": ("doProcess = true", "doProcess = false"),
+}
+
+
+@pytest.mark.parametrize("profile", EVENTS)
+def test_a_process_is_switched_where_its_speed_begins_and_ends(
+    profile, six, seam, tmp_path
+):
+    motion = six if profile == "staubli_val3" else seam
+    text, report = write(motion, profile, tmp_path)
+    on, off = EVENTS[profile]
+    assert text.count(on) == text.count(off) == 1
+    assert text.index(on) < text.index(off)
+    process = next(phase for phase in motion.phases if phase.kind == "given speed")
+    before, _, rest = text.partition(on)
+    moves = {
+        "kuka_rsi_4ms": r"\nPTP",
+        "abb_egm_4ms": "    Move",
+        "fanuc_stream_8ms": r":[JL] P",
+        "staubli_val3": "movej",
+    }
+    count = len(re.findall(moves[profile], before))
+    positions, _ = READERS[profile][1](text)
+    values = axes_of(motion, profile, motion.position([process.begin]))
+    np.testing.assert_allclose(positions[count - 1], values[0], atol=1e-4)
+
+
+def test_heads_name_the_robot_the_positions_and_the_deviation(seam, tmp_path):
+    for profile in ("kuka_rsi_4ms", "abb_egm_4ms", "fanuc_stream_8ms"):
+        text, report = write(seam, profile, tmp_path)
+        head = text[:400]
+        assert "tx90l_rail" in head
+        assert f"{report.positions} positions" in head
+        assert f"deviation {1e3 * report.place:.3g} mm" in head
+
+
+def test_a_language_without_external_axes_refuses_a_rail(seam, tmp_path):
+    with pytest.raises(brachis.InputError, match="no external axes; found j1, .*, e1"):
+        write(seam, "staubli_val3", tmp_path)
