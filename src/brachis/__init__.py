@@ -14,8 +14,8 @@ A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that 
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
 What comes out     Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
-Recorded motions   import_motion, from a CSV file; compare, with a plan along its path; compare_run, with its plan
-To a controller    Result.export, export, plan_for_controller, verify_run, Profile, load_profile, profile_names
+Recorded motions   import_motion, from a CSV; compare with a plan on its path: Comparison; compare_run: Tracking
+To a controller    export, plan_for_controller, verify_run: RunReport; Profile, load_profile, profile_names
 To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
 What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning
 To extend it       ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from brachis.apps.comparison import compare as compare
     from brachis.apps.comparison import compare_run as compare_run
     from brachis.apps.controller import Profile as Profile
+    from brachis.apps.controller import RunReport as RunReport
     from brachis.apps.controller import load_profile as load_profile
     from brachis.apps.controller import profile_names as profile_names
     from brachis.apps.controller import verify_run as verify_run
@@ -107,7 +108,7 @@ _MODULES = {
 _NAMES = {
     "apps.bottleneck": "BottleneckReport",
     "apps.comparison": "Comparison Tracking compare compare_run",
-    "apps.controller": "Profile load_profile profile_names verify_run",
+    "apps.controller": "Profile RunReport load_profile profile_names verify_run",
     "apps.controller_plan": "plan_for_controller",
     "apps.recording": "import_motion",
     "apps.sweeps": "SweepResult sweep",

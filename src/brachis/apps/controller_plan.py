@@ -24,6 +24,8 @@ from brachis.task import Source, TaskKeywords
 
 _ROUNDS = 4
 """Plans that are made, each with smaller limits than the one before."""
+_FULL_REST = 2
+"""Number of derivatives, velocity and acceleration, that vanish at the ends."""
 _MARGIN = 1e-3
 """By how much more than the excess a limit is made smaller."""
 
@@ -76,7 +78,7 @@ def plan_for_controller(
     profile = load_profile(profile)
     robot, loaded = read_arguments(robot_or_task, task, keywords)
     robot = robot_with_profile(robot, profile, bind_axes(profile, robot))
-    if profile.rest == "full" and loaded.spline.rest == "velocity":
+    if profile.rest == "full" and loaded.spline.vanishing < _FULL_REST:
         spline = loaded.spline.model_copy(update={"rest": "full"})
         loaded = loaded.model_copy(update={"spline": spline})
     unscaled = without_scale(robot)

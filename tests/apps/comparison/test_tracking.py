@@ -72,18 +72,6 @@ def test_the_error_of_one_joint_is_found_in_its_place(planned, tmp_path):
     assert by_joint["joint_6"].torque == pytest.approx(3.0, rel=0.1)
 
 
-def test_the_command_prints_the_table(planned, tmp_path, capsys):
-    from typer.testing import CliRunner
-
-    from brachis.apps.cli.main import app
-
-    path = record(planned, tmp_path / "run.csv")
-    planned.save(tmp_path / "result.npz")
-    words = ["compare", str(path), "--plan", str(tmp_path), "--profile", "kuka_rsi_4ms"]
-    outcome = CliRunner().invoke(app, words)
-    assert outcome.exit_code == 0, outcome.output
-
-
 @pytest.mark.parametrize(
     ("profile", "message"),
     [

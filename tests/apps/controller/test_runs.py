@@ -1,6 +1,7 @@
 """Motions as controllers run them, checked by formulas of the tests' own."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -86,9 +87,7 @@ def test_the_path_error_is_that_of_straight_joint_lines(seam):
     report = brachis.verify_run(seam, profile)
     samples = seam.sample(0.02, last="hold")
     u = np.linspace(0.0, 1.0, 5)[1:-1, None]
-    chords = np.concatenate(
-        [a + u * (b - a) for a, b in zip(samples.q[:-1], samples.q[1:])]
-    )
+    chords = np.concatenate([a + u * (b - a) for a, b in pairwise(samples.q)])
     places, rotations = seam.robot.tool_placements(chords)
     start, first = seam.robot.tool_placements(seam.q[:1])
     along = np.array([0.0, 1.0, 0.0])

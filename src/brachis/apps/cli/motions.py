@@ -156,7 +156,8 @@ def export(
             warnings.simplefilter("ignore", formats.RunWarning)  # printed below
             report = write_one(out, write_run, _inputs(result, trajectory))
         code = print_run(report, json=json)
-        print_lines(f"wrote {out}")
+        if not json:
+            print_lines(f"wrote {out}")
         raise typer.Exit(code)
     settings = formats.format_of(out, form)
     names = None if joints is None else [name.strip() for name in joints.split(",")]

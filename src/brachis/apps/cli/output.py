@@ -136,12 +136,12 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
 
     if json:
         print_json(report.to_dict())
-    if not isinstance(report, RunReport):
+    elif isinstance(report, RunReport):
+        print_lines(f"as {report.controller} runs it, every {1e3 * report.period:g} ms:")
+        print_verification(report.verification, degrees=False)
+    else:
         print_lines(str(report))
-        return 0
-    print_lines(f"as {report.controller} runs it, every {1e3 * report.period:g} ms:")
-    print_verification(report.verification, degrees=False)
-    if report.passed:
+    if not isinstance(report, RunReport) or report.passed:
         return 0
     reasons = ("the motion breaks limits as it is run", *report.failures)
     print_error("\n".join([*reasons, *report.remedies]))

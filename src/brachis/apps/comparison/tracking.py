@@ -58,6 +58,17 @@ class Tracking(Summary):
         Largest distance of the tool from its place in the plan, m.
     tool_time : float
         When, s of the plan.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = result.export(f"{folder}/run.csv", profile="ur_servoj_500hz")
+    ...     tracking = brachis.compare_run(f"{folder}/run.csv", result, "ur_servoj_500hz")
+    >>> isinstance(tracking, brachis.Tracking), tracking.axes[0].axis
+    (True, 'base')
     """
 
     axes: tuple[AxisTracking, ...]

@@ -78,7 +78,15 @@ class Language(Model):
 
 
 class Profile(CheckedModel):
-    """How a controller takes a motion, and what it makes of it."""
+    """How a controller takes a motion, and what it makes of it.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> profile = brachis.load_profile("kuka_rsi_4ms")
+    >>> profile.arm.names[0], profile.arm.angle, profile.external.length
+    ('A1', 'deg', 'mm')
+    """
 
     brachis_profile: Version
     """Version of the format."""
@@ -113,18 +121,24 @@ class Profile(CheckedModel):
     """Language of programs of positions."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Limits that the controller checks, as in robot.limits. A list is in the order of the arm's axes."""
-    differences: Flag = True
-    """Whether the controller checks differences of successive samples."""
     rest: Literal["velocity", "full"] = "velocity"
     """What must be zero at both ends: the velocity alone, or the acceleration too."""
     decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
     """Decimals of positions in the file. Default: all digits."""
-    last: Literal["exact", "hold"] = "hold"
-    """Time of the last sample; see brachis export."""
     path_tolerance: Positive = 1e-4
     """Largest deviation of the tool from the path, m and rad."""
     events: dict[Name, Name] = Field(default_factory=dict)
     """Instructions at the beginning and end of sections with a process speed: {process_on: ..., process_off: ...}."""
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether only the samples are known, and not what is between them."""
+        return self.interpolation in ("hold", "linear")
+
+    @property
+    def last(self) -> str:
+        """Time of the last sample; see `Trajectory.sample`."""
+        return "hold" if self.is_sampled else "exact"
 
     def _mistakes(self) -> Iterator[Mistake]:
         if self.limits.scale != LimitScale():
@@ -143,7 +157,14 @@ EVENTS: Final = ("process_on", "process_off")
 
 
 def profile_names() -> list[str]:
-    """Return the names of the profiles that come with brachis."""
+    """Return the names of the profiles that come with brachis.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.profile_names()[:2]
+    ['abb_egm_4ms', 'fanuc_stream_8ms']
+    """
     return sorted(path.stem for path in _FOLDER.glob("*.yaml"))
 
 
@@ -165,8 +186,8 @@ def load_profile(source: str | os.PathLike[str] | Profile) -> Profile:
 
     Examples
     --------
-    >>> from brachis.apps.controller import load_profile
-    >>> load_profile("franka_1khz").limits.jerk[0]
+    >>> import brachis
+    >>> brachis.load_profile("franka_1khz").limits.jerk[0]
     7500.0
     """
     if isinstance(source, Profile):

@@ -43,8 +43,6 @@ _REST = 1e-6
 """Largest acceleration at rest, as a fraction of the largest of the motion."""
 _CHORD_STEPS = 4
 """Steps on a straight joint line between two samples."""
-_SAMPLED = ("hold", "linear")
-"""Interpolations of which only the samples are known."""
 _DERIVATIVES = ("velocity", "acceleration", "jerk", "torque_rate")
 """Kinds of limits that differences of samples are compared with."""
 _SLOWER = (1.001, 1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0)
@@ -138,6 +136,13 @@ def verify_run(
     ------
     InputError
         The profile does not fit the robot, a joint that moves has no axis, or the controller takes no other period.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> brachis.verify_run(result, "kuka_rsi_4ms").passed
+    True
     """
     motion = motion_of(trajectory)
     profile = load_profile(profile)
@@ -219,17 +224,14 @@ class _Run:
         path = path_of(task_map, task)
         options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
         allowed = 1.0 + options.ratio_tolerance
-        is_sampled = self.profile.interpolation in _SAMPLED
-        differences = (
-            _check_differences(robot, run, allowed)
-            if is_sampled or self.profile.differences
-            else ()
-        )
-        if is_sampled:
+        differences: list[Check] = []
+        kind = CheckedMotion
+        if self.profile.is_sampled:
+            differences = list(_check_differences(robot, run, allowed))
+            kind = _SampledMotion
             free = np.full(robot.n, np.inf)
             limits = robot.limits.with_magnitudes(**dict.fromkeys(_DERIVATIVES, free))
             robot = replace(robot, limits=limits)
-        kind = _SampledMotion if is_sampled else CheckedMotion
         checked = kind(run, robot, task_map, path, options)
         ratios = [*check_limits(checked, self.own_limits), *differences]
         path_check = _check_path(checked, self.profile)
@@ -362,6 +364,7 @@ def _check_differences(
         lower, upper = robot.limits.both_ways(kind)
         if not np.isfinite(upper).any():
             continue
+        # The controller holds the first position before, and the last one afterwards.
         held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
         rates = np.diff(held, order, axis=0) / period**order
         ratios = np.maximum(rates / upper, rates / lower)
