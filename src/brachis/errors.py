@@ -104,7 +104,7 @@ _NAMES_HERE = {
 
 
 class Details(TypedDict, total=False):
-    """What an error says besides the problem; see `BrachisError`."""
+    """The facts that an error states besides the problem; see `BrachisError`."""
 
     found: object
     allowed: object
@@ -122,9 +122,9 @@ class BrachisError(Exception):
     found : object, optional
         What was found.
     allowed : object, optional
-        What would have been accepted.
+        The values that would have been accepted.
     where : str, optional
-        File and key, joint, or interval of the path coordinate.
+        Place of the problem: file and key, joint, or interval of the path coordinate.
     hint : str, optional
         What to try.
 
@@ -341,7 +341,7 @@ class DecompositionError(InputError):
     redundant_joints : tuple of str
         The requested choice.
     reasons : dict of str to str
-        For every family that was tried, why it does not fit.
+        The reason why each family that was tried does not fit.
     available : tuple of tuple of str
         Choices of redundant joints of this robot and task space that do have a closed form.
     """
@@ -369,7 +369,7 @@ class DecompositionError(InputError):
 
 
 class ResultFileError(InputError):
-    """A saved result is missing, broken, or of another schema version."""
+    """A saved result is missing, broken, or has a different schema version."""
 
 
 class ClusterError(BrachisError):
@@ -377,7 +377,7 @@ class ClusterError(BrachisError):
 
 
 class NotInstalledError(InputError):
-    """A library of an extra is not installed.
+    """A library that an extra of brachis installs is missing.
 
     Attributes
     ----------
@@ -473,7 +473,7 @@ class MissingAttributeError(AttributeError):
 
 
 def _attribute_meant(instance: object, name: str) -> str | None:
-    """Return the attribute of an object, or of one of its parts, that may be meant by a name."""
+    """Return the attribute of an object, or of one of its parts, that a name may stand for."""
     public = [entry for entry in dir(instance) if not entry.startswith("_")]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
         if word in public or "." in word:

@@ -52,7 +52,7 @@ from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import MotionSource, motion_of
 
 RobotOrTask = Source | Robot | None
-"""A robot, or a task; both may be the name of a file."""
+"""A robot or a task; either may be given by the name of a file."""
 _OWN_KEYWORDS = (
     "start_from",
     "families",
@@ -235,7 +235,7 @@ def _open_search(
 def _find_smoother(
     best: FinishedCandidate, problem: Problem, deadline: Deadline, report: Listener
 ) -> LeastMotion | None:
-    """Find the smoothest motion that is as fast, if the task asks for it."""
+    """Find the smoothest motion that is as fast as the best one, if the task asks for it."""
     if not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")

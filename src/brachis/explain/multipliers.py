@@ -35,7 +35,7 @@ class ActiveSet:
     slopes : (p, v) ndarray
         Gradients of active rows, then of active variables; at upper bounds, the negative gradients.
     rows : (a,) int ndarray
-        Rows to which the first a slopes belong.
+        Numbers of the rows to which the first a slopes belong.
     signs : (a,) ndarray
         1 at a lower bound, -1 at an upper one.
     equalities : int
@@ -182,7 +182,7 @@ def multipliers_of(
     program : Program
     x : (v,) ndarray
     of_solver : (c,) ndarray, optional
-        The solver's multipliers of the rows; L = t_E - of_solver . rows.
+        The solver's multipliers of the rows; the Lagrangian is L = t_E - of_solver . rows.
 
     Returns
     -------

@@ -168,7 +168,7 @@ TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
 
 
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
-    """Derive what the task's figures cost; figures that cannot be larger are left out."""
+    """Derive the costs of the task's figures; figures that cannot be made larger are left out."""
     costs = []
     for cost, change in (*_speeds(motion.problem), *_blends(motion.problem)):
         step = motion.step * cost.figure
@@ -256,7 +256,7 @@ def _with_task(problem: Problem, task: Task) -> Problem:
     Raises
     ------
     PathError
-        The path is not possible.
+        The task describes no valid path.
     """
     task_map = problem.task_map
     path = path_of(task_map, task)

@@ -195,7 +195,7 @@ def load_remedies(
     for bound in limit.bounds if label.key else ():
         if bound.column == column and bound.side is None:
             figure = bound.figure / scale
-            # 5 % more than holding the arm takes.
+            # The new limit is 5 % more than what is needed to hold the arm.
             enough = 1.05 * ratio * figure
             remedies.append(Remedy(label.key, figure, enough, label.unit))
     payload = robot.settings.payload

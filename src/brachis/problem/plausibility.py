@@ -43,7 +43,7 @@ _OR_NULL = ", or null for no limit"
 _OF_SIZE = " for an arm of this size"
 _OF_MASS = " for this mass"
 USUAL = {
-    # Delta robots move at 10 m/s, and accelerate with 15 g.
+    # Delta robots move at 10 m/s and accelerate at 15 g.
     "tool_limits.speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
     "tool_limits.process_speed": ("the speed looks like mm/s", 50.0, "m/s", ""),
     "tool_limits.acceleration": (
@@ -104,7 +104,7 @@ and a remark on it. Some of the largest figures are relative to the size or the 
 def _figure(
     key: str, value: float, scale: float = 1.0, where: str = ""
 ) -> Iterator[Issue]:
-    """Compare a value with `scale` times the largest usual one."""
+    """Compare a value with `scale` times the largest usual value."""
     message, largest, unit, aside = USUAL[key]
     return issue_above(where or key, message, value, largest * scale, unit, aside)
 

@@ -90,8 +90,8 @@ class Problem(Summary):
         Raises
         ------
         InputError
-            Task space, postures, path or a limit of the user's do not fit the robot; the splines are not smooth enough
-            for a limit.
+            The task space, the postures, the path or a limit of the user does not fit the robot, or the splines are not
+            smooth enough for a limit.
         """
         robot, task_map = bind(robot, task.task_space, task.tolerances)
         at_start = task.joints_at("start")
@@ -159,7 +159,7 @@ class Problem(Summary):
 
     @property
     def r(self) -> int:
-        """Degree of redundancy: by how many the joints outnumber the rows of the task space."""
+        """Degree of redundancy: the number of joints minus the number of rows of the task space."""
         return self.robot.n - self.task_map.m
 
     def _law_rate(self, leg: int, end: int) -> float:
@@ -189,7 +189,7 @@ class Problem(Summary):
 
 
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
-    """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
+    """Return the posture at the end of the path closest to a given one, (n,), which may already be there."""
     place = path.sample(np.ones(1)).target
     if isinstance(task_map, JointSpace):
         return np.asarray(place[0])
@@ -265,7 +265,7 @@ class Decompositions(Sequence[Decomposition]):
         return len(self._found)
 
     def __getitem__(self, index: Any) -> Any:
-        """Return one of them, or some."""
+        """Return one of the decompositions, or several."""
         return self._found[index]
 
 
@@ -290,7 +290,7 @@ def decompositions_of(
     Raises
     ------
     DecompositionError
-        No closed form fits.
+        No closed form fits the robot and the task.
     StartError
         A given posture is singular. Or a branch or named joints bind the motion to one branch, and a given posture is
         on another.

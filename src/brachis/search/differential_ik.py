@@ -53,7 +53,7 @@ STRATEGIES = (
 def differential_ik_paths(
     joint_map: ClosedFormMap, deadline: Deadline = NEVER
 ) -> Iterator[np.ndarray]:
-    """Yield joint paths, (steps, 1 + r), strategy after strategy; those not complete by the deadline are left out."""
+    """Yield a joint path, (steps, 1 + r), for each strategy, unless it fails or is not complete by the deadline."""
     for strategy in STRATEGIES if joint_map.r else STRATEGIES[:1]:
         joint_path = differential_ik_path(joint_map, strategy, deadline)
         if joint_path is not None:

@@ -45,7 +45,7 @@ def explain_reach(
     ----------
     decomposition : Decomposition
     deadline : Deadline, optional
-        When the search for the reason ends; the advice then says so.
+        When the search for the reason ends; if it found none by then, the advice says so.
 
     Returns
     -------

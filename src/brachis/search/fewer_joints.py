@@ -21,7 +21,7 @@ from brachis.task import Task, Tolerances
 from brachis.trajectory import Trajectory
 
 Opening = Callable[[Problem, Deadline], Search]
-"""Opens the search for a problem."""
+"""A function that opens the search for a problem."""
 _WORTH_MOVING = 2.0
 """Multiple of the spline tolerance that moving idle joints has to save: either plan may be slower by one tolerance."""
 

@@ -155,7 +155,7 @@ def lock_idle(
 
 
 def stand_still(robot: Robot, postures: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the positions, (n,), at which idle joints stand still: as in a given posture, or else at zero."""
+    """Return the positions, (n,), at which idle joints stand still: those of a given posture, or else zero."""
     limits = robot.limits
     nearest = np.clip(np.zeros(robot.n), limits.position_lower, limits.position_upper)
     return next(iter(postures.values()), nearest)

@@ -417,7 +417,7 @@ def bring_onto_path(
     Raises
     ------
     UnreachableError
-        Such postures do not exist, or they jump.
+        Such postures do not exist, or they jump along the path.
     """
     if newton is not None:
         q = newton.nearest(problem.path.sample(s).target, q)

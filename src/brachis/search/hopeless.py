@@ -44,7 +44,7 @@ _LEAST = 1e-4
 
 
 def refuse_hopeless(guesses: Sequence[InitialGuess]) -> None:
-    """Refuse loads and speeds that are far out of reach along the joint paths of all guesses, before plans are tried.
+    """Refuse loads and speeds far out of reach along the joint paths of all guesses, before any plan is tried.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def explain_speeds(
         if q is None:
             return None
         check = _SpeedCheck(guess, speeds, s, q)
-        # The phase plane is exact without other joint paths, and without friction that helps to brake.
+        # The phase plane is exact if there are no other joint paths, and no friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
         if not check.allows(_LEAST) or check.allows(enough):
@@ -321,7 +321,7 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
 
 
 def _explain_short_leg(check: _SpeedCheck, leg: int, share: float) -> str:
-    """Say between which speeds a leg is too short, for which limit, and how long it has to be.
+    """Say between which speeds a leg is too short, because of which limit, and how long it would have to be.
 
     The leg allows this fraction of the speeds. Under a constant acceleration the length grows with the square of speed.
     """

@@ -59,7 +59,7 @@ def _go_to(point: tuple[Program, np.ndarray]) -> Change:
 def move_to_chart(
     problem: Problem, solved: SolvedProgram, rows: ChartRows | None = None
 ) -> tuple[Program, np.ndarray] | None:
-    """Write a motion in a chart around itself; None if it has none.
+    """Write a motion in the coordinates of a chart around it; None if there is no such chart.
 
     Parameters
     ----------

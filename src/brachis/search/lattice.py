@@ -61,7 +61,7 @@ _SLACK = 1e-9
 
 @dataclass(frozen=True)
 class Layer:
-    """Nodes at a station.
+    """The nodes at a station.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Edges:
     step : (E, n) ndarray
         Step from the node to the posture; NaN if the posture does not exist.
     key : (E, k) int ndarray
-        Equal for edges to the same node.
+        Key that is equal for edges to the same node.
     elsewhere : (E,) bool ndarray, optional
         Whether there is a posture on any branch; by default there is.
     allowed : (E,) bool ndarray, optional
@@ -207,7 +207,7 @@ class Lattice(ABC):
 
     @abstractmethod
     def _thin(self, layer: Layer) -> Layer:
-        """Keep no more nodes than a layer may have."""
+        """Reduce a layer to the number of nodes that it may have."""
 
     def _choose_start_nodes(self, layer: Layer) -> Layer:
         """Choose among the nodes of a free start."""

@@ -237,7 +237,7 @@ def lay_along_timing(
     ----------
     candidate : RankedCandidate
     program : Program
-        Over any knots.
+        A program over any knots.
     timings : sequence of PhaseTiming or None
     reports : tuple of SolverReport
         Reports of earlier solves.

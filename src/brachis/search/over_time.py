@@ -159,7 +159,7 @@ class BetterTimings:
 
 
 def shorten_solves(session: SolverSession) -> SolverSession:
-    """Bound the effort of solves that begin with the fastest timing."""
+    """Return a session with bounded effort, for solves that begin with the fastest timing."""
     iterations = min(_ITERATIONS, session.options.max_iterations)
     options = replace(session.options, max_iterations=iterations, widening=_WIDENING)
     return replace(session, options=options)

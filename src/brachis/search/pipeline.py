@@ -71,7 +71,7 @@ too late."""
 def rank_candidate(
     guess: InitialGuess, deadline: Deadline, _listener: Listener
 ) -> Candidate:
-    """Improve the joint path of a guess over the path, so that candidates can be ranked, unless the time is up.
+    """Improve the joint path of a guess over the path, so that candidates can be ranked; skip it if the time is up.
 
     Parameters
     ----------

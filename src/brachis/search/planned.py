@@ -125,7 +125,7 @@ class PlannedMotion(Summary):
 
     @property
     def solver_report(self) -> SolverReport:
-        """Report of the solve that gave the trajectory."""
+        """The report of the solve that gave the trajectory."""
         return self.candidate.reports[-1]
 
     def to_dict(self) -> dict[str, Any]:

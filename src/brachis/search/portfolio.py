@@ -1,4 +1,4 @@
-"""The search: initial guesses from lattices, ranked by the timing of their joint paths, the best refined and verified.
+"""The search: guesses from lattices are ranked by the timing of their joint paths; the best are refined and verified.
 
 1. Lattices give initial guesses, batch by batch (see `schedule`).
 2. The joint paths of the guesses are improved, and the least times along them rank the candidates (see `pipeline`).
@@ -163,7 +163,7 @@ class Search:
         Raises
         ------
         PathError
-            The path is out of reach, or no posture along it is allowed at rest.
+            The path is out of reach, or at some point of it no posture is allowed at rest.
         PlanningError
             A given speed, or a limit on the mean of a load, is far out of reach.
         """
@@ -472,7 +472,7 @@ class Search:
             self._to_beat = Marks(begun, least)
 
     def _is_known(self, candidate: RankedCandidate) -> bool:
-        """Tell whether a motion along the same joint path is known, in the same coordinates."""
+        """Tell whether a motion along the same joint path, in the same coordinates, is already known."""
         return any(
             candidate.redundant_joints == finished.redundant_joints
             and candidate.branch == finished.branch
@@ -496,7 +496,7 @@ class Search:
             self._keep(candidate)
 
     def _describe_best(self) -> str:
-        """Say how far the best motion is from a plan; empty without one."""
+        """Say by how much the best motion exceeds the limits; empty if there is no motion."""
         if self.best is None:
             return ""
         over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)

@@ -62,7 +62,7 @@ def try_remedies(
             key: str = remedy.key,
             remedy_deadline: Deadline = remedy_deadline,
         ) -> bool | None:
-            """Tell whether a value of the key gives a plan; None if the time was up."""
+            """Tell whether a value of the key gives a plan; None if the time ran out first."""
             soon = remedy_deadline.part(0.4) if max_batches else remedy_deadline
             try:
                 changed = load_task(_with_number(content, robot, key, value))

@@ -1,4 +1,4 @@
-"""What the search tries, batch after batch: initial guesses with solvers.
+"""The batches that the search tries one after the other: initial guesses with solvers.
 
 If the task leaves the choice of redundant joints open, guesses come from the lattice of all postures, and plans are
 made in charts; the closed forms of single choices are tried only while nothing is verified. If the task names its
@@ -83,7 +83,7 @@ def batches(
     problem : Problem
     decompositions : sequence of Decomposition
     deadline : Deadline
-        Joint paths that are not found by then are left out.
+        Joint paths not found by then are left out.
     listener : callable
 
     Yields

@@ -92,7 +92,7 @@ class InitialGuess(Summary):
 
     @property
     def legs(self) -> list[np.ndarray]:
-        """The part of the joint path on every leg, (S, 1 + r) each."""
+        """The parts of the joint path on the legs, (S, 1 + r) each."""
         legs = self.problem.legs
         if self.durations is not None or len(legs) == 1:
             return np.split(self.joint_path, len(legs))
@@ -234,7 +234,7 @@ def round_end_time(time: float) -> float:
 
 
 def facts_of(candidate: Candidate) -> dict[str, Any]:
-    """Return the fields that all candidates have, to be carried over from stage to stage."""
+    """Return the fields that all candidates have, which are carried over from stage to stage."""
     names = (field.name for field in fields(Candidate))
     return {name: getattr(candidate, name) for name in names}
 
@@ -364,7 +364,7 @@ class FinishedCandidate(Candidate):
 
     @property
     def time_scaled(self) -> float:
-        """Factor by which the end time was lengthened at the very end."""
+        """Factor by which the end time was lengthened in the last step."""
         return self.refined.time_scaled
 
     @property

@@ -116,7 +116,7 @@ def verify(
 def _in_words(
     refined: SolvedProgram, verification: Verification | None, tolerance: float
 ) -> str:
-    """Say what became of a refined program, whose limits may be exceeded by a fraction `tolerance`."""
+    """Describe the outcome of a refined program, whose limits may be exceeded by a fraction `tolerance`."""
     last = refined.report
     if verification is not None and verification.passed:
         return "verified"
