@@ -396,9 +396,7 @@ class NotBuiltError(BrachisError):
     """The compiled kernel is missing, damaged, or built from different source code."""
 
     def __init__(self, problem: str, script: object) -> None:
-        hint = (
-            f"Run python {script}; if there is no C compiler, run {PIP} ziglang first"
-        )
+        hint = f"Run python {script}; without a C compiler, run {PIP} ziglang first"
         super().__init__(f"the kernel is not built: {problem}", hint=hint)
 
 

@@ -7,8 +7,7 @@
    before refinement is not refined.
 4. If there is little time, a motion close to a joint path is found before anything else. If nothing is verified towards
    the end of the time, such a motion is found then (see `first_motion`).
-5. Other solvers, the closed forms of single choices of redundant joints, and numeric guesses are tried only while
-   nothing is verified.
+5. Other solvers, closed forms of single choices and numeric guesses are tried only while nothing is verified.
 
 The outcome does not depend on the number of processes: work that one process would not have done is discarded.
 """
@@ -58,8 +57,7 @@ from brachis.trajectory import Trajectory
 
 _LEAST_COST = 0.5
 """Knots, and limits that the phase plane does not know, lengthen every motion. They cost a candidate at least this
-fraction of the smallest cost so far. With 10 intervals, the cost for joint paths of a planar arm was 17 to 20 % of the
-time."""
+fraction of the smallest cost so far. With 10 intervals, joint paths of a planar arm lost 17 to 20 % of the time."""
 _RANKING_SHARE = 0.6
 """Fraction of the remaining time after which no joint path is improved while nothing is verified."""
 _RESERVE = 0.3
@@ -174,8 +172,7 @@ class Search:
                 self._find_first_motion(batch.guesses, soon)
             self._rank(batch)
             self._refine_and_verify(batch)
-        # The last solves may have been cut short.
-        self.interrupted |= self._latest.passed
+        self.interrupted |= self._latest.passed  # solves may have been cut short
         if self.interrupted and self._reserve > 0.0:
             self._find_first_motion(self.guesses, self._deadline)
 
