@@ -323,8 +323,8 @@ def test_the_time_limit_gives_the_best_motion_so_far(clock):
 @pytest.mark.parametrize(
     ("changes", "solved", "remark"),
     [
-        ({}, 1, "of 2 candidates 1 not tried"),
-        (BRANCH, 2, "of 5 candidates 3 not tried, 1 not finished"),
+        ({}, 1, "of 2 candidates, 1 remained untried"),
+        (BRANCH, 2, "of 5 candidates, 3 remained untried, 1 remained unfinished"),
     ],
 )
 @pytest.mark.usefixtures("splines_are_too_fast")
@@ -352,7 +352,7 @@ def test_time_is_kept_for_a_first_motion_while_nothing_is_verified(clock):
     result = plan()
     assert result.interrupted
     assert result.verified
-    assert any("first motion alone" in text for text in result.not_completed)
+    assert any("only for a first motion" in text for text in result.not_completed)
 
 
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
@@ -402,7 +402,7 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(clock):
     clock.jump(schedule, "lattice_guesses", at=1)
     message = (
         r"within the time limit of 60 s: the lattice of j. \| j. was not searched completely; "
-        r"of \d+ candidates \d+ not tried; .*\. Raise search\.time_limit"
+        r"of \d+ candidates, \d+ remained untried; .*\. Raise search\.time_limit"
     )
     with pytest.raises(PlanningError, match=message):
         plan(**EVERY_CHOICE)

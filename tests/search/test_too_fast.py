@@ -161,7 +161,7 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids():
 
 def test_two_speeds_that_are_too_high_are_both_in_the_message():
     both = {"start_speed": 0.9, "end_speed": 0.9}
-    lower = r"Lower boundary\.start_speed and lower boundary\.end_speed \(how"
+    lower = r"Lower boundary\.start_speed and lower boundary\.end_speed \(by how much"
     error = error_of(slide(0.3, (0.3, 0.6), limits={"velocity": 0.3}, **both), lower)
     assert largest_speed_in(error) == 0.3
 
