@@ -1,7 +1,5 @@
 """Periodic motions and ends in motion, from the task to the verified motion and to MuJoCo."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -82,7 +80,7 @@ def test_a_free_start_posture_is_the_end_posture():
     result = plan(start="free", path_start=[3.0**0.5, 0.0], intervals=12)
     assert result.verified
     q = result.trajectory.q
-    np.testing.assert_allclose(q[0], q[-1], atol=1e-9)
+    assert_allclose(q[0], q[-1], atol=1e-9)
 
 
 def test_the_verification_sees_changes_at_seams(circle):
@@ -136,7 +134,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
         state = trajectory.at(time)
         pin.forwardKinematics(model, data, state.q[0], state.qdot[0])
         velocity = pin.getFrameVelocity(model, data, frame, axes).linear
-        np.testing.assert_allclose(velocity, [0.0, speed, 0.0], atol=1e-9)
+        assert_allclose(velocity, [0.0, speed, 0.0], atol=1e-9)
     assert result.t_end < plan(**line).t_end
     faster = task_with(result.task, end_speed=0.501)
     assert failures_of(replace(trajectory, task=faster)) == {"end speed"}
@@ -222,7 +220,7 @@ def test_a_motion_that_does_not_end_at_rest_has_no_posture_to_hold(circle):
 def test_a_circle_round_the_arm_closes_if_joints_turn_freely():
     """A joint makes a whole turn, which one with a range cannot repeat."""
 
-    def arm(kind: str) -> brachis.Robot:
+    def arm(kind):
         limit = {"effort": 60.0, "velocity": 4.0, "lower": -7.0, "upper": 7.0}
         offsets = [(0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (0.4, 0.0, 0.0)]
         joints = [Joint(kind, xyz=offset, limit=limit) for offset in offsets]
@@ -244,7 +242,7 @@ def test_a_circle_round_the_arm_closes_if_joints_turn_freely():
     assert result.verified
     turns = np.abs(np.diff(result.trajectory.q[[0, -1]], axis=0)) / (2.0 * np.pi)
     assert turns.max() > 0.9
-    np.testing.assert_allclose(turns, turns.round(), rtol=0.0, atol=1e-9)
+    assert_allclose(turns, turns.round(), rtol=0.0, atol=1e-9)
     with_ranges = verify_trajectory(result.trajectory, robot=arm("revolute"))
     failed = [check.name for check in with_ranges.checks if not check.passed]
     assert failed == ["position over the seam"]

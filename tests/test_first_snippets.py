@@ -1,7 +1,5 @@
 """What a new user writes first runs, and means what the task file means."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import runpy

@@ -1,7 +1,5 @@
 """Ctrl-C that is never lost."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -24,7 +22,7 @@ def presses(monkeypatch):
     signal.signal(signal.SIGINT, before)
 
 
-def press() -> None:
+def press():
     os.kill(os.getpid(), signal.SIGINT)
 
 
@@ -48,15 +46,15 @@ def test_a_press_interrupts():
 
 
 class Finaliser:
-    def __del__(self) -> None:
+    def __del__(self):
         press()
 
 
-def swallowed_by_a_finaliser() -> None:
+def swallowed_by_a_finaliser():
     Finaliser()
 
 
-def swallowed_by_a_library() -> None:
+def swallowed_by_a_library():
     try:
         press()
     except BaseException as error:

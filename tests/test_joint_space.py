@@ -1,7 +1,5 @@
 """Paths of joints from the task to the verified motion: beside toppra, under every limit, saved, tampered with."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """The pipeline as a whole: what is kept, what is refused, how it is interrupted."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np
@@ -16,7 +14,7 @@ from support.scara import START, scara
 from support.starts import starting_points
 
 
-def plan(robot=None, **changes) -> brachis.Result:
+def plan(robot=None, **changes):
     line = {
         "start": START,
         "task_space": ["x", "y"],

@@ -1,7 +1,5 @@
 """Rows of position with an angle, and the tool's axis: plans against analytic times and Pinocchio."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -19,7 +17,7 @@ SCARA, PALLETISER, GANTRY = "ZZzZ", "ZzxZ", "xyzZ"
 YAWING = ["x", "y", "z", "yaw"]
 
 
-def chain(word: str, tool: tuple[float, float, float] = (0.1, 0.0, -0.1)) -> Robot:
+def chain(word, tool=(0.1, 0.0, -0.1)):
     """Make a robot from letters: slides along x, y, z and turns about X, Y, Z."""
     joints = []
     for letter in word:

@@ -1,7 +1,5 @@
 """The trajectory: evaluation, immutability, precision, and the file."""
 
-from __future__ import annotations
-
 import zipfile
 from dataclasses import fields, replace
 

@@ -1,7 +1,5 @@
 """Robots whose URDF has no masses: planned as long as nothing needs torques, which are unknown."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -37,7 +35,7 @@ TASK = {
 }
 
 
-def six_axes(inertial: str = "", effort: float = 0.0, bare: str = "") -> str:
+def six_axes(inertial="", effort=0.0, bare=""):
     """Write an arm with a spherical wrist and a gas spring that follows a2; links in `bare` have no inertial."""
     links = ["base", *(f"l{i}" for i in range(1, 7)), "spring", "tool0"]
     parts = [
@@ -57,7 +55,7 @@ def six_axes(inertial: str = "", effort: float = 0.0, bare: str = "") -> str:
         <limit lower='-3' upper='3' effort='0' velocity='5'/><mimic joint='a2' multiplier='-0.4'/></joint></robot>"""
 
 
-def robot_of(text: str, **settings) -> Robot:
+def robot_of(text, **settings):
     given = {"limits": {"acceleration": 8.0}, **settings}
     return Robot.from_urdf("arm.urdf", urdf_text=text, tool_frame="tool0", **given)
 

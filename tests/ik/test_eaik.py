@@ -1,13 +1,12 @@
 """Poses solved by EAIK: against Pinocchio on random and on awkward postures, and what is refused."""
 
-from __future__ import annotations
-
 import functools
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.errors import DecompositionError
 from brachis.ik import (
@@ -89,7 +88,7 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     assert 0.5 < np.abs(margin).max() < 20.0, "margins are of the order of one"
     clear = np.abs(margin) > 1e-5
     ratio = margin[clear] / bench.determinant(postures)[clear]
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
+    assert_allclose(ratio, ratio[0], rtol=1e-6)
 
     margins = np.abs(margin_of(bench, q))
     # Nearer to the boundary an URDF's rounding decides whether there is an answer.
@@ -151,9 +150,9 @@ def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
     assert gap_in_label(bench, q, first).max() < 1e-6
     monkeypatch.setattr("brachis.ik.eaik._KEPT", 5)
     for _ in range(2):
-        np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
+        assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
     one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])
-    np.testing.assert_allclose(one_by_one, first, atol=1e-12)
+    assert_allclose(one_by_one, first, atol=1e-12)
 
 
 def rows(robot, *names):

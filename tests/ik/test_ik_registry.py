@@ -1,7 +1,5 @@
 """The registry: what it refuses, what it says then, and that it believes no family."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -30,7 +28,7 @@ def plane(arm):
     return task_map_of(arm, ["x", "y"])
 
 
-def spatial_robot() -> Robot:
+def spatial_robot():
     """Three joints whose axes are neither parallel nor do they meet or leave slides."""
     joints = [
         Joint("revolute", axis=(0.0, 0.0, 1.0)),

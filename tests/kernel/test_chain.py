@@ -13,7 +13,7 @@ from support.random_chains import random_model
 STATES = 11  # not a multiple of what is computed side by side
 
 
-def agrees(found: np.ndarray, known: np.ndarray) -> bool:
+def agrees(found, known):
     scale = max(np.abs(known).max(), 1.0)
     return bool(np.abs(found - known).max() < 1e-11 * scale)
 

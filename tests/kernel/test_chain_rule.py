@@ -1,11 +1,10 @@
 """Values of limits, their slopes by curves, and entries of a Jacobian, against the formulas with NumPy."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kernel import (
     CurvePattern,
@@ -62,11 +61,11 @@ def test_the_chain_rule(with_jerk, width):
     found, entries = differentiate(groups, motion, states, partials)
     assert not entries.size
     known = slopes_of(first, parts, with_jerk)
-    np.testing.assert_allclose(found[:, :, :4], known, atol=1e-12)
+    assert_allclose(found[:, :, :4], known, atol=1e-12)
     zero = np.zeros_like(constant)
     known = slopes_of((zero, constant, zero, zero), parts, with_jerk)
     known[0, :, :, 0] += by_s
-    np.testing.assert_allclose(found[:, :, 4:], known, atol=1e-12)
+    assert_allclose(found[:, :, 4:], known, atol=1e-12)
 
     points = np.array([0, 0, 4, POINTS - 1])
     basis = rng.normal(size=(len(found), 4))
@@ -76,12 +75,12 @@ def test_the_chain_rule(with_jerk, width):
     variables = VariableSlopes(every, places, basis)
     entries = variables.find_entries(found)
     known = np.einsum("bokw,okcw->bkc", every, found).reshape(2 * POINTS, -1)
-    np.testing.assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
+    assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
     by_one = np.einsum("oz,zoc->zc", basis, found[:, points, :, curves])
-    np.testing.assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
+    assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
     again = differentiate(groups, motion, states, partials, variables)
-    np.testing.assert_array_equal(again[0], found)
-    np.testing.assert_array_equal(again[1], entries)
+    assert_array_equal(again[0], found)
+    assert_array_equal(again[1], entries)
 
 
 def test_orders_that_values_do_not_depend_on_are_left_out():
@@ -92,10 +91,10 @@ def test_orders_that_values_do_not_depend_on_are_left_out():
     basis = rng.normal(size=(4, 1))
     whole = VariableSlopes(shared, places, basis).find_entries(found)
     part = VariableSlopes(shared[:, :3], places, basis[:3]).find_entries(found)
-    np.testing.assert_array_equal(whole, part)
+    assert_array_equal(whole, part)
     fewer = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found)
     known = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found[:2])
-    np.testing.assert_array_equal(fewer, known)
+    assert_array_equal(fewer, known)
 
 
 @pytest.mark.parametrize("quantity", ["q", "qdot", "qddot", "qdddot", "torque"])
@@ -113,7 +112,7 @@ def test_scaled_quantities(chain, quantity):
     groups = ValueGroups([scaled], [3])
     (values,) = groups.values(states, torque)
     known = (quantities[quantity][:, joints] - offsets) * factors
-    np.testing.assert_array_equal(values, known)
+    assert_array_equal(values, known)
 
     partials = np.zeros((4, POINTS, N, N))
     if quantity == "torque":
@@ -125,7 +124,7 @@ def test_scaled_quantities(chain, quantity):
     motion = MotionSlopes(*parts[:4], parts[4] if has_jerk else None)
     found, _ = differentiate(groups, motion, states[:3], [])
     known = slopes_of(partials, parts, has_jerk)
-    np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
+    assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
 
 
 def test_formulas_of_the_posture():
@@ -142,7 +141,7 @@ def test_formulas_of_the_posture():
     )
     groups = ValueGroups([None, margins], [1, 2])
     values = groups.values(states)[1]
-    np.testing.assert_allclose(values, function(states[0]) * factors, atol=1e-14)
+    assert_allclose(values, function(states[0]) * factors, atol=1e-14)
     parts = rng.normal(size=(5, POINTS, N, 3))
     by_q = margins.slopes_of(states[0]) * factors[:, None]
     zero = np.zeros_like(by_q)
@@ -150,7 +149,7 @@ def test_formulas_of_the_posture():
     motion = MotionSlopes(*parts[:4])
     found, _ = differentiate(groups, motion, states, given)
     known = slopes_of((by_q, zero, zero, zero), parts, with_jerk=False)
-    np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
+    assert_allclose(found[:, :, 1:], known, atol=1e-13)
     with pytest.raises(ValueError, match="have the shapes"):
         ValueGroups([margins], [3])
 
@@ -166,7 +165,7 @@ def test_groups_can_be_sent_to_another_process(chain):
     (known,) = groups.values(states, torque)
     del groups
     (found,) = again.values(states, torque)
-    np.testing.assert_array_equal(found, known)
+    assert_array_equal(found, known)
 
 
 def test_what_does_not_fit_is_refused(chain):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kernel import (
     Fault,
@@ -85,19 +86,19 @@ def test_motion(case):
     chain, asked, q, (xi, xi_ds, _), conditions, (ydot, yddot), found = case
     m = asked.count
     _, _, twists = chain.tool(q, in_tool_axes=asked.in_tool_axes)
-    np.testing.assert_allclose(found.twists, twists, atol=1e-12)
+    assert_allclose(found.twists, twists, atol=1e-12)
     augmented = np.concatenate([rates_of(asked, twists), conditions.rows], axis=1)
     inverse = np.linalg.inv(augmented)
-    np.testing.assert_allclose(found.inverse, inverse, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(found.determinants, np.linalg.det(augmented), rtol=1e-10)
+    assert_allclose(found.inverse, inverse, rtol=1e-9, atol=1e-9)
+    assert_allclose(found.determinants, np.linalg.det(augmented), rtol=1e-10)
     inverse = found.inverse
     right = np.concatenate([xi, np.zeros((POINTS, len(q[0]) - m))], axis=1)
     if conditions.drift is not None:
         right[:, m:] = -conditions.drift[0]
     gradient = np.concatenate([inverse @ right[:, :, None], inverse[:, :, m:]], axis=2)
-    np.testing.assert_allclose(found.gradient, gradient, atol=1e-10)
+    assert_allclose(found.gradient, gradient, atol=1e-10)
     qdot = np.einsum("kij,kj->ki", gradient, ydot)
-    np.testing.assert_allclose(found.qdot, qdot, atol=1e-10)
+    assert_allclose(found.qdot, qdot, atol=1e-10)
     slopes = tool_derivatives(twists, qdot, 0.0 * qdot, in_tool_axes=asked.in_tool_axes)
     bias = np.einsum("kij,kj->ki", rates_of(asked, slopes[0]), qdot)
     sdot = ydot[:, :1]
@@ -108,7 +109,7 @@ def test_motion(case):
     qddot = np.einsum("kij,kj->ki", gradient, yddot)
     qddot += np.einsum("kij,kj->ki", inverse, wanted)
     scale = np.abs(qddot).max()
-    np.testing.assert_allclose(found.qddot / scale, qddot / scale, atol=1e-11)
+    assert_allclose(found.qddot / scale, qddot / scale, atol=1e-11)
 
 
 def test_derivatives(case):
@@ -151,7 +152,7 @@ def test_derivatives(case):
     known = (qdot_y, qddot_y, qddot_ydot)
     for found, own in zip(motion.derivatives(), known, strict=True):
         scale = max(np.abs(own).max(), 1.0)
-        np.testing.assert_allclose(found / scale, own / scale, atol=1e-11)
+        assert_allclose(found / scale, own / scale, atol=1e-11)
 
 
 def test_singular_slopes(case):
@@ -166,12 +167,12 @@ def test_singular_slopes(case):
     )
     m = asked.count
     known = np.einsum("ki,kij->kj", left[:, :m], rates_of(asked, slopes))
-    np.testing.assert_allclose(found, known, atol=1e-11 * max(1.0, np.abs(known).max()))
+    assert_allclose(found, known, atol=1e-11 * max(1.0, np.abs(known).max()))
     known = np.zeros(POINTS)
     if conditions.turning is not None:
         turned = np.einsum("kij,kj->ki", conditions.turning[0], vectors)
         known = np.sum(left[:, m:] * turned, axis=1)
-    np.testing.assert_allclose(found_s, known, atol=1e-11)
+    assert_allclose(found_s, known, atol=1e-11)
 
 
 def test_rows_that_are_the_same_everywhere_are_given_once():
@@ -190,7 +191,7 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
     for name in ("gradient", "qdot", "qddot", "determinants"):
         first, *others = (getattr(own, name) for own in motions)
         for own in others:
-            np.testing.assert_array_equal(own, first)
+            assert_array_equal(own, first)
 
 
 @pytest.mark.parametrize(
@@ -260,7 +261,7 @@ def test_derivatives_are_those_of_the_last_evaluation(case):
     motion.q[:] = q
     motion.evaluate()
     for own, first in zip(motion.derivatives(), known, strict=True):
-        np.testing.assert_array_equal(own, first)
+        assert_array_equal(own, first)
 
 
 @pytest.mark.parametrize(
@@ -271,9 +272,9 @@ def test_a_motion_can_be_copied_and_sent(case, send):
     *_, motion = case
     again = send(motion)
     for name in ("q", "qdot", "gradient", "inverse"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
+        assert_array_equal(getattr(again, name), getattr(motion, name))
     for own, other in zip(again.derivatives(), motion.derivatives(), strict=True):
-        np.testing.assert_array_equal(own, other)
+        assert_array_equal(own, other)
 
 
 def test_no_points_give_no_motion():
@@ -297,9 +298,9 @@ def test_least_singular_values():
     matrices = np.random.default_rng(3).normal(size=(POINTS, 7, 7))
     values, vectors = find_least_singular(np.linalg.inv(matrices))
     _, known, right = np.linalg.svd(matrices)
-    np.testing.assert_allclose(values, known[:, -1], rtol=1e-12)
+    assert_allclose(values, known[:, -1], rtol=1e-12)
     along = np.abs(np.sum(vectors * right[:, -1], axis=1))
-    np.testing.assert_allclose(along, 1.0, atol=1e-12)
+    assert_allclose(along, 1.0, atol=1e-12)
 
 
 def test_largest_products_of_steps():
@@ -308,8 +309,6 @@ def test_largest_products_of_steps():
     step = rng.normal(size=(POINTS, 5))
     origin = rng.integers(0, 6, POINTS)
     known = np.abs(np.einsum("eij,ej->ei", rows[origin], step)).max(axis=1)
-    np.testing.assert_allclose(
-        find_largest_products(rows, step, origin), known, atol=1e-14
-    )
+    assert_allclose(find_largest_products(rows, step, origin), known, atol=1e-14)
     with pytest.raises(ValueError, match="nowhere"):
         find_largest_products(rows, step, origin + 6)

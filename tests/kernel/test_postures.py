@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kernel import (
     Branch,
@@ -44,7 +45,7 @@ def prepare(answers, q_r, *, turns=(1, 0, 1), ranged=(0, 0, 0), start, **given):
 def test_turns_stay_where_an_answer_is_missing():
     answers = np.array([[[0.0, 7.0]], [[np.nan, 7.0]]])
     motion = prepare(answers, np.zeros(2), start=np.zeros(N))
-    np.testing.assert_array_equal(motion.find_postures()[:, OTHERS], answers[:, 0])
+    assert_array_equal(motion.find_postures()[:, OTHERS], answers[:, 0])
 
 
 def test_the_answer_nearest_to_a_known_posture_is_taken(rng):
@@ -59,7 +60,7 @@ def test_the_answer_nearest_to_a_known_posture_is_taken(rng):
     found = motion.find_postures()[:, OTHERS]
     turned = np.remainder(found - known + np.pi, TURN) - np.pi
     kept = np.arange(20) != 7
-    np.testing.assert_allclose(turned[kept], 0.0, atol=1e-12)
+    assert_allclose(turned[kept], 0.0, atol=1e-12)
     assert np.isnan(found[7]).all()
 
 
@@ -72,7 +73,7 @@ def test_each_answer_follows_the_one_before(rng):
     motion = prepare(answers, np.zeros(30), turns=(0, 0, 0), start=start)
     found = motion.find_postures()[:, OTHERS]
     kept = np.arange(30) != 12
-    np.testing.assert_array_equal(found[kept], path[kept])
+    assert_array_equal(found[kept], path[kept])
     assert np.isnan(found[12]).all()
 
 
@@ -96,8 +97,8 @@ def test_turns_are_counted_by_velocities():
     _, q, _, _ = fast_motion(9)
     motion = turning(q, ranged=1)
     assert not motion.evaluate()
-    np.testing.assert_allclose(motion.qdot[:, 1], fast_motion(9)[2], atol=1e-9)
-    np.testing.assert_allclose(motion.q[:, 1], q, atol=1e-12)
+    assert_allclose(motion.qdot[:, 1], fast_motion(9)[2], atol=1e-9)
+    assert_allclose(motion.q[:, 1], q, atol=1e-12)
 
 
 @pytest.mark.parametrize(("ranged", "fault"), [(1, Fault.TURNS_TOO_FAR), (0, None)])
@@ -112,7 +113,7 @@ def test_a_branch_comes_back_from_another_process():
     branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
     assert branch.address
     again = pickle.loads(pickle.dumps(branch))  # noqa: S301  (our own)
-    np.testing.assert_array_equal(again.nonredundant, OTHERS)
+    assert_array_equal(again.nonredundant, OTHERS)
 
 
 def test_what_does_not_fit_is_an_error():

@@ -1,11 +1,10 @@
 """The chart's motion against differences in time and against the closed form's, its derivatives against differences."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, ChartRows
@@ -81,7 +80,7 @@ def test_path_is_met_exactly(motion):
         np.abs(chart.task_map.difference(targets, chart.task_map.values(q))).max()
         < 1e-12
     )
-    np.testing.assert_allclose(chart.curves(y[:, 0], q), y, atol=1e-12)
+    assert_allclose(chart.curves(y[:, 0], q), y, atol=1e-12)
 
 
 def test_motion_is_the_time_derivative_of_the_postures(motion):
@@ -117,20 +116,16 @@ def test_margins(motion):
         return least_singular(chart, q, s) / np.median(along)
 
     s, q = state.y[:, 0], state.q
-    np.testing.assert_allclose(chart.margins(state)[:, 0], expected(q, s), rtol=1e-9)
-    np.testing.assert_allclose(
-        chart.start_margins(), along[:1] / np.median(along), rtol=1e-9
-    )
+    assert_allclose(chart.margins(state)[:, 0], expected(q, s), rtol=1e-9)
+    assert_allclose(chart.start_margins(), along[:1] / np.median(along), rtol=1e-9)
     by_q, by_s = chart.margin_gradient(state)
     for joint, step in enumerate(h * np.eye(chart.robot.n)):
         difference = (expected(q + step, s) - expected(q - step, s)) / (2.0 * h)
-        np.testing.assert_allclose(
+        assert_allclose(
             by_q[:, 0, joint], difference, atol=2e-7 * max(1.0, np.abs(by_q).max())
         )
     difference = (expected(q, s + h) - expected(q, s - h)) / (2.0 * h)
-    np.testing.assert_allclose(
-        by_s[:, 0], difference, atol=2e-7 * max(1.0, np.abs(by_s).max())
-    )
+    assert_allclose(by_s[:, 0], difference, atol=2e-7 * max(1.0, np.abs(by_s).max()))
 
 
 def test_history_does_not_matter(motion):
@@ -155,7 +150,7 @@ def test_history_does_not_matter(motion):
             rng.permutation(len(y)),
             np.arange(len(y)),
         ):
-            np.testing.assert_allclose(
+            assert_allclose(
                 used.state(y[order], zero, zero, zero).q, fresh[order], atol=1e-11
             )
 
@@ -166,10 +161,8 @@ def test_a_copy_by_pickle_answers_alike(motion):
     copy = pickle.loads(pickle.dumps(chart))  # noqa: S301  (our own)
     first, second = chart.state(*parts), copy.state(*parts)
     for name in ("q", "qdot", "qddot", "gradient"):
-        np.testing.assert_allclose(
-            getattr(second, name), getattr(first, name), atol=1e-10
-        )
-    np.testing.assert_array_equal(copy.start, chart.start)
+        assert_allclose(getattr(second, name), getattr(first, name), atol=1e-10)
+    assert_array_equal(copy.start, chart.start)
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])
@@ -188,9 +181,9 @@ def test_angles_stay_in_the_turns_of_the_reference(scara_urdf, turns):
     fine = np.linspace(0.0, 1.0, 777)
     expected = start + np.outer(6.0 * np.pi * fine, [1.0, 0.0, 0.0])
     y = chart.curves(fine, expected)
-    np.testing.assert_allclose(chart.postures(y), expected, atol=1e-9)
-    np.testing.assert_allclose(chart.postures(y[::-1]), expected[::-1], atol=1e-9)
-    np.testing.assert_allclose(chart.coordinates(1.0, expected[-1]), y[-1], atol=1e-12)
+    assert_allclose(chart.postures(y), expected, atol=1e-9)
+    assert_allclose(chart.postures(y[::-1]), expected[::-1], atol=1e-9)
+    assert_allclose(chart.coordinates(1.0, expected[-1]), y[-1], atol=1e-12)
     assert chart.coordinates(1.0, expected[-1])[1] != pytest.approx(
         chart.coordinates(1.0, expected[0])[1], abs=1.0
     )
@@ -206,9 +199,7 @@ def test_no_posture_beyond_reach_nor_beyond_the_self_motion(scara_urdf):
         task_map, path, ChartRows.constant(np.array([[0.0, 0.0, 1.0]])), s, reference
     )
     y = np.array([[0.0, 0.6], [1.0, 0.6], [0.05, 9.0]])
-    np.testing.assert_array_equal(
-        np.isfinite(chart.postures(y)).all(axis=1), [True, False, False]
-    )
+    assert_array_equal(np.isfinite(chart.postures(y)).all(axis=1), [True, False, False])
     zero = np.zeros((1, 2))
     chart.state(y[:1], zero, zero, zero)
     for beyond in (y[1:2], y[2:]):

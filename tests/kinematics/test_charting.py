@@ -1,9 +1,8 @@
 """Charts around joint paths: constant rows where they do, rows that follow the null space where it turns, and none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import null_space
 
 from brachis.errors import UnreachableError
@@ -77,11 +76,11 @@ def test_constant_rows_where_they_do(rows, start, make, scara):
     assert len(chart.rows.coefficients) == 1
     assert chart.rows.is_constant
     own = chart.rows.at(s[:1])[0][0]
-    np.testing.assert_allclose(own @ own.T, np.eye(len(own)), atol=1e-12)
+    assert_allclose(own @ own.T, np.eye(len(own)), atol=1e-12)
     assert chart.redundant_joints == ()
     null = np.swapaxes(turned_null_spaces(task_map, chart.reference), 1, 2)
     assert transversality(own[None], null).min() > 0.35
-    np.testing.assert_allclose(
+    assert_allclose(
         chart.postures(chart.curves(s, chart.reference)), chart.reference, atol=1e-9
     )
 
@@ -97,11 +96,11 @@ def test_rows_follow_the_null_space_where_it_turns(once_around):
     assert transversality(rows, null).min() > 0.35
     augmented = np.concatenate([jacobian(task_map, q), rows], axis=1)
     assert np.linalg.svd(augmented, compute_uv=False)[:, -1].min() > 0.1
-    np.testing.assert_allclose(chart.postures(chart.curves(s, q)), q, atol=1e-9)
+    assert_allclose(chart.postures(chart.curves(s, q)), q, atol=1e-9)
     # Between the places, and aside of them.
     t = np.linspace(0.02, 0.98, 200)
     state = chart.state(*Sway(chart, amplitude=0.05)(t))
-    np.testing.assert_allclose(
+    assert_allclose(
         task_map.values(state.q), path.sample(state.y[:, 0]).target, atol=1e-12
     )
     assert chart.margins(state).min() > 0.1
@@ -127,14 +126,12 @@ def test_transversality_of_several_rows_is_that_of_the_worst_direction():
         seven_joints(), "position", [{"line": {"by": [0.0, 0.0, 0.1]}}], SEVEN
     )
     null = null_spaces(jacobian(task_map, np.array([SEVEN])))
-    np.testing.assert_allclose(
-        jacobian(task_map, np.array([SEVEN])) @ null, 0.0, atol=1e-12
-    )
+    assert_allclose(jacobian(task_map, np.array([SEVEN])) @ null, 0.0, atol=1e-12)
     rows = null[0].T.copy()
-    np.testing.assert_allclose(transversality(rows[None], null), [1.0], atol=1e-12)
+    assert_allclose(transversality(rows[None], null), [1.0], atol=1e-12)
     aside = null_space(null[0].T)[:, 0]
     rows[2] = 0.6 * rows[2] + 0.8 * aside
-    np.testing.assert_allclose(transversality(rows[None], null), [0.6], atol=1e-12)
+    assert_allclose(transversality(rows[None], null), [0.6], atol=1e-12)
 
 
 def test_a_joint_path_may_stand_still_in_s(once_around):
@@ -149,10 +146,10 @@ def test_a_joint_path_may_stand_still_in_s(once_around):
     assert chart.s[0] == 0.0
     assert chart.s[-1] == 1.0
     assert len(chart.s) == len(s) - 19 - 1 - 5
-    np.testing.assert_array_equal(chart.reference[0], q[0])
-    np.testing.assert_array_equal(chart.start, q[0])
-    np.testing.assert_array_equal(chart.reference[-1], q[-1])
-    np.testing.assert_array_equal(chart.reference[99:102], q[[100, 120, 121]])
+    assert_array_equal(chart.reference[0], q[0])
+    assert_array_equal(chart.start, q[0])
+    assert_array_equal(chart.reference[-1], q[-1])
+    assert_array_equal(chart.reference[99:102], q[[100, 120, 121]])
 
 
 def test_no_chart_where_the_null_space_turns_too_fast(scara):

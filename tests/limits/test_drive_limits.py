@@ -1,7 +1,5 @@
 """What drives bear, and the tool's motion: known optima of slides, and what the free motion of an arm violates."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -37,7 +35,7 @@ def slide(*forces, limits=None, tool=None, intervals=40, **spline):
     return result
 
 
-def ratio(result, kind) -> float:
+def ratio(result, kind):
     return check_of(result.verification, f"{kind} ratio").value
 
 
@@ -155,7 +153,7 @@ def arm():
     return free.task, free
 
 
-def peaks(trajectory) -> dict[str, np.ndarray | float]:
+def peaks(trajectory):
     """Figures of a motion by numpy alone, from samples of the saved motion."""
     motion = trajectory.at(np.linspace(0.0, trajectory.t_end, 4001))
     positions, _ = trajectory.robot.tool_placements(motion.q)

@@ -1,7 +1,5 @@
 """The example of a plug-in: as an object, and named in a task file once it is installed."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import importlib.util
 import json

@@ -1,7 +1,5 @@
 """Every kind of limit by itself: partials against differences, relaxation, lines of the phase plane, ratios."""
 
-from __future__ import annotations
-
 import dataclasses
 from types import SimpleNamespace
 
@@ -175,7 +173,7 @@ PAIRS = {
 }
 
 
-def pairs(kind: str) -> Limit:
+def pairs(kind):
     robot = planar_robot(
         "RRP", "xz", friction={**FRICTION, "viscous": 1.0}, limits=LimitSpec(**PAIRS)
     )

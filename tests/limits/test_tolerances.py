@@ -1,7 +1,5 @@
 """Tolerances of the tool: its virtual joints, the limits beside their ranges, and motions that use them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

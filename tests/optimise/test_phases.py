@@ -1,7 +1,5 @@
 """Phases with a given s(t), pauses between phases, and ends with any given derivatives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +25,7 @@ DURATION = 0.6
 PAUSE = 0.4
 
 
-def bent_law() -> TimeLaw:
+def bent_law():
     """s = u + sin(2 pi u) / 9 with u = t / DURATION, by a spline of degree 5."""
     u = np.linspace(0.0, 1.0, 41)
     s = u + np.sin(2.0 * np.pi * u) / 9.0
@@ -36,14 +34,14 @@ def bent_law() -> TimeLaw:
     return TimeLaw(DURATION, spline, np.array(ends))
 
 
-def at_given_speed(case: str) -> Phase:
+def at_given_speed(case):
     """A phase with every kind of limit whose s(t) is given."""
     phase = phase_of(case)
     boundary = replace(phase.boundary, time_law=bent_law())
     return phase.with_grid(phase.grid, boundary)
 
 
-def points_at_given_speed(phase: Phase, count: int) -> list[np.ndarray]:
+def points_at_given_speed(phase, count):
     points = reachable_points(phase, count)
     return [np.append(DURATION, x[1:]) for x in points]
 
@@ -86,9 +84,7 @@ def test_gradient_of_the_end_time_with_a_given_speed(case):
     assert_array_equal(slower, x)
 
 
-def in_two_phases(
-    knots: str, *, orders: tuple[int, ...] = (0,), points: int | None = None
-) -> Program:
+def in_two_phases(knots, *, orders=(0,), points=None):
     """Two phases, the first at a given speed, and a pause in between; the redundant joint is linked there."""
     moves = phase_of("r1")
     timed = at_given_speed("r1")
@@ -113,7 +109,7 @@ def in_two_phases(
     return Program(phases, [Link(0, 1, (1,), orders)])
 
 
-def point_in_two_phases(program: Program) -> np.ndarray:
+def point_in_two_phases(program):
     first, second = program.phases
     (x,) = points_at_given_speed(first, 1)
     return np.concatenate([x, reachable_points(second, 1)[0]])
@@ -172,7 +168,7 @@ def test_mean_over_phases_and_pause_is_the_integral():
     assert_allclose(means, sums / program.end_time(x), rtol=1e-6)
 
 
-def torque_ratios(program: Program, x: np.ndarray) -> np.ndarray:
+def torque_ratios(program, x):
     """Torques over the limit whose mean is held, at all collocation points."""
     states = [phase.state(part) for phase, part in program.split(x)]
     robot = program.phases[0].joint_map.robot
@@ -230,7 +226,7 @@ def test_the_hessian_at_a_given_speed_is_that_of_the_objective(case):
     assert not known.hessian(x, 0.0, no_rows).any()
 
 
-def without_means(phase: Phase) -> Program:
+def without_means(phase):
     limits = [limit for limit in phase.limits if not limit.guarantee.is_mean]
     return Program([phase.with_limits(limits)])
 

@@ -3,12 +3,9 @@
 And lattices where ranges, turns, limits or paths are out of the ordinary.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -43,15 +40,15 @@ LINE = {
 }
 
 
-def problem(robot: brachis.Robot, **changes: Any) -> Problem:
+def problem(robot, **changes):
     return scara_problem(robot, **(LINE | changes))
 
 
-def content_of(name: str) -> dict[str, Any]:
+def content_of(name):
     return brachis.load_task(ROOT / "examples" / name).to_dict()
 
 
-def problem_of(content: dict[str, Any]) -> Problem:
+def problem_of(content):
     task = brachis.load_task(content)
     return Problem.of(robot_from_settings(task.robot), task)
 
@@ -72,7 +69,7 @@ CASES = {
 }
 
 
-def courses_of(line_problem: Problem, count: int) -> Any:
+def courses_of(line_problem, count):
     """Joint paths of the first closed form."""
     return ClosedFormLattice(decompositions_of(line_problem)[0]).joint_paths(count)
 
@@ -225,9 +222,7 @@ def test_an_end_posture_without_redundancy_may_have_few_digits():
     assert not isinstance(courses_of(line_problem, 1), DeadEnd)
 
 
-def back_from(
-    end: np.ndarray, robot: brachis.Robot, by: list[float]
-) -> dict[str, object]:
+def back_from(end, robot, by):
     """A task of a line that ends in a posture and may begin in any."""
     placement = robot.tool_placement(end)
     return {

@@ -1,7 +1,5 @@
 """Joint paths that are improved over time, where the arm waits between its phases."""
 
-from __future__ import annotations
-
 import brachis
 from brachis.search import pipeline
 

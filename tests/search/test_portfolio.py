@@ -1,7 +1,5 @@
 """The search as a whole: what is left open, order, limits, interruptions."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import os
@@ -9,7 +7,6 @@ import signal
 import sys
 import time
 import types
-from typing import Any
 
 import numpy as np
 import pytest
@@ -38,8 +35,6 @@ from brachis.search.stages import (
     NOT_TRIED,
     RANKED,
     SLOW,
-    Candidate,
-    Marks,
 )
 from brachis.task import load_task
 from support.scara import START, scara
@@ -55,7 +50,7 @@ UNFINISHED = "the search that search.effort requires was not completed"
 ROBOT = scara()
 
 
-def task(**changes: Any) -> dict[str, Any]:
+def task(**changes):
     return {
         "brachis": 1,
         "start": {"joints": START},
@@ -65,17 +60,17 @@ def task(**changes: Any) -> dict[str, Any]:
     } | changes
 
 
-def plan(**changes: Any) -> brachis.Result:
+def plan(**changes):
     return brachis.plan(ROBOT, task(**changes))
 
 
 @pytest.fixture(scope="module")
-def usual() -> brachis.Result:
+def usual():
     """Of the task as it is."""
     return plan()
 
 
-def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndarray]:
+def without_times(result):
     """Candidates, and their times, (K, 3); the order of equally fast ones differs from process to process."""
     rows = [candidate.to_dict() for candidate in result.candidates]
     rows.sort(key=lambda row: (row["redundant_joints"], row["branch"], row["origin"]))
@@ -178,17 +173,17 @@ def test_numeric_guesses_stay_an_option():
     assert choices_of(result) == {("j1",), ("j2",), ("j3",)}
 
 
-def choices_of(result: brachis.Result) -> set[tuple[str, ...]]:
+def choices_of(result):
     return {candidate.redundant_joints for candidate in result.candidates}
 
 
 class NoPosture:
     """A lattice that ends halfway."""
 
-    def __init__(self, *_arguments: object, **_options: object) -> None:
+    def __init__(self, *_arguments, **_options):
         pass
 
-    def joint_paths(self, _most: int) -> DeadEnd:
+    def joint_paths(self, _most):
         return DeadEnd(0.5, "nothing")
 
 
@@ -225,7 +220,7 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
 def test_a_real_ctrl_c_ends_worker_processes():
     """Pressed as soon as a motion is verified, while another process plans on."""
 
-    def listener(text: str) -> None:
+    def listener(text):
         if text.endswith(", verified"):
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -242,7 +237,7 @@ def ctrl_c_before_refinement(monkeypatch):
     """Ctrl-C as the first motion is finished; the second call is the last look at it."""
     honest, calls = pipeline.finish_candidate, []
 
-    def interrupt(*arguments: Any) -> Any:
+    def interrupt(*arguments):
         calls.append(1)
         if len(calls) == 1:
             raise KeyboardInterrupt
@@ -256,7 +251,7 @@ def splines_are_too_fast(monkeypatch):
     """A solve over time ends faster than the limits allow."""
     honest = pipeline.solve_over_time
 
-    def hurry(*arguments: Any) -> Any:
+    def hurry(*arguments):
         solved = honest(*arguments)
         x = solved.program.scale_time(solved.x, 0.6)
         report = dataclasses.replace(solved.report, x=x)
@@ -286,16 +281,16 @@ def test_ctrl_c_before_refinement_lengthens_the_best_motion():
 class Clock:
     """The clock of deadlines, which jumps by a minute and a half at the event that a test chooses."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch):
         self.now = 0.0
         self._monkeypatch = monkeypatch
         monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: self.now)
 
-    def jump(self, where: Any, name: str, *, at: int, by: float = 90.0) -> list[int]:
+    def jump(self, where, name, *, at, by=90.0):
         """Jump at the end of the `at`-th call of a function, and of every later one; the calls are counted."""
         honest, calls = getattr(where, name), []
 
-        def count(*arguments: Any) -> Any:
+        def count(*arguments):
             calls.append(1)
             made = honest(*arguments)
             self.now += by * (len(calls) >= at)
@@ -306,7 +301,7 @@ class Clock:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch):
     return Clock(monkeypatch)
 
 
@@ -424,7 +419,7 @@ def test_starts_from_their_part_of_the_time_have_plans(clock):
 def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     honest = uno.call_uno
 
-    def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
+    def hanging(watch, x, *rest):
         return time.sleep(1e6) if len(x) > 80 else honest(watch, x, *rest)
 
     monkeypatch.setattr(uno, "call_uno", hanging)
@@ -476,15 +471,15 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(usual, monkeypatch)
 def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     robot = scara({"jerk": 2000.0})
     finish = pipeline.finish_candidate
-    meshes: list[int] = []
-    tried: list[Candidate] = []
+    meshes = []
+    tried = []
     adapt = pipeline.adapt_mesh
 
-    def note(*arguments: Any, **settings: Any) -> Any:
+    def note(*arguments, **settings):
         meshes.append(len(tried))
         return adapt(*arguments, **settings)
 
-    def against_faster(candidate: Any, to_beat: Marks, *arguments: Any) -> Candidate:
+    def against_faster(candidate, to_beat, *arguments):
         given = dataclasses.replace(to_beat, begun=0.0) if tried else to_beat
         tried.append(finish(candidate, given, *arguments))
         return tried[-1]

@@ -1,18 +1,14 @@
 """The lattice of all postures: its joint paths are motions of the arm, and it goes wherever the arm can."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-import brachis
 from brachis.common.deadline import Deadline
-from brachis.problem.problem import Problem, decompositions_of
+from brachis.problem.problem import decompositions_of
 from brachis.robot import dynamics
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_TIME, DeadEnd
@@ -30,18 +26,18 @@ TURN = 2.0 * math.pi
 
 
 def line(
-    robot: brachis.Robot,
-    start: list[float],
-    by: list[float],
-    rows: Any = ("x", "y"),
-    **task: Any,
-) -> Problem:
+    robot,
+    start,
+    by,
+    rows=("x", "y"),
+    **task,
+):
     return problem(
         robot, rows, start={"joints": start}, path=[{"line": {"by": by}}], **task
     )
 
 
-def joint_paths_of(line_problem: Problem, **options: Any) -> Any:
+def joint_paths_of(line_problem, **options):
     return PostureLattice(line_problem, [], **options).joint_paths(4)
 
 
@@ -76,9 +72,9 @@ def test_joint_paths_are_motions_of_the_robot(case):
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
-        np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
+        assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
         check_joint_path(line_problem, joint_path, miss=1e-10, step=0.8 + 1e-12)
-        np.testing.assert_array_equal(joint_path.q[0], line_problem.start)
+        assert_array_equal(joint_path.q[0], line_problem.start)
 
 
 def test_gravity_and_ranges_turn_joint_paths_away():
@@ -128,7 +124,7 @@ def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_for
     assert joint_paths_of(line_problem)[0].length < 1.15 * best
 
 
-def component(q: np.ndarray) -> int:
+def component(q):
     """Of the self-motion of three links of 1 m: nearer than 1 m to the base, joint 2 never stretches nor folds."""
     return int(np.sign(np.sin(q[1])))
 

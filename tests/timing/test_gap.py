@@ -1,7 +1,5 @@
 """The timing gap of plans: never much below zero, whatever limits there are, and small with ``intervals: auto``."""
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

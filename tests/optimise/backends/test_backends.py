@@ -1,7 +1,5 @@
 """Every backend on small programs whose optima are known by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import subprocess
