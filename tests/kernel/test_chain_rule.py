@@ -28,6 +28,11 @@ def chain():
     return chain_of(*random_model(N, 1))
 
 
+def one_value(quantity, chain, joint=0):
+    one = np.ones(1)
+    return ScaledQuantity(quantity, np.array([joint]), one, one, chain)
+
+
 def slopes_of(partials, parts, with_jerk):
     """Chain rule for partials by q, qdot, qddot and qdddot."""
     gradient, qdot_y, qddot_y, qddot_ydot, qdddot_y = parts
@@ -155,10 +160,7 @@ def test_formulas_of_the_posture():
 
 
 def test_groups_can_be_sent_to_another_process(chain):
-    one = np.ones(1)
-    groups = ValueGroups(
-        [ScaledQuantity("torque", np.array([2]), one, one, chain)], [1]
-    )
+    groups = ValueGroups([one_value("torque", chain, 2)], [1])
     states = np.random.default_rng(7).normal(size=(3, POINTS, N))
     again = copy.deepcopy(groups)  # as another process gets it
     torque = np.random.default_rng(8).normal(size=(POINTS, N))
@@ -169,14 +171,14 @@ def test_groups_can_be_sent_to_another_process(chain):
 
 
 def test_what_does_not_fit_is_refused(chain):
-    with pytest.raises(ValueError, match="point"):
-        CurvePattern(np.array([9]), np.array([0]), POINTS, 2)
-    with pytest.raises(ValueError, match="curve"):
-        CurvePattern(np.array([0]), np.array([2]), POINTS, 2)
-    with pytest.raises(ValueError, match="as many"):
-        CurvePattern(np.array([0, 1]), np.array([0]), POINTS, 2)
-    with pytest.raises(TypeError, match="cast"):
-        CurvePattern(np.array([0.0]), np.array([0]), POINTS, 2)
+    for points, curve, kind, message in (
+        ([9], 0, ValueError, "point"),
+        ([0], 2, ValueError, "curve"),
+        ([0, 1], 0, ValueError, "as many"),
+        ([0.0], 0, TypeError, "cast"),
+    ):
+        with pytest.raises(kind, match=message):
+            CurvePattern(np.array(points), np.array([curve]), POINTS, 2)
     none = np.zeros(0, dtype=int)
     variables = VariableSlopes(
         np.zeros((1, 3, POINTS, 2)),
@@ -191,12 +193,9 @@ def test_what_does_not_fit_is_refused(chain):
     partials = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
     with pytest.raises(ValueError, match="other points"):
         differentiate(groups, motion, states, partials, variables)
-    one = np.ones(1)
-    beyond = ScaledQuantity("q", np.array([N]), one, one, chain)
     with pytest.raises(ValueError, match="joint"):
-        ValueGroups([beyond], [1])
-    first = np.zeros(1, dtype=int)
-    torque = ScaledQuantity("torque", first, one, one, chain)
+        ValueGroups([one_value("q", chain, N)], [1])
+    torque = one_value("torque", chain)
     groups = ValueGroups([torque], [1])
     with pytest.raises(ValueError, match="needs the torque"):
         groups.values(states)
@@ -205,27 +204,22 @@ def test_what_does_not_fit_is_refused(chain):
     fewer = MotionSlopes(*np.zeros((4, POINTS, 3, 3)))
     with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
         differentiate(groups, fewer, states[:, :, :3], [])
-    other = chain_of(*random_model(3, 1))
+    other = one_value("q", chain_of(*random_model(3, 1)))
     with pytest.raises(ValueError, match="different numbers"):
-        ValueGroups([torque, ScaledQuantity("q", first, one, one, other)], [1, 1])
-    again = chain_of(*random_model(N, 2))
+        ValueGroups([torque, other], [1, 1])
+    other = one_value("torque", chain_of(*random_model(N, 2)))
     with pytest.raises(ValueError, match="more than one chain"):
-        ValueGroups([torque, ScaledQuantity("torque", first, one, one, again)], [1, 1])
+        ValueGroups([torque, other], [1, 1])
 
 
 def test_partials_by_the_jerk_need_its_slopes(chain):
     motion = MotionSlopes(*np.zeros((4, POINTS, N, 3)))
     states = np.zeros((3, POINTS, N))
     partials = np.zeros((POINTS, 1, N))
+    given = [((None, None, None, partials), None)]
     with pytest.raises(ValueError, match="qdddot_y"):
-        differentiate(
-            ValueGroups([None], [1]),
-            motion,
-            states,
-            [((None, None, None, partials), None)],
-        )
-    one = np.ones(1)
-    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
+        differentiate(ValueGroups([None], [1]), motion, states, given)
+    jerk = one_value("qdddot", chain)
     with pytest.raises(ValueError, match="qdddot_y"):
         differentiate(ValueGroups([jerk], [1]), motion, states, [])
     with pytest.raises(ValueError, match="qdddot"):

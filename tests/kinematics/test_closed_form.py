@@ -11,26 +11,26 @@ from brachis.ik.planar import PlanarSolver
 from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.limits.safeguards import build_branch_margins
 from brachis.optimise.evaluator import Evaluator
-from brachis.robot import Robot
 from support.chains import planar_robot
 from support.motions import (
     PLANAR,
+    THREE_CIRCLES,
+    TOO_FAR,
     Sway,
     arc_path,
     check_derivatives,
     check_time_derivatives,
     joint_map,
 )
+from support.scara import scara
 
 
 @pytest.fixture(params=PLANAR, ids=str, scope="module")
 def motion(request):
     pattern, plane, rows, start, redundant = PLANAR[request.param]
     robot = planar_robot(pattern, plane)
-    return Sway(
-        joint_map(robot, rows, arc_path(robot, rows, start), start, redundant),
-        amplitude=0.1,
-    )
+    arc = arc_path(robot, rows, start)
+    return Sway(joint_map(robot, rows, arc, start, redundant), amplitude=0.1)
 
 
 T = np.linspace(0.02, 0.98, 25)
@@ -49,24 +49,17 @@ def test_motion_is_the_time_derivative_of_the_postures(motion):
 
 def test_derivatives(motion):
     exact = check_derivatives(motion, T)
-    assert (
-        min(
-            np.abs(part).max()
-            for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)
-        )
-        > 0.1
-    )
+    for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot):
+        assert np.abs(part).max() > 0.1
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])
 def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_many_turns(
-    scara_urdf, turns
+    turns,
 ):
     # Joint 1 follows a circle about the base three times: it must reach 6 pi, not jump back.
-    robot = Robot.from_urdf(scara_urdf)
     start = np.array([0.2 + 2.0 * np.pi * turns, 1.0, 0.6])
-    circle = [{"circle": {"center": [0.0, 0.0], "turns": 3}}]
-    chain = joint_map(robot, ["x", "y"], circle, start, ["j3"])
+    chain = joint_map(scara(), ["x", "y"], THREE_CIRCLES, start, ["j3"])
     s = np.linspace(0.0, 1.0, 400)
     q = chain.postures(np.stack([s, np.full(400, 0.6)], axis=1))
     assert_allclose(q[0], start, atol=1e-12)
@@ -84,11 +77,8 @@ def test_slides_never_wrap():
     assert_allclose(chain.task_map.values(q), chain.path.sample(s).target, atol=1e-9)
 
 
-def test_target_out_of_reach(scara_urdf):
-    robot = Robot.from_urdf(scara_urdf)
-    chain = joint_map(
-        robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], [0.2, 1.0, 0.6], ["j3"]
-    )
+def test_target_out_of_reach():
+    chain = joint_map(scara(), ["x", "y"], TOO_FAR, [0.2, 1.0, 0.6], ["j3"])
     y = np.array([[0.0, 0.6], [1.0, 0.6]])
     postures = chain.postures(y)
     assert np.isfinite(postures[0]).all()
@@ -116,9 +106,8 @@ class Slower(PlanarSolver):
 def test_what_a_subclass_computes_itself_is_asked_for():
     robot = planar_robot("RRR", "xy")
     start = [0.4, 1.0, 0.5]
-    known = joint_map(
-        robot, ["x", "y"], arc_path(robot, ["x", "y"], start), start, ["j2"]
-    )
+    rows = ["x", "y"]
+    known = joint_map(robot, rows, arc_path(robot, rows, start), start, ["j2"])
     assert isinstance(known.solver, PlanarSolver)
     solver = copy.copy(known.solver)
     solver.__class__ = Slower
