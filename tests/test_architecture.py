@@ -4,8 +4,6 @@ Each test collects all that breaks its rule.
 """
 
 import ast
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import pytest
 import brachis
 import brachis.limits
 import brachis.verify.limits
+from support.scripts import output_of
 
 SOURCE = Path(__file__).parents[1] / "src/brachis"
 
@@ -269,10 +268,7 @@ def test_no_module_imports_a_heavy_library_at_its_top():
 
 def test_importing_loads_no_heavy_library():
     code = f"from brachis import plan, Robot, Trajectory, Task\nimport sys\nprint(sorted({HEAVY!r} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "[]"
+    assert output_of("-c", code).strip() == "[]"
 
 
 @pytest.mark.parametrize("example", ["scara_line", "tx90l_rail_line"])
@@ -283,13 +279,7 @@ def test_an_ordinary_plan_loads_no_scipy(example):
         f"brachis.plan(brachis.examples.{example}, effort='single', intervals=8, strict=False)\n"
         "print('scipy' in sys.modules, 'pinocchio' in sys.modules)"
     )
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == ["False", "True"]
+    assert output_of("-W", "ignore", "-c", code).split() == ["False", "True"]
 
 
 def test_public_names_exist():

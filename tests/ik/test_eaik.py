@@ -1,7 +1,6 @@
 """Poses solved by EAIK: against Pinocchio on random and on awkward postures, and what is refused."""
 
 import functools
-import subprocess
 import sys
 
 import numpy as np
@@ -9,12 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from brachis.errors import DecompositionError
-from brachis.ik import (
-    ChainGeometry,
-    NotApplicableError,
-    check_answers,
-    find,
-)
+from brachis.ik import ChainGeometry, NotApplicableError, check_answers, find
 from brachis.ik.eaik import eaik
 from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
@@ -30,6 +24,7 @@ from support.pose_arms import (
     telescope,
     ur,
 )
+from support.scripts import output_of
 
 pytest.importorskip("eaik")
 
@@ -127,12 +122,10 @@ def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     bench = bench_of(robot, redundant)
     rng = np.random.default_rng(6)
     q, count = bench.q, len(bench.q)
-    off = np.where(
-        rng.uniform(size=count) < 0.1, 0.0, 10.0 ** rng.uniform(-16.0, -3.0, count)
-    )
-    q[:, redundant[0]] = rng.choice(
-        [0.0, 0.5 * np.pi, np.pi], count
-    ) + off * rng.choice([-1.0, 1.0], count)
+    is_exact = rng.uniform(size=count) < 0.1
+    off = np.where(is_exact, 0.0, 10.0 ** rng.uniform(-16.0, -3.0, count))
+    parallel = rng.choice([0.0, 0.5 * np.pi, np.pi], count)
+    q[:, redundant[0]] = parallel + off * rng.choice([-1.0, 1.0], count)
     bench.q = q[np.abs(margin_of(bench, q)) > 5e-3]
     assert len(bench.q) > count / 5
     solved = bench.solve(bench.q)
@@ -217,10 +210,4 @@ assert answers.is_installed()
 assert "eaik.pybindings.EAIK" in sys.modules
 print(sorted({"urchin", "trimesh", "pyglet", "eaik.IK_Robot"} & set(sys.modules)))
 """
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == "[]"
+    assert output_of("-W", "error", "-c", code).strip() == "[]"

@@ -21,6 +21,7 @@ from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings, task_with
 from support.effort import QUICK
 from support.scara import START, scara
+from support.solvers import solve
 from support.starts import starting_points
 
 FINE = {"velocity": 2.1207, "full": 2.1309}
@@ -37,10 +38,6 @@ def task(joint="j1", **spline):
         spline=spline,
         **QUICK,
     )
-
-
-def solve(program, x):
-    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 @pytest.fixture(scope="module")

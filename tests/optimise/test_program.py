@@ -19,19 +19,14 @@ from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
-from brachis.optimise.mesh import (
-    coarsest,
-    optimise_knots,
-    refine_mesh,
-    solve_by_levels,
-)
+from brachis.optimise.mesh import coarsest, optimise_knots, refine_mesh, solve_by_levels
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.task import SplineSettings
 from support.direct_map import DirectJointMap
 from support.slides import X, slides
-from support.solvers import INSTALLED
+from support.solvers import INSTALLED, solve
 
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 FREE = np.nan
@@ -72,10 +67,6 @@ def first_point(program, stop=0.5):
 
 def solve_first(program, **options):
     return SolvedProgram(program, (solve(program, first_point(program, **options)),))
-
-
-def solve(program, x):
-    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def bang_bang(*distances):
