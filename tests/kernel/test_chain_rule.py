@@ -204,12 +204,12 @@ def test_what_does_not_fit_is_refused(chain):
     fewer = MotionSlopes(*np.zeros((4, POINTS, 3, 3)))
     with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
         differentiate(groups, fewer, states[:, :, :3], [])
-    other = one_value("q", chain_of(*random_model(3, 1)))
+    shorter = one_value("q", chain_of(*random_model(3, 1)))
     with pytest.raises(ValueError, match="different numbers"):
-        ValueGroups([torque, other], [1, 1])
-    other = one_value("torque", chain_of(*random_model(N, 2)))
+        ValueGroups([torque, shorter], [1, 1])
+    elsewhere = one_value("torque", chain_of(*random_model(N, 2)))
     with pytest.raises(ValueError, match="more than one chain"):
-        ValueGroups([torque, other], [1, 1])
+        ValueGroups([torque, elsewhere], [1, 1])
 
 
 def test_partials_by_the_jerk_need_its_slopes(chain):

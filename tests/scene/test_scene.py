@@ -69,7 +69,7 @@ def robot_and_task(*arguments, **options):
     return robot_for(None, given.robot), given
 
 
-def clearance(name="iiwa14"):
+def build_limit(name="iiwa14"):
     """The limit, and postures of its robot."""
     robot, given = robot_and_task(name)
     return build_clearance(robot, given), postures(robot)
@@ -182,7 +182,7 @@ def test_mujoco_finds_the_same_distances(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_slopes_agree_with_differences(name):
-    limit, q = clearance(name)
+    limit, q = build_limit(name)
     values = limit.values(Moments.at_rest(q))
     exact = limit.partials(Moments.at_rest(q)).q
     step = 1e-5
@@ -265,7 +265,7 @@ def test_every_posture_has_its_closest_pair():
 
 
 def test_the_limit_has_only_pairs_that_come_close():
-    limit, q = clearance()
+    limit, q = build_limit()
     kept = limit.restrict_to(q)
     assert 0 < len(kept.lower) < len(limit.lower)
     assert_allclose(kept.lower * UNIT, 0.01)
@@ -273,7 +273,7 @@ def test_the_limit_has_only_pairs_that_come_close():
 
 
 def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
-    limit, q = clearance()
+    limit, q = build_limit()
     distances = limit.values(Moments.at_rest(q))
     apart = np.argmax(distances.min(axis=1))
     added = limit.keep_inside(q[[apart]]).lower - limit.lower

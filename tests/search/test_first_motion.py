@@ -1,6 +1,7 @@
 """A first motion, where there is little time: near a joint path, and within all limits."""
 
 import pytest
+import yaml
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
@@ -10,18 +11,15 @@ from brachis.search.first_motion import find_first_motion
 from brachis.search.guesses import first_guess
 from brachis.task import task_with
 
-EXTRAS = {
-    "nothing else": {},
-    "a process speed": {
-        "tool_limits": {"process_speed": {"speed": 0.2, "s": [0.3, 0.7]}}
-    },
-    "a stop": {
-        "path": [
-            {"line": {"by": [0.0, 0.5]}, "stop": True},
-            {"line": {"by": [0.0, 0.3]}},
-        ]
-    },
-}
+EXTRAS = yaml.safe_load("""
+nothing else: {}
+a process speed:
+  tool_limits: {process_speed: {speed: 0.2, s: [0.3, 0.7]}}
+a stop:
+  path:
+  - {line: {by: [0.0, 0.5]}, stop: true}
+  - {line: {by: [0.0, 0.3]}}
+""")
 
 
 def guess_with(extras):

@@ -10,6 +10,7 @@ import types
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 
 import brachis
@@ -20,22 +21,12 @@ from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import (
-    guesses,
-    over_time,
-    pipeline,
-    portfolio,
-    schedule,
-)
+from brachis.search import guesses, over_time, pipeline, portfolio, schedule
 from brachis.search.failure import explain_reach
 from brachis.search.guesses import SEARCH_LEVELS
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.stages import (
-    NOT_TRIED,
-    RANKED,
-    SLOW,
-)
+from brachis.search.stages import NOT_TRIED, RANKED, SLOW
 from brachis.task import load_task
 from support.scara import START, scara
 
@@ -51,13 +42,13 @@ ROBOT = scara()
 
 
 def task(**changes):
-    return {
-        "brachis": 1,
-        "start": {"joints": START},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 0.6, "angle_deg": 90}}],
-        "spline": {"intervals": 10},
-    } | changes
+    content = yaml.safe_load("""
+    brachis: 1
+    task_space: [x, y]
+    path: [{line: {length: 0.6, angle_deg: 90}}]
+    spline: {intervals: 10}
+    """)
+    return content | {"start": {"joints": START}} | changes
 
 
 def plan(**changes):
@@ -97,15 +88,10 @@ def test_every_candidate_is_listed_the_fastest_first(usual, changes, choices):
         assert choices_of(result) == choices
     else:
         assert {candidate.redundant_joints for candidate in slower} <= choices
-    keys = {
-        (candidate.redundant_joints, candidate.origin)
-        for candidate in result.candidates
-    }
-    assert len(keys) == len(result.candidates)
-    finished = [
-        candidate.t_end for candidate in result.candidates if candidate.verified
-    ]
-    assert result.t_end == min(finished)
+    every = result.candidates
+    keys = {(candidate.redundant_joints, candidate.origin) for candidate in every}
+    assert len(keys) == len(every)
+    assert result.t_end == min(row.t_end for row in every if row.verified)
     unfinished = [
         candidate.estimate for candidate in slower if candidate.status in {RANKED, SLOW}
     ]
@@ -167,9 +153,7 @@ def test_a_free_start_needs_a_place_and_no_numeric_guess():
 def test_numeric_guesses_stay_an_option():
     result = plan(search={"guesses": "numeric"})
     assert result.verified
-    assert all(
-        candidate.origin.startswith("numeric") for candidate in result.candidates
-    )
+    assert all(row.origin.startswith("numeric") for row in result.candidates)
     assert choices_of(result) == {("j1",), ("j2",), ("j3",)}
 
 
@@ -333,9 +317,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     assert result.interrupted
     assert not result.verified
     assert result.verification.worst_ratio > 1.0
-    tried = [
-        candidate for candidate in result.candidates if candidate.status != NOT_TRIED
-    ]
+    tried = [row for row in result.candidates if row.status != NOT_TRIED]
     assert len(tried) == solved
     fastest = min(candidate.estimate for candidate in tried)
     assert result.t_end == pytest.approx(fastest, rel=0.1)
@@ -360,12 +342,12 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
 
 def test_no_solve_begins_without_time_and_its_start_is_the_motion(clock):
     calls = clock.jump(over_time, "initial_guess", at=1)
-    joints = {
-        "task_space": "joints",
-        "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
-        "solver": {"name": "uno"},
-    }
-    result = plan(**joints)
+    joints = """
+    task_space: joints
+    path: [{spline: {through: [[0.6, -2.0, 2.0]]}}]
+    solver: {name: uno}
+    """
+    result = plan(**yaml.safe_load(joints))
     assert result.interrupted
     assert result.verified
     assert any("far from the fastest" in text for text in result.not_completed)
@@ -386,10 +368,8 @@ def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(usual, clo
     result = plan(search={"effort": "thorough"})
     assert result.verified
     assert result.interrupted
-    assert (
-        "the lattice of all postures was not searched completely"
-        in result.not_completed
-    )
+    told = "the lattice of all postures was not searched completely"
+    assert told in result.not_completed
     assert len(result.candidates) == len(usual.candidates)
 
 
@@ -424,19 +404,15 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
 
     monkeypatch.setattr(uno, "call_uno", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
-    result = brachis.plan(
-        scara({"jerk": 2000.0}),
-        task(
-            redundant_joints=["j1"],
-            spline={"intervals": 100, "degree": 4},
-            search={"time_limit": 12.0},
-        ),
+    changes = task(
+        redundant_joints=["j1"],
+        spline={"intervals": 100, "degree": 4},
+        search={"time_limit": 12.0},
     )
+    result = brachis.plan(scara({"jerk": 2000.0}), changes)
     assert result.verified
-    assert (
-        "the motion has 25 intervals, and was not solved with all 100"
-        in result.not_completed
-    )
+    told = "the motion has 25 intervals, and was not solved with all 100"
+    assert told in result.not_completed
 
 
 def test_within_other_workers_no_processes_start():

@@ -258,8 +258,8 @@ def test_position_velocity_and_acceleration_are_exact_between_the_nodes(planned)
         assert 1.0 - 1e-12 <= found.value < 1.0 + 1e-7
     q = planned.position(t)
     limits = {"position_lower": q.min(axis=0), "position_upper": q.max(axis=0)}
-    found = ratio(with_limits(planned, **limits), "position")
-    assert 1.0 - 1e-12 <= found.value < 1.0 + 1e-8
+    check = ratio(with_limits(planned, **limits), "position")
+    assert 1.0 - 1e-12 <= check.value < 1.0 + 1e-8
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
@@ -286,9 +286,9 @@ def test_a_peak_within_the_friction_of_a_reversal(rubbing, width):
     assert not check.passed
 
 
-def with_knots(trajectory, more):
+def with_knots(trajectory, added):
     """The same motion with more knots."""
-    fine = np.sort(np.concatenate([trajectory.knots, more]))
+    fine = np.sort(np.concatenate([trajectory.knots, added]))
     points = insert_knots(
         trajectory.control_points, trajectory.knots, fine, trajectory.degree
     )

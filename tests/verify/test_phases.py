@@ -97,9 +97,9 @@ def test_a_jump_at_a_flying_link_is_refused_in_any_case():
 def test_a_motion_in_a_dwell():
     motion = gantry_motion(spline={"degree": DEGREE, "rest": "velocity"})
     rates = [0.1, -0.1, 0.0]  # the tool stays
-    found = failing_checks(with_entry(motion, "qddot_before", 2, rates))
-    assert "velocity in dwells" in found
-    assert not found & {"velocity at stops", "path error"}
+    failed = failing_checks(with_entry(motion, "qddot_before", 2, rates))
+    assert "velocity in dwells" in failed
+    assert not failed & {"velocity at stops", "path error"}
 
 
 @pytest.mark.parametrize(

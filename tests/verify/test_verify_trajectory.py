@@ -50,43 +50,43 @@ def torn(trajectory, row, by):
     return torn
 
 
-def entry(name, place, by):
+def shift(name, place, by):
     return lambda t: with_entry(t, name, place, by)
 
 
 FAULTS = {
-    "off the path": ("path error", entry("q", (MIDDLE, 0), 1e-8)),
+    "off the path": ("path error", shift("q", (MIDDLE, 0), 1e-8)),
     "too fast": ("torque ratio", lambda t: faster(t, 1.001)),
     "backwards": ("ds/dt below zero", backwards),
     "short of the path's end": (
         "s at the ends",
-        entry("control_points", (0, -1), -1e-6),
+        shift("control_points", (0, -1), -1e-6),
     ),
     "not from the path's beginning": (
         "s at the ends",
-        entry("control_points", (0, 0), 1e-6),
+        shift("control_points", (0, 0), 1e-6),
     ),
     "starts elsewhere": ("start posture", lambda t: ended_elsewhere(t, "start", 0)),
     "ends elsewhere": ("end posture", ended_elsewhere),
-    "moving at the start": ("start velocity", entry("qdot", (0, 1), 1e-7)),
-    "moving at the end": ("end velocity", entry("qdot", (-1, 1), 1e-7)),
-    "accelerating at the start": ("start acceleration", entry("qddot", (0, 1), 1e-5)),
+    "moving at the start": ("start velocity", shift("qdot", (0, 1), 1e-7)),
+    "moving at the end": ("end velocity", shift("qdot", (-1, 1), 1e-7)),
+    "accelerating at the start": ("start acceleration", shift("qddot", (0, 1), 1e-5)),
     "accelerating at the end": (
         "end acceleration",
-        entry("qddot_before", (-1, 1), 1e-5),
+        shift("qddot_before", (-1, 1), 1e-5),
     ),
-    "another spline": ("redundant joints' splines", entry("control_points", 1, 0.3)),
+    "another spline": ("redundant joints' splines", shift("control_points", 1, 0.3)),
     "one control point": (
         "redundant joints' splines",
-        entry("control_points", (1, 9), 1e-6),
+        shift("control_points", (1, 9), 1e-6),
     ),
     "position jumps": ("position jump", lambda t: torn(t, 5, 1e-4)),
     "velocity jumps": ("velocity jump", lambda t: torn(t, 4, 1e-6)),
     "acceleration jumps": (
         "acceleration jump",
-        entry("qddot_before", (MIDDLE, 0), 1e-3),
+        shift("qddot_before", (MIDDLE, 0), 1e-3),
     ),
-    "torque jumps": ("torque jump", entry("qddot_before", (MIDDLE, 0), 1e-6)),
+    "torque jumps": ("torque jump", shift("qddot_before", (MIDDLE, 0), 1e-6)),
 }
 ALONE = {
     "off the path",
@@ -174,8 +174,8 @@ def test_nothing_passes_that_is_no_number(planned):
 
 
 def test_tolerances_are_options(planned):
-    other = with_entry(planned, "control_points", 1, 0.3)
-    assert not failing_checks(other, options=VerifyOptions(spline_tolerance=0.31))
+    moved = with_entry(planned, "control_points", 1, 0.3)
+    assert not failing_checks(moved, options=VerifyOptions(spline_tolerance=0.31))
     strict = VerifyOptions(ratio_tolerance=-0.5)
     assert failing_checks(planned, options=strict) == {"torque ratio"}
 
