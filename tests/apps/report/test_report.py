@@ -260,8 +260,8 @@ def test_no_path_of_this_machine_is_in_it(planar, planar_page):
 
 def test_paths_of_many_segments_are_told_in_short():
     points = [[0.01 * i, 0.02 * i] for i in range(1, 30)]
-    path = brachis.Line(by=[0.1, 0.0]) + brachis.Spline(through=points)
-    path += [brachis.Line(by=[0.0, 0.1])] * 7
+    first = brachis.Line(by=[0.1, 0.0]) + brachis.Spline(through=points)
+    path = [*first, *[brachis.Line(by=[0.0, 0.1])] * 7]
     task = task_with(start=[0.0], task_space=["x", "y"], path=path)
     text = tables.describe_path(task)
     assert text.startswith("line (by [0.1, 0]), then spline (through 29 entries), then")
