@@ -15,7 +15,14 @@ from support.chains import Joint, chain_urdf
 from support.effort import QUICK
 from support.factored_bench import Bench
 from support.pose_arms import panda as panda_urdf
-from support.screw_arms import BASES, SLIDE, extra, panda, screw_robot, seven_joints
+from support.screw_arms import (
+    BASES,
+    SLIDE,
+    extra,
+    panda,
+    screw_robot,
+    seven_joints,
+)
 from support.spatial import rail_arm, rail_arm_joints
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -176,26 +183,25 @@ PLANS = {
 @pytest.mark.parametrize("name", PLANS)
 def test_four_redundant_joints_are_faster_than_one(name):
     start, redundant, branch = PLANS[name]
-    by = [0.0, 0.2, -0.1]
-
-    def plan(space, joints):
-        return brachis.plan(
-            name,
-            start=start,
-            task_space=space,
-            path=brachis.Line(by=by),
-            redundant_joints=joints,
-            intervals=8,
-            solver={"max_iterations": 600},
-            search=QUICK,
-        )
-
-    result = plan("position", redundant)
+    urdf, by = ROBOTS / name / "robot.urdf", [0.0, 0.2, -0.1]
+    task = {
+        "brachis": 1,
+        "start": {"joints": start},
+        "path": [{"line": {"by": by}}],
+        "spline": {"intervals": 8},
+        "solver": {"max_iterations": 600},
+        "search": QUICK,
+    }
+    result = brachis.plan(
+        urdf, {**task, "task_space": "position", "redundant_joints": redundant}
+    )
     assert (result.family, result.trajectory.branch) == ("positioning", branch)
     assert result.verified
     ends = result.trajectory.robot.tool_placements(result.trajectory.q[[0, -1]])[0]
     np.testing.assert_allclose(ends[1] - ends[0], by, atol=1e-8)
     # The motion that keeps the orientation as well is one of those that keep the position.
-    pose = plan("pose", redundant[:1])
+    pose = brachis.plan(
+        urdf, {**task, "task_space": "pose", "redundant_joints": redundant[:1]}
+    )
     assert pose.verified
     assert result.t_end < 0.97 * pose.t_end

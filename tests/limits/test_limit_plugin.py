@@ -131,9 +131,10 @@ def test_a_kind_without_its_plugin_is_unknown():
 )
 @pytest.mark.usefixtures("entry_point")
 def test_wrong_parameters_have_a_reason(parameters, said):
+    task = brachis.load_task(TASK).to_dict()
     custom = {"coupled_range": yaml.safe_load(parameters)}
     with pytest.raises(InputError, match=said) as caught:
-        brachis.plan(TASK, custom_limits=custom)
+        brachis.plan({**task, "custom_limits": custom})
     assert "custom_limits.coupled_range" in str(caught.value)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import brachis
 from brachis.errors import PlanningError, StartError, TaskError
-from brachis.task import task_with
+from brachis.task import load_task
 
 TASK = {
     "path": [brachis.Line(by=[0.1, -0.3, 0.05])],
@@ -67,6 +67,12 @@ def test_margins_that_make_no_sense_are_errors(given):
 
 
 def test_a_path_of_joints_has_no_singular_postures():
-    path = [[0.0, 0.0], [1.0, 0.5]]
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": "unread.urdf"},
+        "task_space": "joints",
+        "path": [[0.0, 0.0], [1.0, 0.5]],
+        "margins": {"singularity": 0.1},
+    }
     with pytest.raises(TaskError, match="no choice of postures"):
-        task_with(task_space="joints", path=path, margins={"singularity": 0.1})
+        load_task(task)

@@ -81,14 +81,14 @@ def test_the_warning_says_where_time_is_lost(part, where, has_fixed_intervals):
 )
 def test_a_spline_there_and_back_is_not_promised_a_faster_timing(through):
     """The arm stands where the spline turns round: no grid of the phase plane steps over it."""
-    result = brachis.plan(
-        "ur10_rail",
-        locked_joints={"rail": 0},
-        limits={"acceleration": 12},
-        start=[0, -1.2, 1.6, -0.4, 1.0, 0],
-        task_space="pose",
-        path=brachis.Spline(through=through, relative=True),
-    )
+    content = yaml.safe_load("""
+    brachis: 1
+    robot: {urdf: ur10_rail, locked_joints: {rail: 0}, limits: {acceleration: 12}}
+    start: {joints: [0, -1.2, 1.6, -0.4, 1.0, 0]}
+    task_space: pose
+    """)
+    path = [{"spline": {"relative": True, "through": through}}]
+    result = brachis.plan(content | {"path": path})
     assert result.verified
     assert -1e-3 < result.timing_gap.gap < 3e-3
     assert not result.warnings

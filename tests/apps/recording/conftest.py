@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis import Line, export
+from brachis import export
 from brachis.apps.recording import import_motion
 from brachis.planner import plan
 from support.effort import QUICK
@@ -21,17 +21,17 @@ def smooth_step(u):
 @pytest.fixture(scope="package")
 def motion():
     """A planned motion, which a file has at every 4 ms."""
-    result = plan(
-        SCARA,
-        gravity=[0, 0, 0],
-        start=[0.5236, -2.0944, 2.0944],
-        task_space=["x", "y"],
-        path=Line(length=0.8, angle_deg=90),
-        redundant_joints=["j3"],
-        search=QUICK,
-        intervals=10,
-    )
-    return result.trajectory
+    content = {
+        "brachis": 1,
+        "robot": {"urdf": str(SCARA), "gravity": [0, 0, 0]},
+        "start": {"joints": [0.5236, -2.0944, 2.0944]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 0.8, "angle_deg": 90}}],
+        "redundant_joints": ["j3"],
+        "search": QUICK,
+        "spline": {"intervals": 10},
+    }
+    return plan(content).trajectory
 
 
 @pytest.fixture(scope="package")
