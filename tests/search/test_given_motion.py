@@ -1,7 +1,5 @@
 """Plans that start from a known motion: of the same task, with other limits, another path, other coordinates."""
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

@@ -1,7 +1,5 @@
 """Numbers that an error advises are tried before."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -28,7 +26,7 @@ def task():
     )
 
 
-def hint(task, remedies, is_planned, *, seconds=60.0) -> str:
+def hint(task, remedies, is_planned, *, seconds=60.0):
     """Return the hint where `is_planned` says of a changed task, a deadline and a number of batches what is planned."""
     error = PlanningError("no motion", hint="Try another path").with_remedies(*remedies)
 

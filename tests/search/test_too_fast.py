@@ -1,9 +1,6 @@
 """Speeds that no motion has are refused with their place, and with what would do."""
 
-from __future__ import annotations
-
 import re
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +12,7 @@ LENGTH = 0.5
 FEW = {"intervals": 6, "effort": "single"}
 
 
-def slide(
-    speed: float, interval: tuple[float, float], *further: dict, **changes: Any
-) -> brachis.Task:
+def slide(speed, interval, *further, **changes):
     """A slide of 0.5 m along x with an acceleration of at most 1 m/s^2, with a speed between two path coordinates."""
     limits = {"acceleration": 1.0, "velocity": None, **changes.pop("limits", {})}
     sections = {"intervals": 20, "time_limit": 600.0, **changes}
@@ -40,7 +35,7 @@ def trial_time(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
 
 
-def error_of(task: brachis.Task | dict, reason: str) -> brachis.PlanningError:
+def error_of(task, reason):
     with pytest.raises(brachis.PlanningError, match=reason) as caught:
         brachis.plan(task)
     return caught.value
@@ -52,7 +47,7 @@ def no_hurry(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 600.0)
 
 
-def number_in_hint(error: brachis.BrachisError, key: str) -> float:
+def number_in_hint(error, key):
     """Return the number that a hint advises for a key."""
     advice = rf"{re.escape(key)} to ([\d.]+).*? \(a plan with it was verified"
     match = re.search(advice, error.hint)
@@ -60,7 +55,7 @@ def number_in_hint(error: brachis.BrachisError, key: str) -> float:
     return float(match[1])
 
 
-def largest_speed_in(error: brachis.BrachisError) -> float:
+def largest_speed_in(error):
     """Return the largest speed that an error names."""
     return float(re.match(r"no more than ([\d.]+) m/s", error.allowed)[1])
 
