@@ -24,7 +24,7 @@ from brachis.common.threads import use_one_thread
 from brachis.common.words import write_count
 from brachis.errors import BrachisError, InputError
 from brachis.optimise.layout import SHORTEST_TIME
-from brachis.problem.feasibility import check_independent, check_regular
+from brachis.problem.feasibility import check_regular
 from brachis.problem.plausibility import (
     check_within_reach,
     of_end_time,
@@ -220,7 +220,6 @@ def _open_search(
     decompositions = Decompositions(problem, families)
     task_map = problem.task_map
     if has_charts(problem, decompositions):
-        check_independent(task_map)
         check_regular(problem.task, task_map, problem.given_postures)
     else:
         # They are found here, so that faulty ones are reported before the path is checked.

@@ -361,7 +361,7 @@ class ByForm:
             choose,
             custom_error_type=WRONG_FORM,
             custom_error_message="must be {allowed}",
-            custom_error_context={"allowed": self.allowed, "words": " ".join(words)},
+            custom_error_context={"allowed": self.allowed, "expected": str(words)},
         )
         return _tagged_union(members, by_tag, handler)
 

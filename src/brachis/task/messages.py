@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import is_dataclass
+from itertools import groupby
 from typing import Final, TypeVar, get_args, get_type_hints
 
 from pydantic import ValidationError
@@ -65,13 +66,20 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
     details = [
         detail for detail in error.errors(include_url=False) if not _is_echo(detail)
     ]
-    errors = [_one(detail, source, model) for detail in details[:_MOST_MISTAKES]]
-    if len(details) == 1:
+    # The same mistake in several items of a list is one.
+    mistakes = [
+        [*places]
+        for _, places in groupby(
+            details, lambda detail: [repr(detail["input"]), *_names_in(detail["loc"])]
+        )
+    ]
+    errors = [_one(places, source, model) for places in mistakes[:_MOST_MISTAKES]]
+    if len(mistakes) == 1:
         return errors[0]
     lines = "".join(f"\n  {mistake}" for mistake in errors)
-    if len(details) > len(errors):
-        lines += f"\n  and {len(details) - len(errors)} more"
-    return TaskError(f"{len(details)} mistakes{lines}", where=source)
+    if len(mistakes) > len(errors):
+        lines += f"\n  and {len(mistakes) - len(errors)} more"
+    return TaskError(f"{len(mistakes)} mistakes{lines}", where=source)
 
 
 def show(value: object) -> str:
@@ -85,8 +93,8 @@ def show(value: object) -> str:
     if isinstance(value, str):
         return f"{_shorten(repr(value))} (a string)"
     if isinstance(value, Mapping):
-        keys = ", ".join(map(str, value)) or "none"
-        return f"a mapping with the keys {_shorten(keys)}"
+        keys = _shorten(", ".join(map(str, value)))
+        return f"a mapping with the keys {keys}" if keys else "an empty mapping"
     if isinstance(value, list | tuple):
         return f"{_shorten(repr(list(value)))} (a list)"
     text = repr(value)
@@ -97,9 +105,15 @@ def _shorten(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
+def _one(places: list[ErrorDetails], source: str, model: type[Model]) -> TaskError:
+    """Return the error of one mistake; of the places where it is made it names the first."""
+    detail, *others = places
     problem, *facts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
     key = _write_location(detail["loc"], detail.get("ctx", {}).get("key", ""))
+    if detail["type"] != REFUSED and key in _ALLOWED_AT:
+        facts = [facts[0], _ALLOWED_AT[key]]
+    if others:
+        key += f" and {len(others)} more"
     return TaskError(
         problem,
         where=f"{source}: {key}" if key else source,
@@ -215,16 +229,25 @@ _Parts = tuple[str, *tuple[str | None, ...]]
 def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
     if isinstance(detail["loc"][-1], int):
         return "the list is too short: this item is missing", show(detail["input"])
-    about = _description_at(detail["loc"], model) or ""
-    return "this key is required, and missing", None, None, about.partition("; ")[0]
+    about = _description_at(detail["loc"], model)
+    return "this key is required, and missing", None, None, about
 
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
-    name = str(detail["loc"][-1])
-    keys = _keys_at(detail["loc"][:-1], model)
-    elsewhere = " or ".join(key_paths(name, model))
-    hint = elsewhere and f"This key belongs elsewhere: {elsewhere}"
-    return "unknown key", name, ", ".join(keys), hint or suggest(name, keys)
+    location = detail["loc"]
+    *names, name = _names_in(location)
+    above = [
+        _write_location(location[:end], name)
+        for end, step in enumerate(location)
+        if step in names and name in _keys_at(location[:end], model)
+    ]
+    paths = above[-1:] or key_paths(name, model)
+    hint = _KEYS_OF_OTHERS.get(name)
+    if paths and ".".join(_names_in(location)) not in paths:
+        hint = f"This key belongs elsewhere: {' or '.join(paths)}"
+    keys = _keys_at(location[:-1], model)
+    allowed = None if hint and len(keys) > 12 else ", ".join(keys)
+    return "unknown key", name, allowed, hint or suggest(name, keys)
 
 
 def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
@@ -239,7 +262,7 @@ def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     known = re.findall(r"\w+", facts["allowed"])
     hint = None
     if isinstance(content, Mapping) and not any(key in content for key in known):
-        hints = (suggest(str(name), known) for name in content)
+        hints = (_KEYS_OF_OTHERS.get(name) or suggest(name, known) for name in content)
         hint = next(filter(None, hints), None)
     return facts["problem"], show(content), facts["allowed"], hint
 
@@ -258,10 +281,7 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
         return "wrong type", shown, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
     facts = detail.get("ctx", {})
-    words = re.findall(r"'(\w+)'", facts.get("expected", ""))
-    words += facts.get("words", "").split()
-    value = detail["input"]
-    hint = suggest(value, words) if isinstance(value, str) else None
+    hint = suggest(detail["input"], re.findall(r"'(\w+)'", facts.get("expected", "")))
     allowed = form.format(**facts)
     unit = unit_of(".".join(_names_in(location)))
     if problem == _OUT_OF_RANGE and unit:
@@ -269,6 +289,23 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     return problem, shown, allowed or None, hint
 
 
+_ALLOWED_AT: Final = {
+    "brachis": "1",
+    "path": "a list of segments, such as [{line: {to: [...]}}], or [{csv: {file: ...}}] for a file of points",
+    "scene": "a list of bodies, [{box: [1, 1, 1]}, ...], or {file: cell.yaml}",
+    "spline.degree": "a whole number, 3 to 7 with rest: full (from 2 with rest: velocity, from 4 with rest: jerk)",
+    "spline.intervals": "auto, or a whole number from 4 to 10000",
+    "search.jobs": "auto (all processors), or a whole number >= 1",
+    "search.seed": "a whole number >= 0",
+}
+"""What is allowed at keys of a task whose type does not say all."""
+_KEYS_OF_OTHERS: Final = {
+    "objective": "brachis always minimises the end time",
+    "tool": "The frame that follows the path is robot.tool_frame",
+    "posture": "A posture is stated by its name: start: home, with postures: {home: [...]}",
+    "points": "For a file of points write csv: {file: ...}, for a list of points spline: {through: [...]}",
+}
+"""What to write in place of keys that other programs have."""
 _MAPPING = "a mapping"
 _TYPES: Final = {
     "float_type": "a number",

@@ -250,11 +250,13 @@ class Task(CheckedModel):
             )
         if len(rows) > 1 and all(isinstance(row, list) for row in rows):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
-        if rows and all(isinstance(row, list | int | float) for row in rows):
+        if all(isinstance(row, list | int | float) for row in rows):
             raise refuse(
-                "a path cannot be made of these numbers",
+                "a path cannot be made of these numbers"
+                if rows
+                else "there is no segment",
                 found=rows,
-                allowed="two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}",
+                allowed="at least one segment, such as {line: {by: [0, 0.4, 0]}}, or two points or more, [[...], [...]]",
             )
         return path
 

@@ -22,8 +22,8 @@ from brachis.task.fields import (
 
 Row = Literal["x", "y", "z", "roll", "pitch", "yaw", "axis"]
 _SPACE_FORMS = (
-    "a list of rows out of x, y, z and one of roll, pitch, yaw, axis; "
-    "or one of position, pose, pose_free_roll, axis, joints"
+    "a list of some of x, y, z, then at most one of roll, pitch, yaw, axis; "
+    "or one of the words position, pose, pose_free_roll, axis, joints"
 )
 
 EACH_ONCE = must(
