@@ -141,7 +141,7 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
         (
             {"position": {"sphere": 0.1, "y": 0.1, "axes": "world"}},
             "pose",
-            "all three lengths",
+            "all three ranges",
         ),
         ({"position": {"sphere": 0.1, "x": [0.2, 0.3]}}, "pose", "outside sphere"),
         ({"orientation": {"tilt": 15, "lead": [20, 30]}}, "pose", "outside tilt"),

@@ -1,7 +1,7 @@
 """Segments for programs, joined to a path by ``+``.
 
-`Line`, `Arc`, `Circle`, `Helix` and `Spline` are made from the models in `brachis.task.segments`. Their keywords are the
-keys of a segment.
+`Line`, `Arc`, `Circle`, `Helix` and `Spline` are made from the models in `brachis.task.segments`. Their keywords are
+the keys of a segment.
 """
 
 from __future__ import annotations

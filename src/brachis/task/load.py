@@ -135,9 +135,9 @@ def with_keys(
 
 
 Source = str | os.PathLike[str] | Mapping[str, object] | Task
-"""What a task is made of: its file, or its content."""
+"""The input from which a task is loaded: its file or its content."""
 LARGEST_TASK = 1_000_000
-"""Bytes of YAML, which take some 20 s to read."""
+"""Largest size of a task file, bytes; YAML of this size takes some 20 s to read."""
 
 
 def load_task(source: Source, *, changes: Mapping[str, object] | None = None) -> Task:
@@ -146,25 +146,25 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     Parameters
     ----------
     source : path-like, mapping or Task
-        A YAML file; or what such a file would contain, as a mapping (NumPy arrays are accepted as lists); or a task,
-        which is returned as it is unless keys are to be changed.
+        A YAML file, a mapping with the content of such a file (NumPy arrays are accepted as lists), or a task, which is
+        returned unchanged unless there are changes.
     changes : mapping of str to object, optional
-        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``: they take the place of
-        what `source` says.
+        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``, that replace those of
+        `source`.
 
     Returns
     -------
     Task
-        The validated task. The path of the URDF is absolute: it was relative to the file's folder, or to the current
-        folder for a mapping. CSV files of waypoints, relative to the same folder, are read; what comes back has splines
-        in their place and needs the files no more. So it is with a file of limits.
+        The validated task. The path of the URDF, given relative to the folder of the file or, for a mapping, to the
+        current folder, is made absolute. CSV files of waypoints and a limits file, relative to the same folder, are
+        read: the task contains splines and limits instead, and no longer needs the files.
 
     Raises
     ------
     TaskError
-        The file cannot be read or is not YAML, or the task is wrong. One message has all mistakes, the first
-        twenty with a line each: file, key, what was found and what is allowed. Or a CSV file or a file of
-        limits is wrong; the message names its line or key.
+        The file cannot be read or is not YAML, or the task is wrong. One message lists the mistakes, the first twenty
+        on a line each: file, key, what was found and what is allowed. Or a CSV file or a limits file is wrong; the
+        message names the line or key.
 
     Examples
     --------

@@ -143,7 +143,11 @@ class Task(CheckedModel):
     """Placements of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
         dict[Name, JointValues],
-        must(lambda named: "free" not in named, "free cannot be the name of a posture", "different names"),
+        must(
+            lambda named: "free" not in named,
+            "free cannot be the name of a posture",
+            "different names",
+        ),
     ] = Field(default={})
     """Named joint positions, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None

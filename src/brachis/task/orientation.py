@@ -71,9 +71,7 @@ def _about(name: str) -> Any:
     if convention.euler:
         unit = ", degrees"
     meaning = convention.meaning[0].upper() + convention.meaning[1:]
-    return Field(
-        default=None, description=f"{meaning}{unit}: {convention.makers}."
-    )
+    return Field(default=None, description=f"{meaning}{unit}: {convention.makers}.")
 
 
 class Attitude(Model):

@@ -156,7 +156,9 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     names = [body.name for body in named]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        raise refuse("two bodies have this name", found=twice[0], allowed="each name once")
+        raise refuse(
+            "two bodies have this name", found=twice[0], allowed="each name once"
+        )
     return named
 
 

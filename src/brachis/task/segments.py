@@ -147,7 +147,7 @@ Coordinates = Annotated[
 
 Turns = Annotated[
     Number,
-    must(bool, "a circle with zero turns has no length", "a number other than 0"),
+    must(bool, "a circle with zero turns has zero length", "a number other than 0"),
 ]
 
 
