@@ -218,9 +218,8 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
-    task_map = problem.task_map
     if has_charts(problem, decompositions):
-        check_regular(problem.task, task_map, problem.given_postures)
+        check_regular(problem.task, problem.task_map, problem.given_postures)
     else:
         # They are found here, so that faulty ones are reported before the path is checked.
         len(decompositions)

@@ -64,27 +64,27 @@ _Entry = Annotated[
 ]
 _EntryOrNull = Annotated[
     AnyPositive | _Pair | None,
-    ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
+    ByForm("a number > 0, a pair [lower, upper] around zero, or null (no limit)"),
 ]
 PairEntry = Annotated[
     Literal["urdf"] | AnyPositive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
     ByForm(
-        "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
-        "zero or null; null (no limit), urdf (as in the URDF)"
+        "a number > 0 for all joints; a list or a mapping by joint name, of numbers > 0, pairs [lower, upper] around "
+        "zero, or null; null (no limit); or urdf (as in the URDF)"
     ),
 ]
 NumberEntry = Annotated[
     AnyPositive | NonEmpty[AnyPositive] | dict[Name, AnyPositive | None] | None,
     ByForm(
-        "a number > 0 for all joints, a list of numbers > 0, "
-        "a mapping of joint name to number > 0 or null, null (no limit)"
+        "a number > 0 for all joints; a list of numbers > 0; "
+        "a mapping of joint names to numbers > 0 or null; or null (no limit)"
     ),
 ]
 RangeEntry = Annotated[
     Literal["urdf"] | NonEmpty[Interval] | dict[Name, Interval | None] | None,
     ByForm(
-        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), "
-        "urdf (as in the URDF)"
+        "a list of pairs [low, high]; a mapping of joint names to [low, high] or null; null (no limit); "
+        "or urdf (as in the URDF)"
     ),
 ]
 TorqueCurve = Annotated[

@@ -235,15 +235,15 @@ def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
     location = detail["loc"]
-    *names, name = _names_in(location)
+    name = str(location[-1])
     above = [
         _write_location(location[:end], name)
-        for end, step in enumerate(location)
-        if step in names and name in _keys_at(location[:end], model)
+        for end in range(len(location))
+        if name in _keys_at(location[:end], model)
     ]
     paths = above[-1:] or key_paths(name, model)
     hint = _KEYS_OF_OTHERS.get(name)
-    if paths and ".".join(_names_in(location)) not in paths:
+    if paths and _write_location(location, "") not in paths:
         hint = f"This key belongs elsewhere: {' or '.join(paths)}"
     keys = _keys_at(location[:-1], model)
     allowed = None if hint and len(keys) > 12 else ", ".join(keys)

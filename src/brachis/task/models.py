@@ -65,7 +65,7 @@ from brachis.task.tolerances import (
 JointValues = Annotated[
     NonEmpty[Number] | Annotated[dict[Name, Number], Field(min_length=1)],
     ByForm(
-        "a list of numbers in the order of the chain, or a mapping of joint name to number"
+        "a list of numbers in the order of the chain, or a mapping of joint names to numbers"
     ),
 ]
 
@@ -74,7 +74,7 @@ class Posture(Model):
     """A configuration of the robot."""
 
     joints: JointValues
-    """Joint positions, rad (m): in the order of the chain, or by joint name."""
+    """Joint positions, rad (m), in the order of the chain or by joint name."""
 
 
 PathStart = Annotated[

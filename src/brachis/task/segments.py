@@ -117,7 +117,7 @@ class BSplineCurve(CheckedModel):
             yield (
                 "knots",
                 f"a knot occurs {max(often)} times, so that a derivative up to the third jumps",
-                f"at most {allowed} times",
+                f"at most {allowed}",
             )
 
 

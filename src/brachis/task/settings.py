@@ -167,13 +167,13 @@ Mounting = Annotated[
 PerJoint = Annotated[
     AnyNonNegative | NonEmpty[AnyNonNegative] | dict[Name, AnyNonNegative],
     ByForm(
-        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"
+        "a number >= 0 for all joints, a list of numbers, or a mapping of joint names to numbers"
     ),
 ]
 PerJointPositive = Annotated[
     Positive | NonEmpty[Positive] | dict[Name, Positive],
     ByForm(
-        "a number > 0 for all joints, a list of numbers, a mapping of joint name to number"
+        "a number > 0 for all joints, a list of numbers, or a mapping of joint names to numbers"
     ),
 ]
 UrdfFriction = Annotated[
@@ -183,8 +183,8 @@ UrdfFriction = Annotated[
     | dict[Name, AnyNonNegative]
     | None,
     ByForm(
-        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number, null (none), "
-        "urdf (as in the URDF)"
+        "a number >= 0 for all joints, a list of numbers, a mapping of joint names to numbers, null (none), "
+        "or urdf (as in the URDF)"
     ),
 ]
 
