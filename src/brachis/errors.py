@@ -418,10 +418,9 @@ class PlanningError(BrachisError):
 def nearest(
     name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Suggest a valid name.
+    """Suggest the valid name that is meant by a word of other libraries, a misspelling, or a longer name.
 
-    In this order: the name for a word from other libraries, a name that differs only by a slip, the longest valid name
-    with which `name` begins, the most similar name. With `is_attribute`, functions elsewhere in brachis count as well.
+    If an attribute is asked for, functions elsewhere in brachis count as well.
     """
     if not isinstance(name, str):
         return None
@@ -435,15 +434,16 @@ def nearest(
     begun = [candidate for candidate in by_small if small.startswith(f"{candidate}_")]
     if known and small not in by_small:
         return known[0]
-    near = difflib.get_close_matches(small, by_small, n=1, cutoff=0.5)
-    has_slip = difflib.get_close_matches(small, near, n=1, cutoff=0.9)
-    if begun and not has_slip:
-        return by_small[max(begun, key=len)]
+    near = (
+        difflib.get_close_matches(small, by_small, cutoff=0.9)
+        or sorted(begun, key=len, reverse=True)
+        or difflib.get_close_matches(small, by_small, cutoff=0.65)
+    )
     return by_small[near[0]] if near else None
 
 
 def suggest(
-    name: str, valid: Iterable[str], *, is_attribute: bool = False
+    name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
     """Return the question whether the `nearest` valid name is meant; None if no name is similar."""
     near = nearest(name, valid, is_attribute=is_attribute)

@@ -24,7 +24,7 @@ from brachis.common.threads import use_one_thread
 from brachis.common.words import write_count
 from brachis.errors import BrachisError, InputError
 from brachis.optimise.layout import SHORTEST_TIME
-from brachis.problem.feasibility import check_independent, check_regular
+from brachis.problem.feasibility import check_regular
 from brachis.problem.plausibility import (
     check_within_reach,
     of_end_time,
@@ -221,10 +221,8 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
-    task_map = problem.task_map
     if has_charts(problem, decompositions):
-        check_independent(task_map)
-        check_regular(problem.task, task_map, problem.given_postures)
+        check_regular(problem.task, problem.task_map, problem.given_postures)
     else:
         # Decompositions are computed here, so that faulty ones are reported before the path is checked.
         len(decompositions)

@@ -125,7 +125,7 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
         ("orientation: {lead: [5, 2]}", "pose", "not a range"),
         ("orientation: {lead: 100}", "pose", "within 80 of zero"),
         ("tilt: 15", "pose", "tolerances.orientation.tilt"),
-        ("position: {sphere: 0.1, y: 0.1, axes: world}", "pose", "all three lengths"),
+        ("position: {sphere: 0.1, y: 0.1, axes: world}", "pose", "all three ranges"),
         ("position: {sphere: 0.1, x: [0.2, 0.3]}", "pose", "outside sphere"),
         ("orientation: {tilt: 15, lead: [20, 30]}", "pose", "outside tilt"),
     ],

@@ -211,7 +211,7 @@ TWO_FRAMES = {"workpiece": PLACE, "table": PLACE}
         (
             {"frame": "workpiece", "path": SEGMENTS},
             {},
-            r"path: a path in a frame is .*allowed: \{frame: NAME, segments",
+            r"path: a path in a frame needs .*allowed: \{frame: NAME, segments",
         ),
     ],
 )

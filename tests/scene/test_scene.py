@@ -297,7 +297,10 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
         ("half_space: {normal: [0, 0, 0]}", "cannot have zero length"),
         ("{half_space: {normal: [0, 0, 1]}, link: tool}", "fixed to the world"),
         ("{sphere: 1.0, link: tol}", "tool"),
-        ("{half_space: {normal: [0, 0, 1]}, position: [0, 0, 1]}", "no other place"),
+        (
+            "{half_space: {normal: [0, 0, 1]}, position: [0, 0, 1]}",
+            "placed by its plane",
+        ),
         ("mesh: missing.stl", "missing.stl"),
     ],
 )

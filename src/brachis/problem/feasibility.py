@@ -127,7 +127,12 @@ def _check_range(
     raise error(
         f"joint {name!r} is out of its range",
         where=where,
-        found=f"{position} {unit}{place}",
+        found="; likewise ".join(
+            [
+                f"{position} {unit}{place}",
+                *np.array(robot.joint_names)[joints[1:]],
+            ]
+        ),
         allowed=f"{first} {unit} to {last} {unit}",
         hint=hint or f"{advice} robot.limits.position.{name}",
     )
@@ -289,6 +294,8 @@ def check_independent(task_map: TaskMap) -> None:
     """
     rows = task_map.rows
     jacobians = task_map.sample_jacobians()
+    if _least_singular_values(jacobians).max() >= _REGULAR:
+        return
     numbers = range(len(rows))
     subsets = [
         subset
@@ -296,8 +303,6 @@ def check_independent(task_map: TaskMap) -> None:
         for subset in combinations(numbers, size)
         if _least_singular_values(jacobians[:, list(subset)]).max() < _REGULAR
     ]
-    if not subsets:
-        return
     fixed = [subset[0] for subset in subsets if len(subset) == 1]
     dependent = fixed or subsets[0]
     together = ", ".join(rows[row] for row in dependent)

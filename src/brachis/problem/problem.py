@@ -98,6 +98,8 @@ class Problem(Summary):
         at_end = task.joints_at("end")
         start = at_start and robot.posture(*at_start)
         end = at_end and robot.posture(*at_end)
+        if robot.n >= task_map.m and not isinstance(task_map, JointSpace):
+            check_independent(task_map)
         path = path_of(task_map, task)
         task = with_held_speeds(with_feed_rates(task, path), task_map, path)
         if task.boundary.periodic:
@@ -310,8 +312,6 @@ def decompositions_of(
     tried = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in tried if isinstance(candidate, ik.Match)]
     is_bound = task.branch != "auto" or task.search.guesses != "lattice"
-    if not matches and robot.n >= task_map.m:
-        check_independent(task_map)
     if not matches and (is_bound or robot.n < task_map.m):
         if len(tried) <= 1:
             # There is nothing to choose: report the reasons for the only choice, or the wrong number of joints.

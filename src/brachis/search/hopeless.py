@@ -307,14 +307,14 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         for speed_number, figure in possible.items()
     ]
     speed = check.speeds[number]
-    largest_speed = f"{possible[number]:g} {speed.unit}"
+    found = str(speed)
+    if speed.unit == "m/s" and speed.figure > 10.0:
+        found += f" ({speed.figure / 1e3:g} m/s, if mm/s were meant)"
     error = PlanningError(
         f"the {speed.name} is too high {why}",
         where=speed.key,
-        found=str(speed),
-        allowed=f"about {largest_speed} along the best joint path that was found (estimate)"
-        if check.is_redundant
-        else f"no more than {largest_speed} (estimate)",
+        found=found,
+        allowed=f"about {possible[number]:g} {speed.unit}",
         hint="Raise the limits that hold the motion back",
     )
     return error.with_remedies(*remedies)
