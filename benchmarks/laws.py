@@ -440,7 +440,7 @@ def main() -> None:
     about = (
         f"{len(everything)} pairs: {np.sum(violations > SMALL)} beyond {100.0 * SMALL:g} %, "
         f"{np.sum(violations > LARGE)} beyond {100.0 * LARGE:g} %. "
-        "A violation is by how much the plan of the easier task is slower."
+        "A violation says by how much the plan of the easier task is slower."
     )
     print(about)
     save("Laws of pairs of plans", COLUMNS, rows, about)

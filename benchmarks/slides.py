@@ -111,7 +111,7 @@ def main() -> None:
     about = (
         f"{len(excesses)} slides of {MASS:g} kg over {DISTANCE:g} m. {len(excesses) - above} end within "
         f"{100.0 * ALLOWED:g} % of the least time, the worst {100.0 * max(excesses):.3f} % above it. In {longer} of "
-        f"{len(rises)} steps to a larger force they are not shorter, but up to {100.0 * max(rises):.4f} % longer."
+        f"{len(rises)} steps to a larger force, the motion is not shorter, but up to {100.0 * max(rises):.4f} % longer."
     )
     print(about)
     save("Slides with a known least time", COLUMNS, rows, about)

@@ -274,9 +274,9 @@ def main() -> None:
     worst = 100.0 * np.max(gaps, axis=0)
     above = np.sum(np.array(gaps) > ALLOWED, axis=0)
     about = (
-        f"{len(rows)} lines. Worst gap and how many are above {100.0 * ALLOWED:g} %: reported {worst[0]:.4f} %, "
-        f"{above[0]}; by the phase plane of this file on {PLACES} steps, fastest motions {worst[1]:.4f} %, {above[1]}; "
-        f"returned motions {worst[2]:.4f} %, {above[2]}."
+        f"{len(rows)} lines. Largest timing gap, and number of lines above {100.0 * ALLOWED:g} %: as reported "
+        f"{worst[0]:.4f} %, {above[0]}. By an independent phase plane with {PLACES} steps: fastest motions "
+        f"{worst[1]:.4f} %, {above[1]}; returned motions {worst[2]:.4f} %, {above[2]}."
     )
     print(about)
     save("Strong drives beside slow joints", COLUMNS, rows, about)

@@ -317,8 +317,8 @@ def main() -> None:
     if compared:
         print("\n" + "\n".join(" | ".join(cells) for cells in (RATIOS, *compared)))
     about = (
-        "Every plan has a process of its own. Processor times include those of processes that it starts: the median of "
-        "the line's tasks, and the longest. End times are geometric means of the line's tasks."
+        "Every plan runs in its own process. Processor times include the processes that it starts. They are the median "
+        "and the longest over the tasks of a line. End times are geometric means over these tasks."
     )
     save("The table of work", COLUMNS, rows, about)
 

@@ -1,4 +1,4 @@
-"""Write the pages that are made of committed results: gallery.md and benchmarks.md; ``python docs/make_pages.py``."""
+"""Write gallery.md and benchmarks.md from committed results; ``python docs/make_pages.py``."""
 
 from __future__ import annotations
 
@@ -61,25 +61,28 @@ BENCHMARKS_HEAD = """\
 
 # Benchmarks
 
-Each table is made from a file in `benchmarks/results`, which the script named above the table writes with `--save`.
+Each table comes from a file in `benchmarks/results`, which the script named above the table writes with `--save`.
 `pip install -e ".[benchmark]"` installs what the scripts need. Times are processor times of
 {measured}.
 
 ## How long a plan takes
 
-`python3 tasks.py bench`, 20 intervals, after import, in a fast hour of a virtual machine; a slow hour takes three times
-as long. Plans are refined and verified unless the row says otherwise.
+`python3 tasks.py bench` prints these times. Plans have 20 intervals, and are refined and verified unless the row says
+otherwise. The virtual machine was fast at that hour; when it is slow, plans take three times as long.
 
-| what | planar arm (j1, j2, j3) | goal | TX90L on its rail | goal |
-|---|---|---|---|---|
-| one plan, neither refined nor verified | 22, 23, 41 ms | 40 ms | 54 ms | |
-| one plan, `effort: single` | 108, 122, 130 ms | 80 ms | 162 ms | 150 ms |
-| one plan, `effort: fast`, four guesses | 199, 179, 354 ms | | 309 ms | |
-| `redundant_joints: auto`, `effort: fast` | 390 ms | 3 s | 420 ms | |
-| rows at 61 collocation points | 0.14 ms | | 0.21 ms | |
-| their whole Jacobian | 0.15 ms | | 0.20 ms | 2.5 ms |
-| closed form, all 8 branches, per pose of a batch of 2000 | | | 0.8 to 1.3 us | 5 us |
-| the same by EAIK | | | 17 us | 15 us |
+| what | planar arm (j1, j2, j3) | TX90L on its rail |
+|---|---|---|
+| one plan, neither refined nor verified | 22, 23, 41 ms | 54 ms |
+| one plan, `effort: single` | 108, 122, 130 ms | 162 ms |
+| one plan, `effort: fast`, four guesses | 199, 179, 354 ms | 309 ms |
+| `redundant_joints: auto`, `effort: fast` | 390 ms | 420 ms |
+| rows at 61 collocation points | 0.14 ms | 0.21 ms |
+| their whole Jacobian | 0.15 ms | 0.20 ms |
+| closed form, all 8 branches, per pose of a batch of 2000 | | 0.8 to 1.3 us |
+| the same by EAIK | | 17 us |
+
+Times grow with the degree of redundancy r. With default settings, the line of [this page](my_urdf.md#a-first-motion)
+took 0.9 s for a pose (r = 1), 2.9 s with a free roll (r = 2), and 5.3 s for a position (r = 4).
 """
 BENCHMARKS_REST = """\
 ## All other results
@@ -90,7 +93,7 @@ BENCHMARKS_REST = """\
 
 
 def gallery() -> str:
-    """Return the gallery: a card with picture, description and end times for every example, then all sources."""
+    """Return the gallery: for every example a card with picture, description and end times, then all sources."""
     recorded = json.loads(GALLERY.read_text())
     names = [name for name in PICTURES if name in recorded]
     cards = "\n".join(_card(name, recorded[name]) for name in names)
@@ -127,7 +130,7 @@ def _files(name: str) -> list[Path]:
 
 
 def _about(files: list[Path]) -> str:
-    """Return what an example says of itself: the docstring of its script, or the comment at the head of its task."""
+    """Return the description of an example: the docstring of its script, or the comment at the head of its task."""
     scripts = [path for path in files if path.suffix == ".py"]
     if scripts:
         return (ast.get_docstring(ast.parse(scripts[0].read_text())) or "").split(
@@ -150,8 +153,15 @@ def _all_rows(result: dict[str, Any]) -> Table:
 
 
 def _lines_of_work(result: dict[str, Any]) -> Table:
-    """Return the lines that stand for all tasks of a kind."""
-    return result["columns"], [row for row in result["rows"] if ": " not in row[0]]
+    """Return the lines that summarise all tasks of one kind."""
+    lines = [row for row in result["rows"] if ": " not in row[0]]
+    return _without_column(4, result["columns"], lines)  # the first verified motion
+
+
+def _without_column(index: int, columns: list[str], rows: list[list[str]]) -> Table:
+    """Return a table without one of its columns."""
+    table = [row[:index] + row[index + 1 :] for row in (columns, *rows)]
+    return table[0], table[1:]
 
 
 def _number(text: str) -> float:
@@ -159,12 +169,13 @@ def _number(text: str) -> float:
 
 
 def _by_arm(result: dict[str, Any]) -> Table:
-    """Return, for each arm, how many lines there are, the worst gaps and the median time."""
+    """Return for each arm the number of lines, the worst gaps and the median time."""
     arms = defaultdict(list)
     for task, _, _, *gaps, _, time in result["rows"]:
         arm = task.split(": ")[1].split(",")[0]
         arms[arm].append([*map(_number, gaps), _number(time)])
-    columns = ["arm", "lines", *result["columns"][3:6], "processor time, median"]
+    of_gaps = ["reported gap", "independent, fastest motion", "returned motion"]
+    columns = ["arm", "lines", *of_gaps, "processor time, median"]
     rows = []
     for arm, values in arms.items():
         *gaps, times = zip(*values, strict=True)
@@ -174,7 +185,7 @@ def _by_arm(result: dict[str, Any]) -> Table:
 
 
 def _worst_slides(result: dict[str, Any]) -> Table:
-    """Return, for each velocity limit, the row with the largest excess over the least time."""
+    """Return for each velocity limit the row with the largest excess over the least time."""
     worst: dict[str, list[str]] = {}
     for row in result["rows"]:
         limit, excess = row[0], _number(row[4])
@@ -184,7 +195,7 @@ def _worst_slides(result: dict[str, Any]) -> Table:
 
 
 def _by_robot(result: dict[str, Any]) -> Table:
-    """Return, for each robot at given speeds, the largest deviations and the longest time; squares as they are."""
+    """Return for each robot with process speeds the largest deviations and the longest time; keep rows of squares."""
     groups: dict[str, list[list[str]]] = defaultdict(list)
     for row in result["rows"]:
         name = row[0] if "square" in row[0] else re.split("[,:] ", row[0])[0]
@@ -219,8 +230,19 @@ NAMES_OF_GROUPS = {
 }
 
 
+def _worst_laws(result: dict[str, Any]) -> Table:
+    """Return the changes of a task with violations above 0.1 %."""
+    rows = [row[:3] for row in result["rows"] if _number(row[2]) > 0.1]
+    return ["change with a violation above 0.1 %", *result["columns"][1:3]], rows
+
+
+def _without_small_steps(result: dict[str, Any]) -> Table:
+    """Return all columns but the one for limits that are 0.1 % wider."""
+    return _without_column(3, result["columns"], result["rows"])
+
+
 def _by_range(result: dict[str, Any]) -> Table:
-    """Return, for each kind of range, what it gains."""
+    """Return for each kind of range how much time it saves."""
     kinds = defaultdict(list)
     for row in result["rows"]:
         ((rows_of, ranges),) = ast.literal_eval(row[1]).items()
@@ -235,61 +257,62 @@ def _by_range(result: dict[str, Any]) -> Table:
 
 
 class Shown(NamedTuple):
-    """What the page shows of a result."""
+    """The part of a result that the page shows."""
 
     title: str
     table: Callable[[dict[str, Any]], Table] = _all_rows
     about: str | None = None
-    """In place of the result's own words."""
+    """Text that replaces the description in the result."""
 
 
 SHOWN = {
     "work": Shown("Kinds of tasks", _lines_of_work),
     "growth_plans": Shown(
         "More intervals",
-        about="The TX90L on its rail, `effort: single`, refined and verified, with N intervals.",
+        about="Plans for the TX90L on its rail with N intervals, `effort: single`, refined and verified.",
     ),
     "peers": Shown(
         "Other solvers",
-        about="All start from the joint path of the pseudo-inverse, or search for a better one; one checker looks at "
-        "every answer at 5,001 times. Limits hold everywhere in the answers of brachis, at 61 places in those of "
-        "CasADi and Drake, at 401 in those of toppra. Drake's SNOPT ends without an answer on the second line, after "
-        "20,000 iterations.",
+        about="All solvers start from the joint path of the pseudo-inverse, or search for a better one. The same "
+        "checker examines every solution at 5,001 times. Limits hold everywhere in the solutions of brachis, at 61 "
+        "places in those of CasADi and Drake, and at 401 in those of toppra. On the second line, Drake's SNOPT ends "
+        "without a solution after 20,000 iterations.",
     ),
     "joint_paths": Shown("Joint paths: toppra"),
     "jerk_paths": Shown(
         "Joint paths with limited jerk: copp-py",
-        about="Random paths of the KUKA iiwa 14, also with limits on velocity, acceleration and torque.",
+        about="Random paths of the KUKA iiwa 14, with limits on jerk, velocity, acceleration and torque.",
     ),
     "slides": Shown("Slides whose least time is known", _worst_slides),
     "strong_drives": Shown("Strong drives and slow joints", _by_arm),
     "laws": Shown(
         "An easier task is not slower",
-        lambda result: (result["columns"][:3], [row[:3] for row in result["rows"]]),
+        _worst_laws,
     ),
     "phases": Shown(
         "Stops and process speeds",
         _by_robot,
-        "0.02 to 1 m/s on a part of the path; stops at the corners of a square. The speed is checked by central "
-        "differences of the tool's positions along the saved motion.",
+        "Process speeds of 0.02 to 1 m/s on part of the path, and stops at the corners of a square. The speed is "
+        "checked by central differences of the tool's positions along the saved motion.",
     ),
     "tolerances": Shown(
         "What tolerances gain",
         _by_range,
-        "The same random tasks planned without and with a range for the tool.",
+        "The same random tasks, planned without and with a range for the tool.",
     ),
     "sensitivities": Shown(
         "What limits cost, and solving again",
-        about="Changes of the end time by more than 0.1 ms for a limit that is 1 % wider. The derivative from the "
-        "multipliers is compared with central differences (0.03 % either way), and with solving again; the last column "
-        "is the linearised problem.",
+        _without_small_steps,
+        about="Limits for which the end time changes by more than 0.1 ms if they are 1 % wider. The derivative from "
+        "the multipliers is compared with central differences (0.03 % either way), and with solving again. The last "
+        "column compares it with the linearised problem.",
     ),
 }
-"""The results that are shown, in the order of the page."""
+"""The results that the page shows, in its order."""
 
 
 def benchmarks() -> str:
-    """Return the page of committed results: some as tables, the others as a list of files."""
+    """Return the page of committed results: some as tables, the others in a list of files."""
     results = {
         path.stem: json.loads(path.read_text())
         for path in sorted(RESULTS.glob("*.json"))
@@ -317,7 +340,7 @@ def _benchmark(result: dict[str, Any], shown: Shown) -> str:
 
 
 def _line(name: str, result: dict[str, Any]) -> str:
-    """Return the line of a file, with the sentences that count what was verified."""
+    """Return the line of a file, with those sentences of its description that count verified plans."""
     found = re.findall(r"(?:^|(?<=\. ))\d+ of \d+ .*?\.(?= |$)", result["about"])
     about = ". ".join([result["title"], *found])
     return f"| `{name}` | {about} | `{result['command'].removeprefix('python ')}` |\n"

@@ -3,8 +3,6 @@
 The full count is `benchmarks/ablation.py`.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from dataclasses import replace
 

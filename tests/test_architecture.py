@@ -3,13 +3,7 @@
 Each test collects all that breaks its rule.
 """
 
-from __future__ import annotations
-
 import ast
-import subprocess
-import sys
-from collections.abc import Iterator, Mapping
-from collections.abc import Set as AbstractSet
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +12,7 @@ import pytest
 import brachis
 import brachis.limits
 import brachis.verify.limits
+from support.scripts import output_of
 
 SOURCE = Path(__file__).parents[1] / "src/brachis"
 
@@ -82,7 +77,7 @@ HEAVY = {
 MOST_LINES = 500
 
 
-def module_of(path: Path) -> str:
+def module_of(path):
     parts = ("brachis", *path.relative_to(SOURCE).with_suffix("").parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
@@ -95,17 +90,17 @@ STAGED = {
 }
 
 
-def stage_of(module: str) -> str:
+def stage_of(module):
     parts = module.split(".")
     return ".".join(parts[1:3]) if parts[1] == "apps" else parts[1]
 
 
 @cache
-def tree_of(module: str) -> ast.Module:
+def tree_of(module):
     return ast.parse(FILES[module].read_text())
 
 
-def only_for_types(tree: ast.Module) -> set[ast.AST]:
+def only_for_types(tree):
     """Nodes under ``if TYPE_CHECKING``."""
     tests = [
         node
@@ -116,9 +111,7 @@ def only_for_types(tree: ast.Module) -> set[ast.AST]:
 
 
 @cache
-def imports_of(
-    module: str, *, top_level: bool = False, types: bool = False
-) -> frozenset[str]:
+def imports_of(module, *, top_level=False, types=False):
     """Dotted names of the modules that a module imports; of a package's names the package."""
     tree, names = tree_of(module), set()
     skipped = set() if types else only_for_types(tree)
@@ -135,7 +128,7 @@ def imports_of(
     return frozenset(names)
 
 
-def function_name(call: ast.Call) -> str:
+def function_name(call):
     """Name of the function that is called, without the module that it comes from."""
     named = call.func
     if isinstance(named, ast.Attribute):
@@ -143,7 +136,7 @@ def function_name(call: ast.Call) -> str:
     return named.id if isinstance(named, ast.Name) else ""
 
 
-def modules_by_string(module: str) -> frozenset[str]:
+def modules_by_string(module):
     """Modules that a module imports by a string."""
     calls = [node for node in ast.walk(tree_of(module)) if isinstance(node, ast.Call)]
     importing = [call for call in calls if function_name(call) == "import_module"]
@@ -153,7 +146,7 @@ def modules_by_string(module: str) -> frozenset[str]:
 
 
 @cache
-def stages_of_imports(module: str, *, types: bool = False) -> frozenset[str]:
+def stages_of_imports(module, *, types=False):
     """Stages of what a module imports; with types, what it imports for types alone or by a string too."""
     names = imports_of(module, types=types) | (
         modules_by_string(module) if types else frozenset()
@@ -190,7 +183,7 @@ def test_verification_shares_no_code_with_the_optimiser():
     assert not reached & VERIFY_MUST_NOT_REACH
 
 
-def in_circles(graph: Mapping[str, AbstractSet[str]]) -> list[str]:
+def in_circles(graph):
     """Nodes that lie on a circle, or between two."""
     left = dict(graph)
     while left:
@@ -229,7 +222,7 @@ def test_every_kind_of_limit_is_checked_by_the_verification():
     assert set(brachis.limits.TABLE) <= checked
 
 
-def compared_words(tree: ast.Module) -> Iterator[tuple[int, object]]:
+def compared_words(tree):
     """Lines and constants that are compared with something, or are among what something is looked for in."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Compare):
@@ -277,10 +270,7 @@ def test_no_module_imports_a_heavy_library_at_its_top():
 
 def test_importing_loads_no_heavy_library():
     code = f"from brachis import plan, Robot, Trajectory, Task\nimport sys\nprint(sorted({HEAVY!r} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "[]"
+    assert output_of("-c", code).strip() == "[]"
 
 
 @pytest.mark.parametrize("example", ["scara_line", "tx90l_rail_line"])
@@ -291,13 +281,7 @@ def test_an_ordinary_plan_loads_no_scipy(example):
         f"brachis.plan(brachis.examples.{example}, effort='single', intervals=8, strict=False)\n"
         "print('scipy' in sys.modules, 'pinocchio' in sys.modules)"
     )
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == ["False", "True"]
+    assert output_of("-W", "ignore", "-c", code).split() == ["False", "True"]
 
 
 def test_public_names_exist():

@@ -1,9 +1,6 @@
 """Plans in charts, from the task to the saved motion and its bottlenecks."""
 
-from __future__ import annotations
-
 import dataclasses
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +24,7 @@ from support.result_files import with_parts
 from support.scara import START, scara
 
 
-def scara_line(angle: float, **changes: Any) -> brachis.Result:
+def scara_line(angle, **changes):
     line = brachis.Line(length=1.0, angle_deg=angle)
     task = {"start": START, "task_space": ["x", "y"], "path": line, "intervals": 20}
     return brachis.plan(scara(), **(task | changes))

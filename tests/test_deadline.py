@@ -1,7 +1,5 @@
 """When to end."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

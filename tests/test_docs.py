@@ -1,7 +1,5 @@
 """The documentation is made of what is in the repository: pages from results, pictures, links, names, citation."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import re

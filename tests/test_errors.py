@@ -1,7 +1,5 @@
 """Errors reach the caller whole, from other processes as well."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import re

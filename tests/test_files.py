@@ -1,7 +1,5 @@
 """Reading files of bounded size, and temporary files that killed processes leave."""
 
-from __future__ import annotations
-
 import io
 import os
 import re
@@ -111,7 +109,7 @@ def test_nothing_stays_open_after_a_refusal(tmp_path):
     assert after == before
 
 
-def dead_process() -> int:
+def dead_process():
     done = subprocess.Popen([sys.executable, "-c", ""])
     done.wait()
     return done.pid

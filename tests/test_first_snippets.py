@@ -1,7 +1,5 @@
 """What a new user writes first runs, and means what the task file means."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import runpy
@@ -53,17 +51,18 @@ def test_the_script_of_a_new_user_runs(tmp_path, capsys):
 
 def test_all_forms_of_a_plan_are_the_same_plan(tmp_path):
     urdf = ROOT / "robots/scara3/robot.urdf"
-    content = {
-        "brachis": 1,
-        "robot": {"urdf": str(urdf)},
-        "start": {"joints": Q0},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"by": [0.0, 0.3]}}],
-        "redundant_joints": ["j1"],
-        "spline": {"intervals": 8},
-        "search": {"effort": "single"},
-    }
-    (tmp_path / "task.yaml").write_text(str(content))
+    text = f"""
+    brachis: 1
+    robot: {{urdf: {urdf}}}
+    start: {{joints: {Q0}}}
+    task_space: [x, y]
+    path: [{{line: {{by: [0.0, 0.3]}}}}]
+    redundant_joints: [j1]
+    spline: {{intervals: 8}}
+    search: {{effort: single}}
+    """
+    content = yaml.safe_load(text)
+    (tmp_path / "task.yaml").write_text(text)
     ends = [
         brachis.plan(tmp_path / "task.yaml").t_end,
         brachis.plan(urdf, content).t_end,
@@ -129,11 +128,7 @@ def test_segments_are_those_of_the_task_file():
     [
         ("Line", {}, ["Line", "exactly one of its forms"]),
         ("Line", {"by": ["a", 1]}, ["Line", "line.by[0]"]),
-        (
-            "Helix",
-            {"center": [0, 0, 0], "pitch": 0.1, "turns": 0},
-            ["helix.turns"],
-        ),
+        ("Helix", {"center": [0, 0, 0], "pitch": 0.1, "turns": 0}, ["helix.turns"]),
         ("Spline", {"through": []}, ["Spline", "spline.through"]),
         ("Spline", {"through": [pin.SE3.Identity(), 3.0]}, ["spline.through"]),
     ],

@@ -1,7 +1,5 @@
 """The first 30 cases of ``benchmarks/fuzz.py``: broken inputs end with an error of brachis or a valid outcome."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

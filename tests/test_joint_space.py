@@ -1,13 +1,11 @@
 """Paths of joints from the task to the verified motion: beside toppra, under every limit, saved, tampered with."""
 
-from __future__ import annotations
-
-import json
 import re
 
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import make_interp_spline
 
 import brachis
@@ -25,20 +23,15 @@ WAYPOINTS = np.random.default_rng(3).uniform(-1.0, 1.0, (4, 7))
 REST = np.array([0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0])
 
 
+BRIEF = {"task_space": "joints", "least_motion": False}
 LINE = {
     "limits": {"acceleration": 10.0},
     "start": WAYPOINTS[0],
-    "task_space": "joints",
     "path": brachis.Spline(through=WAYPOINTS[1:]),
     "intervals": 20,
-    "least_motion": False,
+    **BRIEF,
 }
-SHORT = {
-    "task_space": "joints",
-    "intervals": 8,
-    "effort": "single",
-    "least_motion": False,
-}
+SHORT = {"intervals": 8, "effort": "single", **BRIEF}
 
 
 def plan(**changes):
@@ -67,7 +60,7 @@ def test_result_is_verified_and_follows_the_path(joint_motion):
     assert joint_motion.trajectory.redundant_joints == ()
     assert joint_motion.family == "path of joints"
     ends = joint_motion.trajectory.position([0.0, joint_motion.t_end])
-    np.testing.assert_allclose(ends, WAYPOINTS[[0, -1]], atol=1e-12)
+    assert_allclose(ends, WAYPOINTS[[0, -1]], atol=1e-12)
 
 
 def test_a_spline_of_scipys_is_the_path():
@@ -76,7 +69,7 @@ def test_a_spline_of_scipys_is_the_path():
     result = plan(path=[brachis.bspline_segment(curve)])
     assert result.verified
     u = 3.0 * result.trajectory.path_coordinate(1.0)
-    np.testing.assert_allclose(result.trajectory.position(1.0), curve(u), atol=1e-9)
+    assert_allclose(result.trajectory.position(1.0), curve(u), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -115,13 +108,8 @@ def test_paths_beyond_a_limit_at_rest_are_refused_with_their_place(changes, reas
 
 def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
     """A pendulum that needs 6.2 Nm to be held level, from its lowest to its highest position, which takes 12.4 J."""
-    swing = {
-        "start": [-1.5],
-        "task_space": "joints",
-        "path": brachis.Line(to=[1.5]),
-        "intervals": 20,
-        "least_motion": False,
-    }
+    line = brachis.Line(to=[1.5])
+    swing = {"start": [-1.5], "path": line, "intervals": 20, **BRIEF}
     strong, weak = (
         planar_robot("R", "xz", limits=LimitSpec(torque=torque))
         for torque in (5.5, 3.0)
@@ -134,9 +122,8 @@ def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
 
 
 def test_sensitivities_are_those_of_solving_again(joint_motion):
-    found = check_sensitivities(
-        joint_motion.candidate.refined, joint_motion.sensitivities
-    )
+    refined = joint_motion.candidate.refined
+    found = check_sensitivities(refined, joint_motion.sensitivities)
     assert found.larger()
     assert found.worst_deviation() < 0.05
 
@@ -199,13 +186,13 @@ def test_the_first_waypoint_may_be_the_start(tmp_path):
             assert np.allclose(task.start.joints, WAYPOINTS[0], rtol=0, atol=1e-5)
     result = brachis.plan("iiwa14", path=WAYPOINTS, **SHORT)
     assert result.t_end == pytest.approx(expected.t_end, rel=1e-9)
-    content = {
-        "brachis": 1,
-        "robot": {"urdf": "iiwa14"},
-        "task_space": "joints",
-        "path": WAYPOINTS.tolist(),
-    }
-    (tmp_path / "task.yaml").write_text(json.dumps(content))
+    text = f"""
+    brachis: 1
+    robot: {{urdf: iiwa14}}
+    task_space: joints
+    path: {WAYPOINTS.tolist()}
+    """
+    (tmp_path / "task.yaml").write_text(text)
     task = brachis.load_task(tmp_path / "task.yaml")
     assert task.start.joints == tuple(WAYPOINTS[0])
     assert brachis.load_task(task.to_dict()) == task
@@ -253,4 +240,4 @@ def test_a_bspline_of_seven_joints_is_no_pose():
     knots = [0.0] * 6 + [1.0] * 6
     curve = {"degree": 5, "knots": knots, "control_points": rows.tolist()}
     task = task_with(task_space="joints", path=[{"bspline": curve}])
-    np.testing.assert_array_equal(task.start.joints, first)
+    assert_array_equal(task.start.joints, first)

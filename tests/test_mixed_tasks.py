@@ -3,8 +3,6 @@
 The full counts are `benchmarks/mixed_tasks.py` and `benchmarks/restarts.py`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

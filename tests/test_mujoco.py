@@ -1,7 +1,5 @@
 """Independent physics: MuJoCo, from the same URDF, agrees with the torques and follows the path with them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

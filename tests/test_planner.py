@@ -1,7 +1,5 @@
 """The pipeline as a whole: what is kept, what is refused, how it is interrupted."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np
@@ -9,14 +7,14 @@ import pytest
 
 import brachis
 from brachis.errors import NotInstalledError, StartError
-from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
 from support.effort import QUICK
 from support.scara import START, scara
+from support.solvers import solve
 from support.starts import starting_points
 
 
-def plan(robot=None, **changes) -> brachis.Result:
+def plan(robot=None, **changes):
     line = {
         "start": START,
         "task_space": ["x", "y"],
@@ -25,10 +23,6 @@ def plan(robot=None, **changes) -> brachis.Result:
         "intervals": 20,
     }
     return brachis.plan(robot or scara(), **{**line, **QUICK, **changes})
-
-
-def solve_with_uno(program, x):
-    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def test_task_of_the_result_repeats_the_plan():
@@ -40,12 +34,12 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
     program, _ = brachis.transcribe(
         brachis.examples.scara_line, redundant_joints=["j1"]
     )
-    first = solve_with_uno(program, next(starting_points(program)))
+    first = solve(program, next(starting_points(program)))
     (phase,) = program.phases
     dense = phase.with_points(np.linspace(0.0, 1.0, 2001))
     assert phase.violation(first.x).max() < 1e-6
     assert dense.violation(first.x).max() > 0.01
-    refined = refine(program, first, solve_with_uno, RefinementOptions())
+    refined = refine(program, first, solve, RefinementOptions())
     assert dense.violation(refined.x).max() <= 1e-4
     assert refined.t_end > first.objective
 

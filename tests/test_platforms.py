@@ -1,7 +1,5 @@
 """What is installed where: the README, the dependencies, and the task that resolves them."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import sys

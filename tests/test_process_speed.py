@@ -1,9 +1,8 @@
 """A given speed of the tool over parts of the path: known optima of a gantry, with the speed met exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.robot import dynamics
@@ -32,13 +31,13 @@ def plan(part=None, **changes):
 PART = {"speed": SPEED, "s": [BEGIN, END]}
 
 
-def leg(way: float, speed: float) -> float:
+def leg(way, speed):
     """Least time between rest and a speed over a way, by full force either way."""
     top = np.sqrt(ACCELERATION * way + 0.5 * speed**2)
     return float((2.0 * top - speed) / ACCELERATION)
 
 
-def fastest(speed: float) -> float:
+def fastest(speed):
     """Least time with the speed on the part in the middle."""
     ways = leg(BEGIN * LENGTH, speed) + leg((1.0 - END) * LENGTH, speed)
     return ways + (END - BEGIN) * LENGTH / speed
@@ -61,7 +60,7 @@ def test_the_speed_is_met_and_reached_and_left_fast():
     assert result.t_end > 1.2 * free.t_end
     s, speed = speeds_along(result.trajectory)
     inside = (s > BEGIN + 1e-3) & (s < END - 1e-3)
-    np.testing.assert_allclose(speed[inside], SPEED, rtol=1e-8)
+    assert_allclose(speed[inside], SPEED, rtol=1e-8)
     # On the way to it the tool is as fast as it can.
     assert speed[s < 0.9 * BEGIN].max() > 1.4 * SPEED
     assert fastest(SPEED) <= result.t_end < 1.05 * fastest(SPEED)
@@ -110,7 +109,7 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     is_held = (x > 0.02) & (x < 0.3 - lead)
     is_held |= (x > 0.3 + lead) & (x < 0.6 - lead)
     is_held &= np.roll(is_held, 3) & np.roll(is_held, -3)
-    np.testing.assert_allclose(speeds[is_held], speed, rtol=1e-6)
+    assert_allclose(speeds[is_held], speed, rtol=1e-6)
     is_behind = (x > 0.021) & (x < 0.599)
     assert speeds[is_behind].max() < speed * (1.0 + 1e-3), "faster in a lead"
     assert is_held.sum() * 2.0 * t[1] > 0.5 * 0.5 / speed
@@ -139,7 +138,7 @@ def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():
     assert 4.99 < mean.max() < 5.001
     for curves in (motion.q, motion.qdot, motion.qddot):
         size = np.abs(curves).max()
-        np.testing.assert_allclose(curves[-1], curves[0], atol=1e-9 * size)
+        assert_allclose(curves[-1], curves[0], atol=1e-9 * size)
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.1])

@@ -1,7 +1,5 @@
 """Progress: a line on standard error, the log, and nothing for those who ask for nothing."""
 
-from __future__ import annotations
-
 import logging
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 The full count, 200, is `benchmarks/random_lines.py`.
 """
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

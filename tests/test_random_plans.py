@@ -3,8 +3,6 @@
 The full count, 300 over all robots, is `benchmarks/random_plans.py`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

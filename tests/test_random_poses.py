@@ -3,8 +3,6 @@
 The full count, 100 for each robot, is `benchmarks/random_poses.py`.
 """
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

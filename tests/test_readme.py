@@ -1,7 +1,5 @@
 """The README's commands, snippets and table, the docs' snippets, and the examples, all executed."""
 
-from __future__ import annotations
-
 import functools
 import importlib.util
 import re
@@ -35,7 +33,7 @@ def clone(tmp_path):
     return tmp_path
 
 
-def blocks(page: Path, language: str) -> list[str]:
+def blocks(page, language):
     return re.findall(
         rf"^```{language}\n(.*?)^```", page.read_text(), flags=re.DOTALL | re.MULTILINE
     )
@@ -92,7 +90,7 @@ def test_commands_run(page, clone, monkeypatch, capfd):
     assert (clone / "out/motion.csv").stat().st_size > 1000
 
 
-def look(command: list[str | Path]) -> None:
+def look(command):
     """Start a viewer, and stop it once it says where to look."""
     if importlib.util.find_spec("viser") is None:
         return
@@ -130,7 +128,7 @@ def test_example_02(monkeypatch):
     check_table("examples/02_scara_table.py", module.markdown_table(results))
 
 
-def check_table(name: str, made: str) -> None:
+def check_table(name, made):
     """Compare lines of a table of the docs with those that an example makes; last digits differ between machines."""
     (page,) = [
         page for page in DOCS.glob("*.md") if f": {name} -->" in page.read_text()
@@ -339,7 +337,7 @@ def test_the_quick_start_plans_the_task_of_its_file():
     text = (ROOT / "docs/quick_start.md").read_text()
     cell = re.findall(r"```{code-cell}\n(.*?)```", text, flags=re.DOTALL)[0]
     assert "The same as a file is `examples/01_scara_line.yaml`" in text
-    names: dict[str, brachis.Result] = {}
+    names = {}
     exec(compile(cell, "quick_start.md", "exec"), names)  # noqa: S102
     file = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
     planned = names["result"].task.to_dict()

@@ -1,7 +1,5 @@
 """Stops and dwells, planned: known optima of a gantry; a tool that turns on the spot; corners of a file."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -36,7 +34,7 @@ def plan(path, **keys):
     )
 
 
-def from_rest(distance: float) -> float:
+def from_rest(distance):
     """Least time from rest to rest over a way in x, by full force either way."""
     return float(2.0 * np.sqrt(distance / ACCELERATION))
 

@@ -1,7 +1,5 @@
 """What objects show of themselves fits on a screen, has units, and is escaped in notebooks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

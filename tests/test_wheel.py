@@ -1,7 +1,5 @@
 """Robots and examples are found from an installed wheel as from the source tree."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

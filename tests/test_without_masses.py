@@ -1,7 +1,5 @@
 """Robots whose URDF has no masses: planned as long as nothing needs torques, which are unknown."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -29,15 +27,15 @@ GRAM = (
     "<inertial><mass value='0.001'/>"
     "<inertia ixx='1e-6' iyy='1e-6' izz='1e-6' ixy='0' ixz='0' iyz='0'/></inertial>"
 )
-TASK = {
-    "brachis": 1,
-    "start": {"joints": [0.2, 0.3, -0.4, 0.3, 0.9, 0.1]},
-    "task_space": "pose",
-    "path": [{"line": {"by": [0.1, 0.4, 0]}}],
-}
+TASK = yaml.safe_load("""
+brachis: 1
+start: {joints: [0.2, 0.3, -0.4, 0.3, 0.9, 0.1]}
+task_space: pose
+path: [{line: {by: [0.1, 0.4, 0]}}]
+""")
 
 
-def six_axes(inertial: str = "", effort: float = 0.0, bare: str = "") -> str:
+def six_axes(inertial="", effort=0.0, bare=""):
     """Write an arm with a spherical wrist and a gas spring that follows a2; links in `bare` have no inertial."""
     links = ["base", *(f"l{i}" for i in range(1, 7)), "spring", "tool0"]
     parts = [
@@ -57,7 +55,7 @@ def six_axes(inertial: str = "", effort: float = 0.0, bare: str = "") -> str:
         <limit lower='-3' upper='3' effort='0' velocity='5'/><mimic joint='a2' multiplier='-0.4'/></joint></robot>"""
 
 
-def robot_of(text: str, **settings) -> Robot:
+def robot_of(text, **settings):
     given = {"limits": {"acceleration": 8.0}, **settings}
     return Robot.from_urdf("arm.urdf", urdf_text=text, tool_frame="tool0", **given)
 
@@ -137,46 +135,39 @@ def test_bottlenecks_and_report(result):
 
 
 @pytest.mark.parametrize(
-    ("settings", "key"),
+    ("text", "key"),
     [
-        (
-            {"limits": {"acceleration": 8.0, kind: {"a2": 5.0}}},
-            f"robot.limits.{kind}.a2",
-        )
+        (f"limits: {{acceleration: 8.0, {kind}: {{a2: 5.0}}}}", f"limits.{kind}.a2")
         for kind in ("torque", "power", "rms_torque", "torque_rate")
     ]
     + [
         (
-            {"limits": {"acceleration": 8.0, "torque_speed": {"a2": [[0, 5], [1, 2]]}}},
-            "robot.limits.torque_speed",
+            "limits: {acceleration: 8.0, torque_speed: {a2: [[0, 5], [1, 2]]}}",
+            "limits.torque_speed",
         ),
-        (
-            {"limits": {"acceleration": 8.0, "total_power": 100.0}},
-            "robot.limits.total_power",
-        ),
-        ({"payload": {"mass": 1.0}}, "robot.payload"),
-        ({"friction": {"viscous": 1.0}}, "robot.friction.viscous"),
-        ({"friction": {"armature": {"a1": 0.1}}}, "robot.friction.armature"),
+        ("limits: {acceleration: 8.0, total_power: 100.0}", "limits.total_power"),
+        ("payload: {mass: 1.0}", "payload"),
+        ("friction: {viscous: 1.0}", "friction.viscous"),
+        ("friction: {armature: {a1: 0.1}}", "friction.armature"),
     ],
 )
-def test_what_needs_torques_is_refused_by_its_key(settings, key):
+def test_what_needs_torques_is_refused_by_its_key(text, key):
+    settings = yaml.safe_load(text)
     with pytest.raises(UrdfError) as caught:
         robot_of(six_axes(), **settings)
     message = str(caught.value)
     keys, _, _ = message.partition("which are needed for ")[2].partition(";")
-    assert key in keys.split(", ")
+    assert f"robot.{key}" in keys.split(", ")
     assert "moved by a1 (l1, spring), a2 (l2)," in message
     assert robot_of(six_axes(GRAM), **settings).has_masses
 
 
 def test_what_changes_a_robot_is_refused_too():
     robot = robot_of(six_axes())
-    for change in (
-        lambda: robot.with_limits(torque=5.0),
-        lambda: robot.with_payload(1.0),
-    ):
-        with pytest.raises(UrdfError, match="has no masses"):
-            change()
+    with pytest.raises(UrdfError, match="has no masses"):
+        robot.with_limits(torque=5.0)
+    with pytest.raises(UrdfError, match="has no masses"):
+        robot.with_payload(1.0)
     assert robot.with_limits(jerk=100.0).limits.jerk[0] == 100.0
     assert not robot_of(six_axes(), friction={"viscous": None, "coulomb": 0}).has_masses
 

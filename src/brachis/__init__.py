@@ -7,20 +7,20 @@
     result = brachis.plan("scara3", path=Line(by=[0, 1]), start=[0.52, -2.09, 2.09], task_space=["x", "y"])
     result.plot()
 
-To plan            plan, plan_many, transcribe (the nonlinear program itself)
+Planning           plan, plan_many, transcribe (the nonlinear program itself)
 Many plans         sweep, SweepResult: keys of a task varied over grids and draws, also on a cluster
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
-A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
-A task             Task, load_task; examples (task files that come along)
-What comes out     Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
-Recorded motions   import_motion, from a CSV; compare with a plan on its path: Comparison; compare_run: Tracking
-To a controller    export, plan_for_controller, verify_run: RunReport; Profile, load_profile, profile_names
-To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
-What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning
-To extend it       ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
+A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (the included ones)
+A task             Task, load_task; examples (the included task files)
+Results            Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
+Recorded motions   import_motion, from a CSV file; compare with a plan: Comparison; compare_run: Tracking
+Controllers        export, plan_for_controller, verify_run: RunReport; Profile, load_profile, profile_names
+Looking at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
+Errors             errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning
+Extensions         ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
 
-All units are SI: m, rad, kg, s, N, Nm. ``help(brachis.plan)`` has the details, as have the files in ``docs/``.
+All units are SI: m, rad, kg, s, N, Nm. For details see ``help(brachis.plan)`` and the files in ``docs/``.
 """
 
 # The names are imported when first used, so that ``import brachis`` is quick.
@@ -127,7 +127,7 @@ _NAMES = {
     "trajectory": "Samples Trajectory",
     "verify": "Verification verify_trajectory",
 }
-"""The names that each module has for the public."""
+"""The public names of each module."""
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = ["__version__", *_MODULES, *_HOME]  # noqa: PLE0604  (names)
@@ -147,5 +147,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Names for completion."""
+    """List the names for completion."""
     return list(__all__)

@@ -1,4 +1,4 @@
-"""The command ``brachis`` and ``python -m brachis``: Ctrl-C is heard before anything else is imported."""
+"""The command ``brachis``, also ``python -m brachis``; it handles Ctrl-C before anything else is imported."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from brachis.common import interrupts
 def main() -> None:
     """Run the command line."""
     interrupts.install()
-    if sys.argv[1:] == ["--version"]:  # without the import of Typer
+    if sys.argv[1:] == ["--version"]:  # without importing Typer
         sys.stdout.write(f"brachis {brachis.__version__}\n")
         return
     from brachis.apps.cli.main import main as run

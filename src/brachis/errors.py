@@ -17,7 +17,7 @@ The tree of errors::
         |-- StartError              the start or end posture
         |-- DecompositionError      a choice of redundant joints without a closed form
         |-- PlausibilityError       implausible figures, if the plan is strict
-        `-- NotInstalledError       a library of an extra
+        `-- NotInstalledError       a library of an extra that is not installed
     MissingAttributeError           an AttributeError that names the attribute that may be meant
     BrachisWarning                  a UserWarning
 
@@ -43,19 +43,19 @@ PIP = "python -m pip install"
 
 @dataclass(frozen=True)
 class Remedy:
-    """A number of the task whose change may help.
+    """A number in the task that may be changed to make a plan possible.
 
     Attributes
     ----------
     key : str
         Dotted key, for example ``boundary.end_speed``.
     current : float
-        The number in the task.
+        The value in the task.
     guess : float
-        A number that may be enough.
+        A value that may be enough.
     unit : str
     is_known : bool
-        Whether the guess is as near to the current number as it can be.
+        Whether the guess is known to be the smallest change that can be enough.
     """
 
     key: str
@@ -100,11 +100,11 @@ _NAMES_HERE = {
     }.items()
     for name in names.split()
 }
-"""Names that other libraries use, and those used here, of which the first one that exists is meant."""
+"""Names in other libraries, each with the names used here; the first of these that exists is suggested."""
 
 
 class Details(TypedDict, total=False):
-    """What an error says besides the problem; see `BrachisError`."""
+    """The facts that an error states besides the problem; see `BrachisError`."""
 
     found: object
     allowed: object
@@ -122,16 +122,16 @@ class BrachisError(Exception):
     found : object, optional
         What was found.
     allowed : object, optional
-        What would have been accepted.
+        The values that would have been accepted.
     where : str, optional
-        File and key, joint, or interval of the path coordinate.
+        Place of the problem: file and key, joint, or interval of the path coordinate.
     hint : str, optional
         What to try.
 
     Attributes
     ----------
     remedies : tuple of Remedy
-        Numbers of the task to change. `brachis.plan` tries them, and names in the hint those that lead to a plan.
+        Numbers in the task to change. `brachis.plan` tries new values, and the hint names those that lead to a plan.
 
     Examples
     --------
@@ -163,11 +163,11 @@ class BrachisError(Exception):
         super().__init__(problem)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Be sent to other processes with all data, whatever a subclass takes to be made."""
+        """Support pickling with all data, whatever arguments the constructor of a subclass has."""
         return type(self).__new__, (type(self), *self.args), self.__dict__
 
     def with_remedies(self, *remedies: Remedy) -> Self:
-        """Return the error with numbers of the task that may be changed."""
+        """Attach numbers of the task that may be changed, and return the error."""
         self.remedies = remedies
         return self
 
@@ -194,7 +194,7 @@ class BrachisError(Exception):
 
 
 class BrachisWarning(UserWarning):
-    """Something that is allowed, and that the user should know."""
+    """A warning about something that is allowed, but that the user should know."""
 
 
 class InputError(BrachisError):
@@ -222,8 +222,8 @@ class UrdfError(InputError):
 
 
 _NOT_STRICT = (
-    "If they are meant, make them warnings: strict: false in the task file, brachis.plan(..., strict=False), or "
-    "brachis plan --no-strict"
+    "If these figures are intended, turn the error into warnings: strict: false in the task file, "
+    "brachis.plan(..., strict=False), or brachis plan --no-strict"
 )
 
 
@@ -233,7 +233,7 @@ class PlausibilityError(InputError):
     Attributes
     ----------
     remarks : tuple of str
-        One line for each.
+        One line for each implausible figure.
     """
 
     def __init__(self, remarks: Sequence[str]) -> None:
@@ -250,7 +250,7 @@ class UnknownNameError(InputError):
     kind : str
         What was looked for, for example ``"joint"``.
     name : str
-        The name that was asked for, the first of several.
+        The unknown name; the first one if there are several.
     valid : tuple of str
         The names that exist.
     """
@@ -313,7 +313,7 @@ class PathError(InputError):
     Attributes
     ----------
     s_interval : tuple of float or None
-        Where on the path, in the dimensionless path coordinate.
+        The faulty part of the path, as an interval of the dimensionless path coordinate.
     """
 
     def __init__(
@@ -334,14 +334,14 @@ class StartError(InputError):
 
 
 class DecompositionError(InputError):
-    """No closed form fits the asked choice of redundant joints.
+    """No closed form fits the requested choice of redundant joints.
 
     Attributes
     ----------
     redundant_joints : tuple of str
-        What was asked for.
+        The requested choice.
     reasons : dict of str to str
-        For every family that was tried, why it does not fit.
+        The reason why each family that was tried does not fit.
     available : tuple of tuple of str
         Choices of redundant joints of this robot and task space that do have a closed form.
     """
@@ -369,7 +369,7 @@ class DecompositionError(InputError):
 
 
 class ResultFileError(InputError):
-    """A saved result is missing, broken, or of another schema version."""
+    """A saved result is missing, broken, or has a different schema version."""
 
 
 class ClusterError(BrachisError):
@@ -377,31 +377,31 @@ class ClusterError(BrachisError):
 
 
 class NotInstalledError(InputError):
-    """A library of an extra is not installed.
+    """A library that an extra of brachis installs is missing.
 
     Attributes
     ----------
     library, extra : str
-        The library, and the extra of brachis that brings it.
+        The library, and the extra of brachis that installs it.
     """
 
     def __init__(self, user: str, library: str, extra: str) -> None:
         self.library = library
         self.extra = extra
-        hint = f'In a clone of brachis run {PIP} ".[{extra}]"; from its wheel {PIP} "brachis-....whl[{extra}]"'
+        hint = f'In a clone of brachis run {PIP} ".[{extra}]"; with a wheel run {PIP} "brachis-....whl[{extra}]"'
         super().__init__(f"{user} needs {library}, which is not installed", hint=hint)
 
 
 class NotBuiltError(BrachisError):
-    """The compiled kernel is missing, damaged, or made of other source."""
+    """The compiled kernel is missing, damaged, or built from different source code."""
 
     def __init__(self, problem: str, script: object) -> None:
-        hint = f"Run python {script}; without a C compiler first {PIP} ziglang"
+        hint = f"Run python {script}; without a C compiler, run {PIP} ziglang first"
         super().__init__(f"the kernel is not built: {problem}", hint=hint)
 
 
 class UnreachableError(BrachisError):
-    """A trial point of the optimiser has a collocation point outside the branch; solvers back off from it."""
+    """A trial point of the optimiser has a collocation point outside the branch; solvers then shorten their step."""
 
 
 class PlanningError(BrachisError):
@@ -418,9 +418,8 @@ class PlanningError(BrachisError):
 def nearest(
     name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Suggest a valid name.
+    """Suggest the valid name that is meant by a word of other libraries, a misspelling, or a longer name.
 
-    In turn: the one for a word of other libraries, one with a slip, the longest beginning of `name`, the nearest.
     If an attribute is asked for, functions elsewhere in brachis count as well.
     """
     if not isinstance(name, str):
@@ -435,23 +434,24 @@ def nearest(
     begun = [candidate for candidate in by_small if small.startswith(f"{candidate}_")]
     if known and small not in by_small:
         return known[0]
-    near = difflib.get_close_matches(small, by_small, n=1, cutoff=0.5)
-    has_slip = difflib.get_close_matches(small, near, n=1, cutoff=0.9)
-    if begun and not has_slip:
-        return by_small[max(begun, key=len)]
+    near = (
+        difflib.get_close_matches(small, by_small, cutoff=0.9)
+        or sorted(begun, key=len, reverse=True)
+        or difflib.get_close_matches(small, by_small, cutoff=0.65)
+    )
     return by_small[near[0]] if near else None
 
 
 def suggest(
-    name: str, valid: Iterable[str], *, is_attribute: bool = False
+    name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Ask whether the `nearest` valid name is meant; None if none is near."""
+    """Return the question whether the `nearest` valid name is meant; None if no name is similar."""
     near = nearest(name, valid, is_attribute=is_attribute)
     return f"Did you mean {near!r}?" if near else None
 
 
 class MissingAttributeError(AttributeError):
-    """An object has no such attribute; the message names the one that may be meant, also of its parts."""
+    """An object has no such attribute; the message suggests one, which may also belong to a part of the object."""
 
     def __init__(self, instance: object, name: str) -> None:
         super().__init__()
@@ -459,11 +459,11 @@ class MissingAttributeError(AttributeError):
         self._name = name
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Be sent to other processes without the object."""
+        """Support pickling without the object."""
         return AttributeError, (str(self),)
 
     def __str__(self) -> str:
-        """Look for the name that may be meant; most such errors are caught, and nobody reads them."""
+        """Return the message; the suggestion is looked up only now, because most such errors are caught unread."""
         name = self._name
         meant = None if name.startswith("_") else _attribute_meant(self._instance, name)
         message = f"{type(self._instance).__name__!r} object has no attribute {name!r}"
@@ -471,7 +471,7 @@ class MissingAttributeError(AttributeError):
 
 
 def _attribute_meant(instance: object, name: str) -> str | None:
-    """Return the attribute of an object, or of one of its parts, that may be meant by a name."""
+    """Return the attribute of an object, or of one of its parts, that a name may stand for."""
     public = [entry for entry in dir(instance) if not entry.startswith("_")]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
         if word in public or "." in word:
@@ -486,7 +486,7 @@ def _attribute_meant(instance: object, name: str) -> str | None:
 def no_attribute(
     module: str, kind: str, name: str, valid: Sequence[str]
 ) -> AttributeError:
-    """Return what a module raises that has things of one kind, such as robots, by their names."""
+    """Return the error for an unknown name in a module whose attributes are all of one kind, such as robots."""
     hint = suggest(name, valid)
     return AttributeError(
         f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}"
@@ -495,6 +495,6 @@ def no_attribute(
 
 
 def __dir__() -> list[str]:
-    """Names for completion."""
+    """List the names for completion."""
     homes = {key: getattr(value, "__module__", "") for key, value in globals().items()}
     return [key for key, home in homes.items() if home == __name__ and key[0] != "_"]

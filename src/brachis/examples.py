@@ -1,4 +1,4 @@
-"""Task files that come with brachis: ``brachis.examples.scara_line`` is the path of ``01_scara_line.yaml``.
+"""Included task files: ``brachis.examples.scara_line`` is the file path of ``01_scara_line.yaml``.
 
 Examples
 --------
@@ -18,18 +18,18 @@ from brachis.errors import no_attribute
 
 
 def _task_files() -> dict[str, Path]:
-    """Return the task files by the names of the examples, from the easiest on."""
+    """Return the task files by the names of the examples, the easiest first."""
     paths = sorted(shipped_folder("examples").glob("[0-9]*_*.yaml"))
     return {path.stem.split("_", 1)[1]: path for path in paths}
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of the examples, from the easiest on."""
+    """Return the names of the examples, the easiest first."""
     return tuple(_task_files())
 
 
 def __getattr__(name: str) -> Path:
-    """Find an example's task file."""
+    """Return the path of an example's task file."""
     paths = _task_files()
     if name not in paths:
         raise no_attribute(__name__, "examples", name, names())
@@ -37,5 +37,5 @@ def __getattr__(name: str) -> Path:
 
 
 def __dir__() -> list[str]:
-    """Names for completion."""
+    """List the names for completion."""
     return ["names", *names()]

@@ -1,4 +1,4 @@
-"""Plan a motion: the steps of `plan` stand in the order in which they run.
+"""Plan a motion: the steps of `plan` are written in the order in which they run.
 
 `transcribe` stops before the solve; `plan_many` plans many tasks in several processes.
 """
@@ -24,7 +24,7 @@ from brachis.common.threads import use_one_thread
 from brachis.common.words import write_count
 from brachis.errors import BrachisError, InputError
 from brachis.optimise.layout import SHORTEST_TIME
-from brachis.problem.feasibility import check_independent, check_regular
+from brachis.problem.feasibility import check_regular
 from brachis.problem.plausibility import (
     check_within_reach,
     of_end_time,
@@ -52,7 +52,7 @@ from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import MotionSource, motion_of
 
 RobotOrTask = Source | Robot | None
-"""A robot, or a task; both may be the name of a file."""
+"""A robot or a task; either may be given by the name of a file."""
 _OWN_KEYWORDS = (
     "start_from",
     "families",
@@ -78,38 +78,41 @@ def plan(
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
 
-    ``plan(task)``, ``plan(robot, task)`` and ``plan(robot, path=..., start=..., task_space=...)`` say the same in
-    different ways; keywords beside a task change it.
+    ``plan(task)``, ``plan(robot, task)`` and ``plan(robot, path=..., start=..., task_space=...)`` are different ways to
+    say the same. Keywords given with a task change that task.
 
     Parameters
     ----------
     robot_or_task : path, Robot, mapping, Task or None
-        A robot: a `Robot`, a URDF file, or the name of one that comes with brachis (`brachis.robots`). It takes the
-        place of the one that the task names; what else the task's ``robot`` part sets (limits, gravity, frames, ...) is
-        added to it. None: the task's own. Or, alone, a task as below.
+        A robot: a `Robot`, a URDF file, or the name of an included robot (`brachis.robots`). It replaces the robot that
+        the task names; all other settings in the task's ``robot`` section (limits, gravity, frames, ...) are added to
+        it. If None, the task's own robot is used. If it is the only argument, it may also be a task, as described
+        below.
     task : path, mapping or Task, optional
         Task file, or its content.
     start_from : Result, Trajectory or path, optional
-        A motion, or its file, of this task or one like it (other limits, another path), to start from in place of the
-        search. The optimum next to it is found, in a fraction of the time. Where the motion cannot be used, or leads to
-        no verified plan, the search goes on as usual, and ``result.not_completed`` says so.
+        A motion, or its file, to start from in place of the search. It may belong to this task or to a similar one
+        (with other limits or another path). The optimum closest to it is found, in a fraction of the time. If the
+        motion cannot be used, or leads to no verified plan, the search continues as usual, and ``result.not_completed``
+        says so.
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
     own_limits : sequence of LimitModel, optional
-        Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
-        They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
+        Limits of your own in addition to those of the task: objects whose ``bind(robot)`` returns a
+        `brachis.limits.Limit`. They are not saved with the motion. Limits from installed packages are named in the task
+        instead (``custom_limits``).
     listener : callable, optional
-        Called with what happens, a line of text at a time; ``logging`` has it under the name ``brachis``, stages at
-        level INFO and iterations at DEBUG.
+        Called with one line of text for each step of the work. The same lines go to the ``logging`` module under the
+        name ``brachis``, stages at level INFO and iterations at DEBUG.
     progress : bool, optional
-        Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless
-        there is a listener.
+        Whether to show the progress on standard error, or below the cell in a notebook. By default it is shown only in
+        notebooks, and not if there is a listener.
     check_advice : bool, optional
-        If no plan is found: whether numbers that the error advises are first tried in plans, for up to 20 s. False:
-        the error names what to change, but not how far.
+        If no plan is found, whether to try the numbers that the error advises in further plans, for up to 20 s. If
+        False, the error names what to change, but not by how much.
     **keywords
-        Keys of the task, without their sections: ``path``, ``start``, ``task_space``, ``limits``, ``intervals``,
-        ``effort``, ...; all of them: `brachis.task.TaskKeywords`.
+        Keys of the task, without the names of their sections: ``path``, ``start``, ``task_space``, ``limits``,
+        ``intervals``, ``effort``, ... `brachis.task.TaskKeywords` lists them all.
 
     Returns
     -------
@@ -120,7 +123,7 @@ def plan(
     ------
     InputError
         The task, URDF, path or start posture is wrong (`TaskError`, `UrdfError`, `LimitError`, `PathError`, ...); a
-        `Robot` and the task's ``robot`` part contradict each other (`TaskError`); the start posture looks like
+        `Robot` and the task's ``robot`` section contradict each other (`TaskError`); the start posture looks like
         degrees, or with ``strict=True`` another figure is implausible (`PlausibilityError`).
     PlanningError
         No candidate gave a motion within the limits.
@@ -128,7 +131,7 @@ def plan(
     Warns
     -----
     PlausibilityWarning
-        A figure is implausible.
+        A figure of the task, the robot or the motion is implausible.
     SlowTimingWarning
         Another timing of the same joint path is more than 2 % faster.
 
@@ -218,12 +221,10 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
-    task_map = problem.task_map
     if has_charts(problem, decompositions):
-        check_independent(task_map)
-        check_regular(problem.task, task_map, problem.given_postures)
+        check_regular(problem.task, problem.task_map, problem.given_postures)
     else:
-        # They are found here, so that faulty ones are reported before the path is checked.
+        # Decompositions are computed here, so that faulty ones are reported before the path is checked.
         len(decompositions)
     check_within_reach(problem)
     return Search(problem, decompositions, deadline, report)
@@ -232,7 +233,7 @@ def _open_search(
 def _find_smoother(
     best: FinishedCandidate, problem: Problem, deadline: Deadline, report: Listener
 ) -> LeastMotion | None:
-    """Find the smoothest motion that is as fast, if the task asks for it."""
+    """Find the smoothest motion that is as fast as the best one, if the task asks for it."""
     if not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")
@@ -246,7 +247,7 @@ def _find_smoother(
 def read_arguments(
     first: RobotOrTask, task: Source | None, keywords: TaskKeywords
 ) -> tuple[Robot, Task]:
-    """Return the robot, and the task with all that the robot was made with."""
+    """Return the robot, and the task with all settings of the robot."""
     check_keywords(keywords, "plan", _OWN_KEYWORDS)
     section = keywords.get("robot")
     if is_robot(section):
@@ -256,13 +257,13 @@ def read_arguments(
             found=repr(section) if isinstance(section, str) else type(section).__name__,
             allowed="a robot as the first argument, as in brachis.plan('scara3', path=...)",
         )
-    # Everything else than a robot is a task.
+    # Anything that is not a robot is a task.
     if task is None and first is not None and not is_robot(first):
         task = first  # type: ignore[assignment]
         first = None
     named = locate(first)  # type: ignore[arg-type]
     if isinstance(named, str | os.PathLike):
-        read_file(Path(named))  # a missing file is the first thing to say
+        read_file(Path(named))  # a missing file is reported before anything else
     loaded_task = task_with(task, **keywords)
     robot = robot_for(named, loaded_task.robot)
     return robot, loaded_task.model_copy(update={"robot": robot.settings})
@@ -296,17 +297,17 @@ def transcribe(
     Returns
     -------
     program : TaskProgram
-        ``program.guess`` is a point x to begin with, ``program.names`` says what stands where in x, and
-        ``program.trajectory(x)`` is its motion, for `verify_trajectory`. There are as many knot intervals a phase as
-        the task says; with ``intervals: auto`` 10, or 12 where a speed is given, while `plan` chooses its own knots.
-        With ``knots: free`` their lengths are variables.
+        ``program.guess`` is a first point x, ``program.names`` names the entries of x, and ``program.trajectory(x)``
+        returns the motion of a point, for `verify_trajectory`. Each phase has as many knot intervals as the task says.
+        With ``intervals: auto`` it has 10, or 12 if its speed is given, whereas `plan` chooses its own knots. With
+        ``knots: free`` the lengths of the intervals are variables.
     family : str
         Family of the closed form.
 
     Raises
     ------
     InputError
-        As `plan` does; no joint path was found (`PathError`).
+        For the same reasons as in `plan`, or because no joint path was found (`PathError`).
 
     Examples
     --------
@@ -327,7 +328,7 @@ def transcribe(
 
 Outcome = Result | BrachisError
 OnProgress = Callable[[int, int, Outcome], None]
-"""Called after every plan with how many are done, of how many, and what came out."""
+"""Called after every plan with the number of finished plans, the total number, and the outcome."""
 
 
 def plan_many(
@@ -338,34 +339,36 @@ def plan_many(
     progress: bool | OnProgress | None = None,
     **keywords: Unpack[TaskKeywords],
 ) -> list[Outcome]:
-    """Plan many tasks, in several processes or by an executor; a plan that fails is an error in the list, no more.
+    """Plan many tasks, in several processes or by an executor; a plan that fails becomes an error in the list.
 
     Parameters
     ----------
     tasks : iterable of path, mapping, Task, or pair of robot and task
-        Each as `plan` takes it.
+        Each task in a form that `plan` accepts.
     jobs : int, optional
-        Processes; no more than there are processors are used.
+        Number of processes; at most as many as there are processors are used.
     executor : Executor, optional
-        Plans in place of them: a Dask client, or any ``concurrent.futures.Executor``, such as those of mpi4py and
-        parsl. Tasks are read by its workers: files that they name must be there.
+        Runs the plans in place of these processes: a Dask client, or any ``concurrent.futures.Executor``, such as those
+        of mpi4py and parsl. Its workers read the tasks, so they need the files that the tasks name.
     progress : bool or callable, optional
-        True: how many are done, as `plan` shows its progress; left out: in notebooks. A function: called after every
-        plan, in the order of the tasks, with the number of those done, the number of all, and the outcome.
+        If True, the number of finished plans is shown in the same way as the progress of `plan`; by default it is shown
+        in notebooks. A function is called after every plan, in the order of the tasks, with the number of finished
+        plans, the total number, and the outcome.
     **keywords
-        Keys of all the tasks, as for `plan`.
+        Keys to set in all the tasks, as for `plan`.
 
     Returns
     -------
     list of Result or BrachisError
-        In the order of the tasks. An error is what `plan` would have raised with ``check_advice=False``.
+        Outcomes in the order of the tasks. An error is the one that `plan` would have raised with
+        ``check_advice=False``.
 
     Raises
     ------
     InputError
-        One task is given in place of several, `jobs` is not a number of processes, or a keyword does not exist.
+        A single task is given in place of a list, `jobs` is not a number of processes, or a keyword does not exist.
     KeyboardInterrupt
-        Ctrl-C ends all.
+        Ctrl-C ends all plans.
 
     Examples
     --------
@@ -420,7 +423,7 @@ def plan_many(
 def _plan_one(
     item: Any, keywords: TaskKeywords, listener: Callable[[str], None]
 ) -> Outcome:
-    """Plan one task; Ctrl-C does not end this plan alone."""
+    """Plan one task; Ctrl-C ends the other plans too."""
     robot, task = item if isinstance(item, tuple) else (None, item)
     heard = SigintHandler.heard
     outcome: Outcome

@@ -1,4 +1,4 @@
-"""The result of a plan, and the methods that lead from it to what is done with a motion."""
+"""The result of a plan, with methods to plot, report, explain and view its motion."""
 
 from __future__ import annotations
 
@@ -23,33 +23,33 @@ CANDIDATES = "candidates"
 
 @dataclass(frozen=True, repr=False)
 class Result(PlannedMotion):
-    """What a plan gives: trajectory, verification, and how they came about.
+    """The result of a plan: the trajectory, its verification, and how they were found.
 
     Attributes
     ----------
     task : Task
-        All that was asked, with the robot's settings and all defaults; ``plan(result.task)`` repeats the plan.
+        The complete task, with the robot's settings and all defaults; ``plan(result.task)`` repeats the plan.
     trajectory : Trajectory
     verification : Verification
     family : str
-        Family of the closed form; ``chart`` where there was none.
+        Family of the closed form; ``chart`` if no closed form was used.
     candidate : FinishedCandidate
-        The fastest one, with its solved program and its motion.
+        The fastest candidate, with its solved program and its motion.
     least_motion : LeastMotion or None
-        How the calmest motion that is as fast was found; None where it was not asked for.
+        How the smoothest motion that is as fast was found; None if the task did not ask for it.
     timing : dict of str to float
         Wall time of every stage, s.
     candidates : tuple of Candidate
-        All that the search looked at, the fastest verified one first; without their programs.
+        All candidates of the search, the fastest verified one first, without their programs.
     interrupted : bool
-        True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
+        Whether Ctrl-C or ``search.time_limit`` ended the search. A faster motion may then have been missed.
     not_completed : tuple of str
         What was left undone, in plain words.
     warnings : tuple of Issue
-        What of robot, task and motion is implausible, and a timing that is much slower than possible.
+        Implausible figures of the robot, the task and the motion, and a timing that is much slower than possible.
     timing_gap : TimingGap or None
-        By how much another timing of the same joint path could be faster; None if the phase plane finds none, or if no
-        time was left for it.
+        How much faster another timing of the same joint path could be. None if the phase plane finds no faster timing,
+        or if no time was left to look for one.
 
     Examples
     --------
@@ -68,12 +68,12 @@ class Result(PlannedMotion):
         Parameters
         ----------
         kind : str, optional
-            Out of `brachis.plots.PLOTS`; or ``candidates``, all that the search looked at.
+            A name from `brachis.plots.PLOTS`, or ``candidates`` for all candidates of the search.
 
         Returns
         -------
         Figure
-            Of Matplotlib; a notebook shows it, `brachis.plots.save_figure` writes it.
+            A Matplotlib figure. A notebook shows it, and `brachis.plots.save_figure` writes it to a file.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class Result(PlannedMotion):
     def report(
         self, path: str | os.PathLike[str] | None = None, *, degrees: bool = False
     ) -> Report:
-        """Make a page from which a person decides whether to run the motion, as `brachis.report.make_report` does.
+        """Make a page that helps a person decide whether to run the motion, as `brachis.report.make_report` does.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class Result(PlannedMotion):
         Raises
         ------
         InputError
-            The file cannot be written; or Jinja2 or Plotly is not installed (`NotInstalledError`).
+            The file cannot be written, or Jinja2 or Plotly is not installed (`NotInstalledError`).
         """
         from brachis.apps import report
 
@@ -150,7 +150,7 @@ class Result(PlannedMotion):
     def bottleneck(
         self, *, check: bool = False, reference: bool = False
     ) -> BottleneckReport:
-        """Find out what holds the motion back, as `brachis.bottleneck.report` does."""
+        """Find out which limits hold the motion back, as `brachis.bottleneck.report` does."""
         from brachis.apps import bottleneck
 
         return bottleneck.report(self, check=check, reference=reference)

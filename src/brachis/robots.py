@@ -1,4 +1,6 @@
-"""Robots that come with brachis: ``brachis.robots.scara3`` is a `Robot`; `path_of` has its URDF, `names` all names.
+"""Included robots: ``brachis.robots.scara3`` is a `Robot`.
+
+`path_of` returns the URDF file of a robot, and `names` lists the names of all robots.
 
 Examples
 --------
@@ -32,14 +34,14 @@ def path_of(name: str) -> Path:
     Raises
     ------
     UnknownNameError
-        brachis has no robot of this name.
+        brachis has no robot with this name.
     """
     check_names("robot", [name], names(), "brachis.robots")
     return shipped_folder("robots") / name / "robot.urdf"
 
 
 def is_robot(source: object) -> bool:
-    """Return whether something is a robot: a `Robot`, a URDF or MJCF file, or a name from `names` or like one."""
+    """Return whether something is a robot: a `Robot`, a URDF or MJCF file, or a name from `names` or similar to one."""
     if isinstance(source, Robot):
         return True
     return isinstance(source, str | os.PathLike) and (
@@ -50,18 +52,18 @@ def is_robot(source: object) -> bool:
 def locate(
     robot: str | os.PathLike[str] | Robot | None,
 ) -> str | os.PathLike[str] | Robot | None:
-    """Return the URDF file where a robot is given by its name, and everything else as it is.
+    """Return the URDF file of a robot that is given by its name; return anything else unchanged.
 
     Raises
     ------
     UnknownNameError
-        It is neither a file nor a name, but like a name.
+        The text is neither a file nor the name of a robot, but similar to such a name.
     """
     return path_of(robot) if isinstance(robot, str) and _is_name(robot) else robot
 
 
 def _is_name(source: str | os.PathLike[str]) -> bool:
-    """Return whether this is a name, its first letters or a misspelt name, and not the name of a file."""
+    """Return whether this is a robot's name, its first letters or a misspelling of it, and not the name of a file."""
     known = names()
     path = Path(source)
     if source in known or path.suffix or len(path.parts) != 1 or is_file(path):
@@ -84,5 +86,5 @@ def __getattr__(name: str) -> Robot:
 
 
 def __dir__() -> list[str]:
-    """Names for completion."""
+    """List the names for completion."""
     return ["names", "path_of", *names()]

@@ -1,7 +1,5 @@
 """What a plan says of itself: no solve, one row a cause, process speeds and waits among them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,21 +12,21 @@ STEP = 0.01
 
 
 @pytest.fixture(scope="module")
-def seams() -> brachis.Result:
+def seams():
     """Two seams at given speeds, with a wait of half a second at the corner."""
     return brachis.plan(ROOT / "examples/13_weld_seams.yaml")
 
 
 def test_a_saved_plan_is_explained_without_a_solve(seams, tmp_path):
     seams.save(tmp_path / "result.npz")
-    lines: list[str] = []
+    lines = []
     saved = brachis.bottleneck.report(tmp_path / "result.npz", listener=lines.append)
     assert saved.sensitivities == seams.bottleneck().sensitivities
     assert saved.sensitivities.reliable
     assert not [line for line in lines if "again" in line]
 
 
-def faster(task: brachis.Task, speed: float) -> brachis.Task:
+def faster(task, speed):
     """Return a task with one of its process speeds higher by `STEP`."""
     parts = tuple(
         part.model_copy(update={"speed": (1.0 + STEP) * part.speed})

@@ -1,9 +1,6 @@
 """Rows for what a task asks beside its limits: each is compared with a plan of the other task."""
 
-from __future__ import annotations
-
 import copy
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +13,7 @@ STEP = 0.01
 CORNER = [{"line": {"by": [0.25, 0.0]}, "blend": 0.05}, {"line": {"by": [0.0, 0.25]}}]
 
 
-def task_of(*, locked: bool, **changes: Any) -> dict[str, Any]:
+def task_of(*, locked, **changes):
     """Return a corner for the planar arm; with a locked joint its motion follows from the path alone."""
     task = copy.deepcopy(brachis.load_task(brachis.examples.scara_line).to_dict())
     task |= {"path": CORNER, "redundant_joints": ["j1"], "search": QUICK}
@@ -29,12 +26,12 @@ def task_of(*, locked: bool, **changes: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["redundant", "locked"])
-def corner(request) -> tuple[bool, brachis.Result]:
+def corner(request):
     """A corner that is rounded by 5 cm, once with multipliers and once with timings."""
     return request.param, brachis.plan(task_of(locked=request.param))
 
 
-def least_time(result: brachis.Result) -> float:
+def least_time(result):
     """Return the least time of its joint path, s: splines are up to 0.1 % slower."""
     return result.timing_gap.least_time
 
@@ -61,7 +58,7 @@ def test_a_blend_that_cannot_be_larger_has_no_row():
     assert not [entry for entry in costs.limits if entry.label.subject == "path"]
 
 
-def row_of(result: brachis.Result, words: str) -> brachis.bottleneck.TaskSaving:
+def row_of(result, words):
     """Return the only row of the task with these words."""
     (saving,) = [row for row in result.sensitivities.task if words in row.change]
     return saving
@@ -95,7 +92,7 @@ def test_a_stop_on_a_straight_line_has_a_row():
 def test_accelerations_that_may_jump_at_rest_save_about_what_their_row_says(intervals):
     task = task_of(locked=False, path=[{"line": {"by": [0.3, 0.3]}}])
 
-    def resting(rest: str) -> brachis.Result:
+    def resting(rest):
         return brachis.plan({**task, "spline": {"intervals": intervals, "rest": rest}})
 
     result = resting("full")
@@ -138,7 +135,7 @@ def test_corners_of_points_have_one_row():
         ]
     )
 
-    def plan_through_points(corner: float) -> brachis.Result:
+    def plan_through_points(corner):
         tolerance = {"position": 1e-4, "corner": corner}
         path = brachis.fit_path(points, tolerance=tolerance, relative=True)
         return brachis.plan(task_of(locked=True, path=path))

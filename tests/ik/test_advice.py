@@ -1,7 +1,5 @@
 """EAIK where it has wheels, and all else without it."""
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from pathlib import Path

@@ -1,21 +1,14 @@
 """Poses solved by EAIK: against Pinocchio on random and on awkward postures, and what is refused."""
 
-from __future__ import annotations
-
 import functools
-import subprocess
 import sys
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.errors import DecompositionError
-from brachis.ik import (
-    ChainGeometry,
-    NotApplicableError,
-    check_answers,
-    find,
-)
+from brachis.ik import ChainGeometry, NotApplicableError, check_answers, find
 from brachis.ik.eaik import eaik
 from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
@@ -31,6 +24,7 @@ from support.pose_arms import (
     telescope,
     ur,
 )
+from support.scripts import output_of
 
 pytest.importorskip("eaik")
 
@@ -89,7 +83,7 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     assert 0.5 < np.abs(margin).max() < 20.0, "margins are of the order of one"
     clear = np.abs(margin) > 1e-5
     ratio = margin[clear] / bench.determinant(postures)[clear]
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
+    assert_allclose(ratio, ratio[0], rtol=1e-6)
 
     margins = np.abs(margin_of(bench, q))
     # Nearer to the boundary an URDF's rounding decides whether there is an answer.
@@ -128,12 +122,10 @@ def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     bench = bench_of(robot, redundant)
     rng = np.random.default_rng(6)
     q, count = bench.q, len(bench.q)
-    off = np.where(
-        rng.uniform(size=count) < 0.1, 0.0, 10.0 ** rng.uniform(-16.0, -3.0, count)
-    )
-    q[:, redundant[0]] = rng.choice(
-        [0.0, 0.5 * np.pi, np.pi], count
-    ) + off * rng.choice([-1.0, 1.0], count)
+    is_exact = rng.uniform(size=count) < 0.1
+    off = np.where(is_exact, 0.0, 10.0 ** rng.uniform(-16.0, -3.0, count))
+    parallel = rng.choice([0.0, 0.5 * np.pi, np.pi], count)
+    q[:, redundant[0]] = parallel + off * rng.choice([-1.0, 1.0], count)
     bench.q = q[np.abs(margin_of(bench, q)) > 5e-3]
     assert len(bench.q) > count / 5
     solved = bench.solve(bench.q)
@@ -151,9 +143,9 @@ def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
     assert gap_in_label(bench, q, first).max() < 1e-6
     monkeypatch.setattr("brachis.ik.eaik._KEPT", 5)
     for _ in range(2):
-        np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
+        assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
     one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])
-    np.testing.assert_allclose(one_by_one, first, atol=1e-12)
+    assert_allclose(one_by_one, first, atol=1e-12)
 
 
 def rows(robot, *names):
@@ -218,10 +210,4 @@ assert answers.is_installed()
 assert "eaik.pybindings.EAIK" in sys.modules
 print(sorted({"urchin", "trimesh", "pyglet", "eaik.IK_Robot"} & set(sys.modules)))
 """
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == "[]"
+    assert output_of("-W", "error", "-c", code).strip() == "[]"

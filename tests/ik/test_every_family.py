@@ -1,11 +1,10 @@
 """What all closed forms owe beside right answers: they are found, sent to other processes, and NaN says no."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.ik import find
 from brachis.ik.snapping import PolishedSolver
@@ -66,13 +65,13 @@ def test_a_solver_is_found_and_sent_and_what_it_cannot_solve_disturbs_nothing(na
     assert np.isfinite(clean).any(axis=(1, 2, 3)).all()
     for branch in range(len(solver.branches)):
         in_branch = solver.solve_branch(targets, values, branch)
-        np.testing.assert_allclose(in_branch, clean[:, branch], atol=1e-12)
+        assert_allclose(in_branch, clean[:, branch], atol=1e-12)
 
     again = pickle.loads(pickle.dumps(solver))  # noqa: S301  (our own)
-    np.testing.assert_allclose(again.solve(targets, values), clean, atol=1e-12)
+    assert_allclose(again.solve(targets, values), clean, atol=1e-12)
     for branch in range(len(solver.branches)):
         margins = solver.branch_margins(q, branch)
-        np.testing.assert_array_equal(again.branch_margins(q, branch), margins)
+        assert_array_equal(again.branch_margins(q, branch), margins)
 
     assert solver.solve(targets[:0], values[:0]).shape == (0, *shape)
     spoilt = [5, 7]
@@ -88,4 +87,4 @@ def test_a_solver_is_found_and_sent_and_what_it_cannot_solve_disturbs_nothing(na
     assert np.isnan(answers[spoilt]).all()
     assert np.isnan(solver.solve(targets[spoilt[-1:]], values[spoilt[-1:]])).all()
     others = np.setdiff1d(np.arange(COUNT), spoilt)
-    np.testing.assert_allclose(answers[others], clean[others], atol=1e-12)
+    assert_allclose(answers[others], clean[others], atol=1e-12)

@@ -1,7 +1,5 @@
 """Cartesian gantries and macro-mini arms: slides that carry, or are carried by, other joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The example of a plug-in: installed into a scratch environment, its family is found and plans."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

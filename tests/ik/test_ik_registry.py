@@ -1,7 +1,5 @@
 """The registry: what it refuses, what it says then, and that it believes no family."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -30,7 +28,7 @@ def plane(arm):
     return task_map_of(arm, ["x", "y"])
 
 
-def spatial_robot() -> Robot:
+def spatial_robot():
     """Three joints whose axes are neither parallel nor do they meet or leave slides."""
     joints = [
         Joint("revolute", axis=(0.0, 0.0, 1.0)),
@@ -53,11 +51,11 @@ def test_wrong_number_of_redundant_joints(arm, plane, names):
 
 def test_more_rows_than_joints():
     robot = planar_robot("RR")
-    with pytest.raises(
-        DecompositionError, match="fewer joints than the task space has rows"
-    ):
-        find(robot, task_map_of(robot, ["x", "y", "yaw"]), [])
-    assert find_all(robot, task_map_of(robot, ["x", "y", "yaw"])) == []
+    space = task_map_of(robot, ["x", "y", "yaw"])
+    words = "fewer joints than the task space has rows"
+    with pytest.raises(DecompositionError, match=words):
+        find(robot, space, [])
+    assert find_all(robot, space) == []
 
 
 def test_unknown_joint_with_suggestion(arm, plane):
@@ -143,15 +141,19 @@ class Wrapped(IKSolver):
         return self._inner.margin_gradient(q, branch)
 
 
+def wrap(arm, plane, change):
+    return Wrapped(find(arm, plane, ["j3"]).solver, change)
+
+
 def third_party(arm, plane, change):
     """A family of another package that answers for redundant joint j3 only."""
-    inner = find(arm, plane, ["j3"]).solver
+    solver = wrap(arm, plane, change)
 
     @ik_family("third_party", source="this test")
     def family(geometry, _task_space, redundant):
         if geometry.joint_names[redundant[0]] != "j3":
             raise NotApplicableError("only j3")
-        return Wrapped(inner, change)
+        return solver
 
     return family
 
@@ -193,9 +195,7 @@ def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, r
     assert candidate.family == "planar"
     assert reason in candidate.reasons["third_party"]
     with pytest.raises(NotApplicableError, match=reason):
-        check_answers(
-            arm, plane, (2,), Wrapped(find(arm, plane, ["j3"]).solver, change)
-        )
+        check_answers(arm, plane, (2,), wrap(arm, plane, change))
 
 
 def test_lifted_angles_are_right_answers(arm, plane):
@@ -221,16 +221,8 @@ def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane
             lambda _labels: ("elbow", "elbow"),
             "the same label: elbow, elbow",
         ),
-        (
-            "branch_margins",
-            lambda margins: margins[:, 0],
-            r"shape \(100,\), not \(100, k",
-        ),
-        (
-            "margin_gradient",
-            lambda slopes: slopes[:, 0],
-            "margin_gradient has the shape",
-        ),
+        ("branch_margins", lambda a: a[:, 0], r"shape \(100,\), not \(100, k"),
+        ("margin_gradient", lambda a: a[:, 0], "margin_gradient has the shape"),
         ("margin_gradient", lambda _slopes: np.zeros((1, 1, 1)), "has the shape"),
         ("margin_gradient", lambda slopes: -slopes, "contradicts differences of its"),
         ("margin_gradient", lambda slopes: 1.01 * slopes, "contradicts differences"),
@@ -238,7 +230,7 @@ def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane
     ],
 )
 def test_wrong_members_of_a_solver_are_errors(arm, plane, member, change, reason):
-    solver = Wrapped(find(arm, plane, ["j3"]).solver, lambda answers: answers)
+    solver = wrap(arm, plane, lambda answers: answers)
     check_answers(arm, plane, (2,), solver)
     right = getattr(solver, member)
     wrong = (lambda *given: change(right(*given))) if callable(right) else change(right)
@@ -291,7 +283,6 @@ def test_families_have_names_of_their_own(arm, plane, name):
 
 def test_two_families_have_two_names(arm, plane):
     family = third_party(arm, plane, lambda answers: answers)
-    with pytest.raises(
-        InputError, match=r"families\[1\].name: a family of this name exists"
-    ):
+    words = r"families\[1\].name: a family of this name exists"
+    with pytest.raises(InputError, match=words):
         find(arm, plane, ["j3"], families=[family, family])

@@ -1,9 +1,8 @@
 """Newton's method: placement and Jacobian as Pinocchio has them, targets met to rounding, NaN where they cannot be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from brachis.ik.newton import Newton
 from brachis.robot import bind
@@ -45,12 +44,12 @@ def arm(request):
 def test_placed_is_what_pinocchio_says(arm):
     task_map, q = arm
     values, found = Newton(task_map).task_coordinates(q)
-    np.testing.assert_allclose(
+    assert_allclose(
         values, task_map.of_placements(*task_map.robot.tool_placements(q)), atol=1e-13
     )
     expected = jacobian(task_map, q)
     assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(found, expected, atol=1e-13)
+    assert_allclose(found, expected, atol=1e-13)
 
 
 def regular_postures(task_map, q):
@@ -68,8 +67,8 @@ def test_targets_and_linear_conditions_are_met(arm):
     targets, levels = task_map.values(there), np.einsum("kij,kj->ki", rows, there)
     found = Newton(task_map).solve(targets, q, rows, levels)
     assert np.abs(task_map.difference(targets, task_map.values(found))).max() < 1e-12
-    np.testing.assert_allclose(np.einsum("kij,kj->ki", rows, found), levels, atol=1e-12)
-    np.testing.assert_allclose(found, there, atol=1e-10)
+    assert_allclose(np.einsum("kij,kj->ki", rows, found), levels, atol=1e-12)
+    assert_allclose(found, there, atol=1e-10)
 
 
 def test_no_answer_out_of_reach_nor_from_nowhere():
@@ -82,7 +81,7 @@ def test_no_answer_out_of_reach_nor_from_nowhere():
     levels[2] = np.nan
     found = Newton(task_map).solve(targets, q, rows, levels)
     assert np.isnan(found[:3]).all()
-    np.testing.assert_allclose(found[3], q[3], atol=1e-12)
+    assert_allclose(found[3], q[3], atol=1e-12)
 
 
 def test_singular_matrices_do_not_raise_and_leave_the_others_alone():
@@ -95,4 +94,4 @@ def test_singular_matrices_do_not_raise_and_leave_the_others_alone():
     rows = np.array([[[1.0, 1.0, 0.0]], [[1.0, -1.0, 0.0]], [[0.0, 0.0, 0.0]]])
     found = Newton(task_map).solve(targets, q, rows, np.zeros((3, 1)))
     assert np.isnan(found[[0, 2]]).all()
-    np.testing.assert_allclose(found[1], [0.05, 0.05, 0.1], atol=1e-14)
+    assert_allclose(found[1], [0.05, 0.05, 0.1], atol=1e-14)

@@ -1,7 +1,5 @@
 """Three parallel axes: UR arms alone and on rails, from both ends, with every joint redundant that allows it."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Planar chains: every pattern of up to four revolute and prismatic joints, every decomposition, by Pinocchio."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 
@@ -31,7 +29,7 @@ CASES = [
 ]
 
 
-def roots(pattern: str, rows: list[str], redundant: tuple[int, ...]) -> int:
+def roots(pattern, rows, redundant):
     """How many answers plane geometry allows: two if a circle is met, one if only lines are."""
     left = [letter for i, letter in enumerate(pattern) if i not in redundant]
     if len(rows) == 3:

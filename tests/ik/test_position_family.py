@@ -1,7 +1,5 @@
 """Three joints that place the tool: every recipe, built arms with all their choices of redundant joints, and plans."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

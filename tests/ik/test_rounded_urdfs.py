@@ -1,7 +1,5 @@
 """Arms whose URDF rounds angles, as in 1.5708: closed forms of the ideal arm, polished on the arm as it is."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json

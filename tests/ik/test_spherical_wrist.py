@@ -1,7 +1,5 @@
 """Arms with a spherical wrist or shoulder: which decompositions have a closed form, and why the others have none."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -13,7 +13,7 @@ from support.random_chains import random_model
 STATES = 11  # not a multiple of what is computed side by side
 
 
-def agrees(found: np.ndarray, known: np.ndarray) -> bool:
+def agrees(found, known):
     scale = max(np.abs(known).max(), 1.0)
     return bool(np.abs(found - known).max() < 1e-11 * scale)
 
@@ -31,9 +31,8 @@ def case(request):
 def test_torques(case):
     model, _, chain, (q, qdot, qddot) = case
     data = model.createData()
-    known = [
-        pin.rnea(model, data, *state) for state in zip(q, qdot, qddot, strict=True)
-    ]
+    states = zip(q, qdot, qddot, strict=True)
+    known = [pin.rnea(model, data, *state) for state in states]
     assert agrees(chain.torques(q, qdot, qddot), np.array(known))
 
 
@@ -138,7 +137,7 @@ def test_tool_sizes(case, quantity):
 
 
 def test_no_states(case):
-    chain = case[2]
+    _, _, chain, _ = case
     none = np.empty((0, chain.n))
     assert chain.torques(none, none, none).shape == (0, chain.n)
     assert chain.tool(none, in_tool_axes=True)[2].shape == (6, 0, chain.n)

@@ -1,11 +1,10 @@
 """Values of limits, their slopes by curves, and entries of a Jacobian, against the formulas with NumPy."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kernel import (
     CurvePattern,
@@ -27,6 +26,11 @@ N = 5
 @pytest.fixture
 def chain():
     return chain_of(*random_model(N, 1))
+
+
+def one_value(quantity, chain, joint=0):
+    one = np.ones(1)
+    return ScaledQuantity(quantity, np.array([joint]), one, one, chain)
 
 
 def slopes_of(partials, parts, with_jerk):
@@ -62,11 +66,11 @@ def test_the_chain_rule(with_jerk, width):
     found, entries = differentiate(groups, motion, states, partials)
     assert not entries.size
     known = slopes_of(first, parts, with_jerk)
-    np.testing.assert_allclose(found[:, :, :4], known, atol=1e-12)
+    assert_allclose(found[:, :, :4], known, atol=1e-12)
     zero = np.zeros_like(constant)
     known = slopes_of((zero, constant, zero, zero), parts, with_jerk)
     known[0, :, :, 0] += by_s
-    np.testing.assert_allclose(found[:, :, 4:], known, atol=1e-12)
+    assert_allclose(found[:, :, 4:], known, atol=1e-12)
 
     points = np.array([0, 0, 4, POINTS - 1])
     basis = rng.normal(size=(len(found), 4))
@@ -76,12 +80,12 @@ def test_the_chain_rule(with_jerk, width):
     variables = VariableSlopes(every, places, basis)
     entries = variables.find_entries(found)
     known = np.einsum("bokw,okcw->bkc", every, found).reshape(2 * POINTS, -1)
-    np.testing.assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
+    assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
     by_one = np.einsum("oz,zoc->zc", basis, found[:, points, :, curves])
-    np.testing.assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
+    assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
     again = differentiate(groups, motion, states, partials, variables)
-    np.testing.assert_array_equal(again[0], found)
-    np.testing.assert_array_equal(again[1], entries)
+    assert_array_equal(again[0], found)
+    assert_array_equal(again[1], entries)
 
 
 def test_orders_that_values_do_not_depend_on_are_left_out():
@@ -92,10 +96,10 @@ def test_orders_that_values_do_not_depend_on_are_left_out():
     basis = rng.normal(size=(4, 1))
     whole = VariableSlopes(shared, places, basis).find_entries(found)
     part = VariableSlopes(shared[:, :3], places, basis[:3]).find_entries(found)
-    np.testing.assert_array_equal(whole, part)
+    assert_array_equal(whole, part)
     fewer = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found)
     known = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found[:2])
-    np.testing.assert_array_equal(fewer, known)
+    assert_array_equal(fewer, known)
 
 
 @pytest.mark.parametrize("quantity", ["q", "qdot", "qddot", "qdddot", "torque"])
@@ -113,7 +117,7 @@ def test_scaled_quantities(chain, quantity):
     groups = ValueGroups([scaled], [3])
     (values,) = groups.values(states, torque)
     known = (quantities[quantity][:, joints] - offsets) * factors
-    np.testing.assert_array_equal(values, known)
+    assert_array_equal(values, known)
 
     partials = np.zeros((4, POINTS, N, N))
     if quantity == "torque":
@@ -125,7 +129,7 @@ def test_scaled_quantities(chain, quantity):
     motion = MotionSlopes(*parts[:4], parts[4] if has_jerk else None)
     found, _ = differentiate(groups, motion, states[:3], [])
     known = slopes_of(partials, parts, has_jerk)
-    np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
+    assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
 
 
 def test_formulas_of_the_posture():
@@ -142,7 +146,7 @@ def test_formulas_of_the_posture():
     )
     groups = ValueGroups([None, margins], [1, 2])
     values = groups.values(states)[1]
-    np.testing.assert_allclose(values, function(states[0]) * factors, atol=1e-14)
+    assert_allclose(values, function(states[0]) * factors, atol=1e-14)
     parts = rng.normal(size=(5, POINTS, N, 3))
     by_q = margins.slopes_of(states[0]) * factors[:, None]
     zero = np.zeros_like(by_q)
@@ -150,34 +154,31 @@ def test_formulas_of_the_posture():
     motion = MotionSlopes(*parts[:4])
     found, _ = differentiate(groups, motion, states, given)
     known = slopes_of((by_q, zero, zero, zero), parts, with_jerk=False)
-    np.testing.assert_allclose(found[:, :, 1:], known, atol=1e-13)
+    assert_allclose(found[:, :, 1:], known, atol=1e-13)
     with pytest.raises(ValueError, match="have the shapes"):
         ValueGroups([margins], [3])
 
 
 def test_groups_can_be_sent_to_another_process(chain):
-    one = np.ones(1)
-    groups = ValueGroups(
-        [ScaledQuantity("torque", np.array([2]), one, one, chain)], [1]
-    )
+    groups = ValueGroups([one_value("torque", chain, 2)], [1])
     states = np.random.default_rng(7).normal(size=(3, POINTS, N))
     again = copy.deepcopy(groups)  # as another process gets it
     torque = np.random.default_rng(8).normal(size=(POINTS, N))
     (known,) = groups.values(states, torque)
     del groups
     (found,) = again.values(states, torque)
-    np.testing.assert_array_equal(found, known)
+    assert_array_equal(found, known)
 
 
 def test_what_does_not_fit_is_refused(chain):
-    with pytest.raises(ValueError, match="point"):
-        CurvePattern(np.array([9]), np.array([0]), POINTS, 2)
-    with pytest.raises(ValueError, match="curve"):
-        CurvePattern(np.array([0]), np.array([2]), POINTS, 2)
-    with pytest.raises(ValueError, match="as many"):
-        CurvePattern(np.array([0, 1]), np.array([0]), POINTS, 2)
-    with pytest.raises(TypeError, match="cast"):
-        CurvePattern(np.array([0.0]), np.array([0]), POINTS, 2)
+    for points, curve, kind, message in (
+        ([9], 0, ValueError, "point"),
+        ([0], 2, ValueError, "curve"),
+        ([0, 1], 0, ValueError, "as many"),
+        ([0.0], 0, TypeError, "cast"),
+    ):
+        with pytest.raises(kind, match=message):
+            CurvePattern(np.array(points), np.array([curve]), POINTS, 2)
     none = np.zeros(0, dtype=int)
     variables = VariableSlopes(
         np.zeros((1, 3, POINTS, 2)),
@@ -192,12 +193,9 @@ def test_what_does_not_fit_is_refused(chain):
     partials = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
     with pytest.raises(ValueError, match="different points"):
         differentiate(groups, motion, states, partials, variables)
-    one = np.ones(1)
-    beyond = ScaledQuantity("q", np.array([N]), one, one, chain)
     with pytest.raises(ValueError, match="joint"):
-        ValueGroups([beyond], [1])
-    first = np.zeros(1, dtype=int)
-    torque = ScaledQuantity("torque", first, one, one, chain)
+        ValueGroups([one_value("q", chain, N)], [1])
+    torque = one_value("torque", chain)
     groups = ValueGroups([torque], [1])
     with pytest.raises(ValueError, match="needs the torque"):
         groups.values(states)
@@ -206,27 +204,22 @@ def test_what_does_not_fit_is_refused(chain):
     fewer = MotionSlopes(*np.zeros((4, POINTS, 3, 3)))
     with pytest.raises(ValueError, match=r"has 3 joints; needed: 5"):
         differentiate(groups, fewer, states[:, :, :3], [])
-    other = chain_of(*random_model(3, 1))
+    shorter = one_value("q", chain_of(*random_model(3, 1)))
     with pytest.raises(ValueError, match="different numbers"):
-        ValueGroups([torque, ScaledQuantity("q", first, one, one, other)], [1, 1])
-    again = chain_of(*random_model(N, 2))
+        ValueGroups([torque, shorter], [1, 1])
+    elsewhere = one_value("torque", chain_of(*random_model(N, 2)))
     with pytest.raises(ValueError, match="more than one chain"):
-        ValueGroups([torque, ScaledQuantity("torque", first, one, one, again)], [1, 1])
+        ValueGroups([torque, elsewhere], [1, 1])
 
 
 def test_partials_by_the_jerk_need_its_slopes(chain):
     motion = MotionSlopes(*np.zeros((4, POINTS, N, 3)))
     states = np.zeros((3, POINTS, N))
     partials = np.zeros((POINTS, 1, N))
+    given = [((None, None, None, partials), None)]
     with pytest.raises(ValueError, match="qdddot_y"):
-        differentiate(
-            ValueGroups([None], [1]),
-            motion,
-            states,
-            [((None, None, None, partials), None)],
-        )
-    one = np.ones(1)
-    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
+        differentiate(ValueGroups([None], [1]), motion, states, given)
+    jerk = one_value("qdddot", chain)
     with pytest.raises(ValueError, match="qdddot_y"):
         differentiate(ValueGroups([jerk], [1]), motion, states, [])
     with pytest.raises(ValueError, match="qdddot"):

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kernel import Formula
 from brachis.kernel.formula import arccos, arctan2, ceil, cos, sin, sqrt
@@ -35,7 +36,7 @@ def points():
 
 def test_values(points):
     found = Formula.of(everything, 2, 1)(*points)
-    np.testing.assert_allclose(found, everything(*points), rtol=0.0, atol=1e-14)
+    assert_allclose(found, everything(*points), rtol=0.0, atol=1e-14)
 
 
 def test_slopes(points):
@@ -48,21 +49,21 @@ def test_slopes(points):
     for joint in range(3):
         step = 1e-6 * np.eye(3)[joint]
         known = (function(q + step) - function(q - step)) / 2e-6
-        np.testing.assert_allclose(found[:, :, joint], known, atol=1e-8)
+        assert_allclose(found[:, :, joint], known, atol=1e-8)
 
 
 def test_a_part_has_fewer_steps_and_the_same_values(points):
     whole = Formula.of(everything, 2, 1)
     part = whole.select(np.s_[:2])
     assert len(part.steps) < len(whole.steps)
-    np.testing.assert_array_equal(part(*points), whole(*points)[:, :2])
+    assert_array_equal(part(*points), whole(*points)[:, :2])
 
 
 def test_a_formula_comes_back_from_another_process(points):
     whole = Formula.of(everything, 2, 1)
     whole(*points)
     again = pickle.loads(pickle.dumps(whole))  # noqa: S301  (our own)
-    np.testing.assert_array_equal(again(*points), whole(*points))
+    assert_array_equal(again(*points), whole(*points))
 
 
 def test_what_has_no_value_is_not_finite():
@@ -78,7 +79,7 @@ def test_a_row_is_found_as_a_whole():
     whole = Formula.of(function, 2, discards_incomplete=True)
     points = np.array([[4.0, 5.0], [-1.0, 5.0], [4.0, np.inf]])
     found = whole(points)
-    np.testing.assert_array_equal(found[0], [2.0, 5.0])
+    assert_array_equal(found[0], [2.0, 5.0])
     assert np.isnan(found[1:]).all()
     assert Formula.of(function, 2)(points)[1, 1] == 5.0
 

@@ -29,7 +29,7 @@ a growth is meant."""
 GROWTH = 1.1
 
 
-def compiler() -> str:
+def compiler():
     """Name and major version of the C compiler."""
     command = find_compiler()
     if command is None:
@@ -42,7 +42,7 @@ def compiler() -> str:
     return f"{name} {version.group(1) if version else ''}"
 
 
-def compile_marks(folder: Path) -> Path:
+def compile_marks(folder):
     """Compile the library that tells Valgrind what to count."""
     source, library = folder / "marks.c", folder / "marks.so"
     source.write_text(MARKS)
@@ -51,7 +51,7 @@ def compile_marks(folder: Path) -> Path:
     return library
 
 
-def count_instructions(folder: Path) -> int:
+def count_instructions(folder):
     """Count the instructions of doing the work once, by a process that marks where that begins and ends."""
     command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'out'}"]
     command += ["--instr-atstart=no", sys.executable, str(WORK)]

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kernel import (
     Fault,
@@ -19,6 +20,9 @@ from brachis.robot.chain import chain_of
 from support.random_chains import random_model
 
 POINTS = 11
+PLANAR_CHAIN = chain_of(*random_model(3, 1))
+PLACE = Prescribed((0, 1))
+LAST_STAYS = np.eye(3, 4)[[2]]
 CURVES_AND_PATH = ("y", "ydot", "yddot", "xi", "xi_ds", "xi_dds")
 CASES = {
     "pose, r = 0": (6, Prescribed((0, 1, 2), 3, in_tool_axes=True)),
@@ -47,6 +51,12 @@ def motion_in(chain, asked, q, path, tables, curves):
     return motion
 
 
+def prepare(rows, count=1, **options):
+    """Motion of three joints in a plane under a condition, (k, 4), whose curves and path are ones."""
+    given = dict.fromkeys(CURVES_AND_PATH, np.ones((count, 2))) | {"rows": rows}
+    return PathMotion.prepare(PLANAR_CHAIN, PLACE, given, **options)
+
+
 def rates_of(asked, twists):
     """Prescribed rows, (K, m, n), of columns (6, K, n)."""
     turning = [3, 4, 5]
@@ -54,6 +64,12 @@ def rates_of(asked, twists):
         turning = [6 - sum(asked.heading[1:])]
     rows = [*asked.axes, *turning[: asked.turns]]
     return np.moveaxis(twists[rows], 0, 1)
+
+
+def slopes_of(asked, twists, qdot, qddot):
+    """Derivatives of the prescribed rates and of theirs."""
+    slopes = tool_derivatives(twists, qdot, qddot, in_tool_axes=asked.in_tool_axes)
+    return [rates_of(asked, own) for own in slopes]
 
 
 @pytest.fixture(
@@ -85,21 +101,21 @@ def test_motion(case):
     chain, asked, q, (xi, xi_ds, _), conditions, (ydot, yddot), found = case
     m = asked.count
     _, _, twists = chain.tool(q, in_tool_axes=asked.in_tool_axes)
-    np.testing.assert_allclose(found.twists, twists, atol=1e-12)
+    assert_allclose(found.twists, twists, atol=1e-12)
     augmented = np.concatenate([rates_of(asked, twists), conditions.rows], axis=1)
     inverse = np.linalg.inv(augmented)
-    np.testing.assert_allclose(found.inverse, inverse, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(found.determinants, np.linalg.det(augmented), rtol=1e-10)
+    assert_allclose(found.inverse, inverse, rtol=1e-9, atol=1e-9)
+    assert_allclose(found.determinants, np.linalg.det(augmented), rtol=1e-10)
     inverse = found.inverse
     right = np.concatenate([xi, np.zeros((POINTS, len(q[0]) - m))], axis=1)
     if conditions.drift is not None:
         right[:, m:] = -conditions.drift[0]
     gradient = np.concatenate([inverse @ right[:, :, None], inverse[:, :, m:]], axis=2)
-    np.testing.assert_allclose(found.gradient, gradient, atol=1e-10)
+    assert_allclose(found.gradient, gradient, atol=1e-10)
     qdot = np.einsum("kij,kj->ki", gradient, ydot)
-    np.testing.assert_allclose(found.qdot, qdot, atol=1e-10)
-    slopes = tool_derivatives(twists, qdot, 0.0 * qdot, in_tool_axes=asked.in_tool_axes)
-    bias = np.einsum("kij,kj->ki", rates_of(asked, slopes[0]), qdot)
+    assert_allclose(found.qdot, qdot, atol=1e-10)
+    slopes, *_ = slopes_of(asked, twists, qdot, 0.0 * qdot)
+    bias = np.einsum("kij,kj->ki", slopes, qdot)
     sdot = ydot[:, :1]
     wanted = np.concatenate([xi_ds * sdot**2 - bias, 0.0 * right[:, m:]], axis=1)
     if conditions.turning is not None:
@@ -108,17 +124,14 @@ def test_motion(case):
     qddot = np.einsum("kij,kj->ki", gradient, yddot)
     qddot += np.einsum("kij,kj->ki", inverse, wanted)
     scale = np.abs(qddot).max()
-    np.testing.assert_allclose(found.qddot / scale, qddot / scale, atol=1e-11)
+    assert_allclose(found.qddot / scale, qddot / scale, atol=1e-11)
 
 
 def test_derivatives(case):
     """The module's formulas in NumPy."""
     _, asked, _, (_, xi_ds, xi_dds), conditions, (ydot, yddot), motion = case
     m = asked.count
-    slopes = tool_derivatives(
-        motion.twists, motion.qdot, motion.qddot, in_tool_axes=asked.in_tool_axes
-    )
-    V_q, A_q, A_v = (rates_of(asked, own) for own in slopes)  # noqa: N806  (the field's letters)
+    V_q, A_q, A_v = slopes_of(asked, motion.twists, motion.qdot, motion.qddot)  # noqa: N806  (the field's letters)
     gradient = motion.gradient
     upper = motion.inverse[:, :, :m]
     lower = motion.inverse[:, :, m:]
@@ -151,7 +164,7 @@ def test_derivatives(case):
     known = (qdot_y, qddot_y, qddot_ydot)
     for found, own in zip(motion.derivatives(), known, strict=True):
         scale = max(np.abs(own).max(), 1.0)
-        np.testing.assert_allclose(found / scale, own / scale, atol=1e-11)
+        assert_allclose(found / scale, own / scale, atol=1e-11)
 
 
 def test_singular_slopes(case):
@@ -160,18 +173,15 @@ def test_singular_slopes(case):
     values, vectors = find_least_singular(motion.inverse)
     found, found_s = motion.singular_slopes(values, vectors)
     left = values[:, None] * np.einsum("kji,kj->ki", motion.inverse, vectors)
-    rest = np.zeros_like(q)
-    slopes, _, _ = tool_derivatives(
-        motion.twists, vectors, rest, in_tool_axes=asked.in_tool_axes
-    )
+    slopes, *_ = slopes_of(asked, motion.twists, vectors, 0.0 * q)
     m = asked.count
-    known = np.einsum("ki,kij->kj", left[:, :m], rates_of(asked, slopes))
-    np.testing.assert_allclose(found, known, atol=1e-11 * max(1.0, np.abs(known).max()))
+    known = np.einsum("ki,kij->kj", left[:, :m], slopes)
+    assert_allclose(found, known, atol=1e-11 * max(1.0, np.abs(known).max()))
     known = np.zeros(POINTS)
     if conditions.turning is not None:
         turned = np.einsum("kij,kj->ki", conditions.turning[0], vectors)
         known = np.sum(left[:, m:] * turned, axis=1)
-    np.testing.assert_allclose(found_s, known, atol=1e-11)
+    assert_allclose(found_s, known, atol=1e-11)
 
 
 def test_rows_that_are_the_same_everywhere_are_given_once():
@@ -190,7 +200,7 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
     for name in ("gradient", "qdot", "qddot", "determinants"):
         first, *others = (getattr(own, name) for own in motions)
         for own in others:
-            np.testing.assert_array_equal(own, first)
+            assert_array_equal(own, first)
 
 
 @pytest.mark.parametrize(
@@ -203,56 +213,50 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
     ],
 )
 def test_what_is_singular_or_on_the_other_side_is_said(row, side, fault):
-    chain = chain_of(*random_model(3, 1))
-    given = dict.fromkeys(CURVES_AND_PATH, np.ones((1, 2)))
-    given["rows"] = np.array([[*row, 0.0]])
-    asked = Prescribed((0, 1))
-    upright = PathMotion.prepare(chain, asked, given | {"rows": np.eye(3, 4)[[2]]})
+    upright = prepare(LAST_STAYS)
     upright.q[:] = 0.3
     upright.evaluate()
     side *= np.sign(upright.determinants[0])
-    motion = PathMotion.prepare(chain, asked, given, side=side)
+    motion = prepare(np.array([[*row, 0.0]]), side=side)
     motion.q[:] = 0.3
     assert motion.evaluate() is fault
 
 
 def test_what_is_not_finite_is_no_posture():
-    chain = chain_of(*random_model(3, 1))
-    given = dict.fromkeys(CURVES_AND_PATH, np.ones((1, 2)))
-    given["rows"] = np.eye(3, 4)[[2]]
-    motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
+    motion = prepare(LAST_STAYS)
     motion.q[:] = np.nan
     assert motion.evaluate() is Fault.NO_POSTURE
 
 
-def test_conditions_of_other_shapes_are_refused():
-    chain = chain_of(*random_model(3, 1))
-    ones = np.ones((1, 2))
-    given = {
-        "y": ones,
-        "rows": np.zeros((1, 1, 4)),
-        "row_derivatives": np.zeros((2, 1, 1, 4)),
-    }
-    with pytest.raises(ValueError, match="needed"):
-        PathMotion.prepare(chain, Prescribed((0, 1)), given)
+POSITIONS = {"y": np.ones((1, 2))}
+ROWS = {"rows": np.zeros((1, 4))}
 
 
-def test_what_the_library_would_read_beyond_its_end_is_refused():
-    chain = chain_of(*random_model(3, 1))
-    asked = Prescribed((0, 1))
-    ones = np.ones((1, 2))
-    given = {"y": ones, "rows": np.zeros((1, 4))}
-    with pytest.raises(ValueError, match="rows of the motion is missing"):
-        PathMotion.prepare(chain, asked, {"y": ones})
-    with pytest.raises(ValueError, match="targets of the motion is missing"):
-        PathMotion.prepare(chain, asked, given | {"reference": np.zeros((1, 7))})
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"rows": np.zeros((1, 1, 4)), "row_derivatives": np.zeros((2, 1, 1, 4))},
+            "needed",
+        ),
+        ({}, "rows of the motion is missing"),
+        (ROWS | {"reference": np.zeros((1, 7))}, "targets of the motion is missing"),
+    ],
+)
+def test_what_the_library_would_read_beyond_its_end_is_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        PathMotion.prepare(PLANAR_CHAIN, PLACE, POSITIONS | given)
+
+
+def test_a_motion_without_rates_is_not_evaluated():
+    motion = PathMotion.prepare(PLANAR_CHAIN, PLACE, POSITIONS | ROWS)
     with pytest.raises(ValueError, match="ydot, yddot, xi, xi_ds, xi_dds of the"):
-        PathMotion.prepare(chain, asked, given).evaluate()
+        motion.evaluate()
 
 
 def test_derivatives_are_those_of_the_last_evaluation(case):
     *_, motion = case
-    known = [own.copy() for own in motion.derivatives()]
+    known = copy.deepcopy(motion.derivatives())
     q = motion.q.copy()
     motion.q[:] = q + 0.1
     motion.evaluate()
@@ -260,7 +264,7 @@ def test_derivatives_are_those_of_the_last_evaluation(case):
     motion.q[:] = q
     motion.evaluate()
     for own, first in zip(motion.derivatives(), known, strict=True):
-        np.testing.assert_array_equal(own, first)
+        assert_array_equal(own, first)
 
 
 @pytest.mark.parametrize(
@@ -271,16 +275,13 @@ def test_a_motion_can_be_copied_and_sent(case, send):
     *_, motion = case
     again = send(motion)
     for name in ("q", "qdot", "gradient", "inverse"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
+        assert_array_equal(getattr(again, name), getattr(motion, name))
     for own, other in zip(again.derivatives(), motion.derivatives(), strict=True):
-        np.testing.assert_array_equal(own, other)
+        assert_array_equal(own, other)
 
 
 def test_no_points_give_no_motion():
-    chain = chain_of(*random_model(3, 1))
-    given = dict.fromkeys(CURVES_AND_PATH, np.zeros((0, 2)))
-    given["rows"] = np.eye(3, 4)[[2]]
-    motion = PathMotion.prepare(chain, Prescribed((0, 1)), given)
+    motion = prepare(LAST_STAYS, count=0)
     assert motion.evaluate() is None
     assert motion.derivatives()[0].shape == (0, 3, 2)
 
@@ -297,9 +298,9 @@ def test_least_singular_values():
     matrices = np.random.default_rng(3).normal(size=(POINTS, 7, 7))
     values, vectors = find_least_singular(np.linalg.inv(matrices))
     _, known, right = np.linalg.svd(matrices)
-    np.testing.assert_allclose(values, known[:, -1], rtol=1e-12)
+    assert_allclose(values, known[:, -1], rtol=1e-12)
     along = np.abs(np.sum(vectors * right[:, -1], axis=1))
-    np.testing.assert_allclose(along, 1.0, atol=1e-12)
+    assert_allclose(along, 1.0, atol=1e-12)
 
 
 def test_largest_products_of_steps():
@@ -308,8 +309,6 @@ def test_largest_products_of_steps():
     step = rng.normal(size=(POINTS, 5))
     origin = rng.integers(0, 6, POINTS)
     known = np.abs(np.einsum("eij,ej->ei", rows[origin], step)).max(axis=1)
-    np.testing.assert_allclose(
-        find_largest_products(rows, step, origin), known, atol=1e-14
-    )
+    assert_allclose(find_largest_products(rows, step, origin), known, atol=1e-14)
     with pytest.raises(ValueError, match="a point that does not exist"):
         find_largest_products(rows, step, origin + 6)

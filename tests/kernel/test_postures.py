@@ -4,14 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
-from brachis.kernel import (
-    Branch,
-    Fault,
-    Formula,
-    PathMotion,
-    Prescribed,
-)
+from brachis.kernel import Branch, Fault, Formula, PathMotion, Prescribed
 from brachis.robot.chain import chain_of
 from support.random_chains import random_model
 
@@ -29,7 +24,7 @@ def rng():
 def prepare(answers, q_r, *, turns=(1, 0, 1), ranged=(0, 0, 0), start, **given):
     """A motion of three joints, of which joint 1 is redundant, with answers (K, A, 2)."""
     count = len(answers)
-    masks = np.array(turns, dtype=bool), np.array(ranged, dtype=bool)
+    masks = np.array([turns, ranged], dtype=bool)
     alternatives = answers.shape[1]
     branch = Branch(REDUNDANT, OTHERS, *masks, np.array(start), alternatives)
     zeros = np.zeros((count, 2))
@@ -44,7 +39,7 @@ def prepare(answers, q_r, *, turns=(1, 0, 1), ranged=(0, 0, 0), start, **given):
 def test_turns_stay_where_an_answer_is_missing():
     answers = np.array([[[0.0, 7.0]], [[np.nan, 7.0]]])
     motion = prepare(answers, np.zeros(2), start=np.zeros(N))
-    np.testing.assert_array_equal(motion.find_postures()[:, OTHERS], answers[:, 0])
+    assert_array_equal(motion.find_postures()[:, OTHERS], answers[:, 0])
 
 
 def test_the_answer_nearest_to_a_known_posture_is_taken(rng):
@@ -59,7 +54,7 @@ def test_the_answer_nearest_to_a_known_posture_is_taken(rng):
     found = motion.find_postures()[:, OTHERS]
     turned = np.remainder(found - known + np.pi, TURN) - np.pi
     kept = np.arange(20) != 7
-    np.testing.assert_allclose(turned[kept], 0.0, atol=1e-12)
+    assert_allclose(turned[kept], 0.0, atol=1e-12)
     assert np.isnan(found[7]).all()
 
 
@@ -72,7 +67,7 @@ def test_each_answer_follows_the_one_before(rng):
     motion = prepare(answers, np.zeros(30), turns=(0, 0, 0), start=start)
     found = motion.find_postures()[:, OTHERS]
     kept = np.arange(30) != 12
-    np.testing.assert_array_equal(found[kept], path[kept])
+    assert_array_equal(found[kept], path[kept])
     assert np.isnan(found[12]).all()
 
 
@@ -96,8 +91,8 @@ def test_turns_are_counted_by_velocities():
     _, q, _, _ = fast_motion(9)
     motion = turning(q, ranged=1)
     assert not motion.evaluate()
-    np.testing.assert_allclose(motion.qdot[:, 1], fast_motion(9)[2], atol=1e-9)
-    np.testing.assert_allclose(motion.q[:, 1], q, atol=1e-12)
+    assert_allclose(motion.qdot[:, 1], fast_motion(9)[2], atol=1e-9)
+    assert_allclose(motion.q[:, 1], q, atol=1e-12)
 
 
 @pytest.mark.parametrize(("ranged", "fault"), [(1, Fault.TURNS_TOO_FAR), (0, None)])
@@ -107,38 +102,40 @@ def test_turns_that_are_not_certain(ranged, fault):
     assert turning(q, ranged).evaluate() is fault
 
 
-def test_a_branch_comes_back_from_another_process():
+def branch_of(redundant, others, *answers):
     mask = np.ones(N, dtype=bool)
-    branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
+    return Branch(redundant, others, mask, mask, np.zeros(N), *answers)
+
+
+def test_a_branch_comes_back_from_another_process():
+    branch = branch_of(REDUNDANT, OTHERS)
     assert branch.address
     again = pickle.loads(pickle.dumps(branch))  # noqa: S301  (our own)
-    np.testing.assert_array_equal(again.nonredundant, OTHERS)
+    assert_array_equal(again.nonredundant, OTHERS)
 
 
 def test_what_does_not_fit_is_an_error():
-    mask = np.ones(N, dtype=bool)
     with pytest.raises(ValueError, match="must be all joints"):
-        _ = Branch(REDUNDANT, REDUNDANT, mask, mask, np.zeros(N)).address
+        _ = branch_of(REDUNDANT, REDUNDANT).address
     with pytest.raises(ValueError, match="no solutions to choose from"):
-        _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 0).address
+        _ = branch_of(REDUNDANT, OTHERS, 0).address
     formula = Formula.of(lambda a, b: np.stack([a[:, 0], b[:, 0]], axis=1), 2, 1)
     with pytest.raises(ValueError, match=r"the answers have the shape \(2,\)"):
-        _ = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula).address
+        _ = branch_of(REDUNDANT, OTHERS, 1, formula).address
 
 
 def test_a_branch_of_another_chain_is_an_error():
     chain = chain_of(*random_model(4, 1))
-    mask = np.ones(N, dtype=bool)
     given = {"y": np.zeros((1, 2)), "rows": np.zeros((1, 4))}
     given["targets"] = np.zeros((1, 2))
-    branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N))
+    branch = branch_of(REDUNDANT, OTHERS)
     with pytest.raises(ValueError, match="has 3 joints, 1 redundant; needed: 4, 1"):
         PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, branch=branch)
-    branch = Branch(OTHERS, REDUNDANT, mask, mask, np.zeros(N))
+    branch = branch_of(OTHERS, REDUNDANT)
     chain = chain_of(*random_model(N, 1))
     with pytest.raises(ValueError, match="has 3 joints, 2 redundant; needed: 3, 1"):
         PathMotion.prepare(chain, ASKED, given, branch=branch)
     formula = Formula.of(lambda a: a[:, None, :2], 3)
-    branch = Branch(REDUNDANT, OTHERS, mask, mask, np.zeros(N), 1, formula)
+    branch = branch_of(REDUNDANT, OTHERS, 1, formula)
     with pytest.raises(ValueError, match=r"takes \(3,\) numbers; needed: \(2, 1\)"):
         PathMotion.prepare(chain, ASKED, given, branch=branch)

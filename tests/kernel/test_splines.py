@@ -1,9 +1,8 @@
 """Splines, against SciPy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
 from brachis.kernel import Basis, Spline, blossom, collocation
@@ -20,7 +19,7 @@ def test_values_and_derivatives(nu, shape):
     own = Spline(KNOTS, points, 3)(X.reshape(-1, 3), nu)
     wanted = BSpline(KNOTS, points, 3)(X.reshape(-1, 3), nu)
     assert own.shape == wanted.shape
-    np.testing.assert_allclose(own, wanted, rtol=1e-11, atol=1e-9)
+    assert_allclose(own, wanted, rtol=1e-11, atol=1e-9)
 
 
 def test_higher_derivatives_vanish():
@@ -37,12 +36,10 @@ def test_interpolation(degree, more):
     values = rng.normal(size=(len(places), 2, 2))
     own = Spline.through(places, values, degree)
     wanted = make_interp_spline(places, values, k=degree)
-    np.testing.assert_allclose(own.knots, wanted.t)
+    assert_allclose(own.knots, wanted.t)
     size = np.abs(wanted.c).max()
-    np.testing.assert_allclose(
-        own.control_points, wanted.c, rtol=1e-9, atol=1e-9 * size
-    )
-    np.testing.assert_allclose(own(places), values, rtol=1e-9, atol=1e-9 * size)
+    assert_allclose(own.control_points, wanted.c, rtol=1e-9, atol=1e-9 * size)
+    assert_allclose(own(places), values, rtol=1e-9, atol=1e-9 * size)
 
 
 def test_cubic_interpolation_over_uneven_places():
@@ -53,20 +50,20 @@ def test_cubic_interpolation_over_uneven_places():
     x = np.linspace(places[0], places[-1], 300)
     own = Spline.through(places, values)
     wanted = CubicSpline(places, values)
-    np.testing.assert_allclose(own(x), wanted(x), atol=1e-12)
-    np.testing.assert_allclose(own(x, 1), wanted(x, 1), atol=1e-8)
+    assert_allclose(own(x), wanted(x), atol=1e-12)
+    assert_allclose(own(x, 1), wanted(x, 1), atol=1e-8)
 
 
 def test_collocation():
     points = np.random.default_rng(3).normal(size=(len(KNOTS) - 4, 2))
     for nu in range(3):
         matrix = collocation(KNOTS, 3, X, nu)
-        np.testing.assert_allclose(matrix @ points, Spline(KNOTS, points, 3)(X, nu))
+        assert_allclose(matrix @ points, Spline(KNOTS, points, 3)(X, nu))
 
 
 def test_few_places_are_joined_by_straight_lines():
     own = Spline.through(np.array([1.0, 1.5, 3.0]), np.array([0.0, 1.0, 4.0]))
-    np.testing.assert_allclose(own([1.25, 2.0, 3.0]), [0.5, 2.0, 4.0])
+    assert_allclose(own([1.25, 2.0, 3.0]), [0.5, 2.0, 4.0])
 
 
 @pytest.mark.parametrize("count", [7, 9])
@@ -78,7 +75,7 @@ def test_as_many_values_as_places(count):
 def test_values_in_any_order_of_memory():
     values = np.random.default_rng(5).normal(size=(8, 3))
     own = Spline.through(np.arange(8.0), np.asfortranarray(values))
-    np.testing.assert_allclose(own(np.arange(8.0)), values, atol=1e-14)
+    assert_allclose(own(np.arange(8.0)), values, atol=1e-14)
 
 
 def test_no_place_and_no_curve():

@@ -1,7 +1,5 @@
 """Nodes and quintic pieces against the closed form at other times."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly
@@ -14,7 +12,7 @@ from support.chains import planar_robot
 from support.motions import Sway, joint_map
 
 
-def pieces(nodes) -> BPoly:
+def pieces(nodes):
     """SciPy's quintic pieces from the nodes' values and derivatives."""
     return BPoly.from_derivatives(
         nodes.times, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)

@@ -1,9 +1,8 @@
 """The joint map of a path of all joints: exact derivatives, and limits that bind with them and not without."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.kinematics import JointSpaceMap
 from brachis.limits.safeguards import build_branch_margins
@@ -51,15 +50,13 @@ def test_the_motion_is_that_of_the_path(along, states):
             ydddot,
         ).qddot
 
-    np.testing.assert_allclose(state.q, along.postures(y), atol=1e-12)
-    np.testing.assert_allclose(
-        state.qdot, (moved(H) - moved(-H)) / (2.0 * H), atol=1e-8
-    )
-    np.testing.assert_allclose(
+    assert_allclose(state.q, along.postures(y), atol=1e-12)
+    assert_allclose(state.qdot, (moved(H) - moved(-H)) / (2.0 * H), atol=1e-8)
+    assert_allclose(
         state.qddot, (moved(1e-3) - 2.0 * moved(0) + moved(-1e-3)) / 1e-6, atol=1e-4
     )
     jerk = (accelerated(H) - accelerated(-H)) / (2.0 * H)
-    np.testing.assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
+    assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
 
 
 def test_derivatives_equal_differences(along, states):
@@ -85,9 +82,7 @@ def test_derivatives_equal_differences(along, states):
     ):
         expected = difference(part, of_y=by[0], of_ydot=by[1])
         assert np.abs(expected).max() > 0.1
-        np.testing.assert_allclose(
-            found[:, :, 0], expected, atol=1e-6 * np.abs(expected).max()
-        )
+        assert_allclose(found[:, :, 0], expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_nothing_is_chosen_and_nothing_guards_it(along, states):
@@ -98,16 +93,16 @@ def test_nothing_is_chosen_and_nothing_guards_it(along, states):
     by_q, by_s = along.margin_gradient(state)
     assert by_q.shape == (6, 0, 3)
     assert by_s is None
-    np.testing.assert_allclose(along.start, [0.1, 0.2, 0.3], atol=1e-14)
-    np.testing.assert_array_equal(along.coordinates(0.3, np.full(3, np.nan)), [0.3])
+    assert_allclose(along.start, [0.1, 0.2, 0.3], atol=1e-14)
+    assert_array_equal(along.coordinates(0.3, np.full(3, np.nan)), [0.3])
 
 
 def test_the_task_map_is_the_identity():
     robot = planar_robot("RRP")
     space, q = task_map_of(robot, "joints"), np.array([[7.0, -8.0, 0.3]])
-    np.testing.assert_array_equal(space.values(q), q)
-    np.testing.assert_array_equal(space.difference(q, np.zeros((1, 3))), q)
-    np.testing.assert_array_equal(space.jacobian(space.twists(q)), np.eye(3)[None])
+    assert_array_equal(space.values(q), q)
+    assert_array_equal(space.difference(q, np.zeros((1, 3))), q)
+    assert_array_equal(space.jacobian(space.twists(q)), np.eye(3)[None])
     assert space.rows == ("joint j1", "joint j2", "joint j3")
     assert space.units == ("rad", "rad", "m")
     assert space.axes == ()

@@ -1,7 +1,5 @@
 """What drives bear, and the tool's motion: known optima of slides, and what the free motion of an arm violates."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -37,7 +35,7 @@ def slide(*forces, limits=None, tool=None, intervals=40, **spline):
     return result
 
 
-def ratio(result, kind) -> float:
+def ratio(result, kind):
     return check_of(result.verification, f"{kind} ratio").value
 
 
@@ -70,9 +68,8 @@ def test_torque_that_falls_with_speed(curve):
 
     def largest_force(v):
         last = (force[-1] - force[-2]) / (speed[-1] - speed[-2])
-        return np.maximum(
-            np.interp(v, speed, force) + last * np.maximum(v - speed[-1], 0.0), 0.0
-        )
+        beyond = last * np.maximum(v - speed[-1], 0.0)
+        return np.maximum(np.interp(v, speed, force) + beyond, 0.0)
 
     def motion(_t, state):
         return [state[1], largest_force(state[1]) / MASS]
@@ -106,9 +103,8 @@ def test_rms_force_makes_a_parabola_of_the_speed():
     """The least mean square of the force over a time T is that of F = F0 (1 - 2 t / T): F0^2 / 3."""
     rms = 20.0
     result = slide(FORCE, limits={"rms_torque": rms}, intervals=12)
-    assert result.t_end == pytest.approx(
-        np.sqrt(6.0 * MASS * LENGTH / (np.sqrt(3.0) * rms)), rel=NEAR
-    )
+    expected = np.sqrt(6.0 * MASS * LENGTH / (np.sqrt(3.0) * rms))
+    assert result.t_end == pytest.approx(expected, rel=NEAR)
     assert ratio(result, "rms torque") == pytest.approx(1.0, abs=1e-5)
     check = brachis.bottleneck.report(result, check=True).check
     (entry,) = check.larger()
@@ -133,11 +129,8 @@ def test_a_speed_table_is_a_staircase_of_cruises():
     a, fast, slow, step = FORCE / MASS, 1.5, 0.5, 0.6
     table = {"s": [0.0, step, step, 1.0], "speed": [fast, fast, slow, slow]}
     way = step * LENGTH - (fast**2 + fast**2 - slow**2) / (2.0 * a)
-    expected = (
-        (2.0 * fast) / a
-        + way / fast
-        + ((1.0 - step) * LENGTH - slow**2 / (2.0 * a)) / slow
-    )
+    slow_length = (1.0 - step) * LENGTH - slow**2 / (2.0 * a)
+    expected = 2.0 * fast / a + way / fast + slow_length / slow
     result = slide(FORCE, tool={"speed": table}, intervals=60, degree=2)
     assert result.t_end == pytest.approx(
         expected, rel=5e-3
@@ -155,7 +148,7 @@ def arm():
     return free.task, free
 
 
-def peaks(trajectory) -> dict[str, np.ndarray | float]:
+def peaks(trajectory):
     """Figures of a motion by numpy alone, from samples of the saved motion."""
     motion = trajectory.at(np.linspace(0.0, trajectory.t_end, 4001))
     positions, _ = trajectory.robot.tool_placements(motion.q)
@@ -213,11 +206,8 @@ def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(
     assert failed_checks(verification) == [f"{check} ratio"]
     assert check_of(verification, f"{check} ratio").value > 1.2
     report = brachis.bottleneck.report(result, check=True)
-    entry = next(
-        entry
-        for entry in report.check.entries
-        if str(entry.sensitivity.label).startswith(label)
-    )
+    entries = report.check.entries
+    entry = next(e for e in entries if str(e.sensitivity.label).startswith(label))
     assert entry.re_solved < -1e-4
     assert entry.deviation < 0.05
     subject = label.split()[0]

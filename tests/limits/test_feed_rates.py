@@ -1,7 +1,5 @@
 """Feed rates of a path's points are largest speeds of the tool, in the plan and in its verification."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -10,7 +8,7 @@ import pytest
 import brachis
 from brachis import LimitSpec
 from brachis.limits import Moments, limits_of
-from brachis.task import SpeedTable, Task, task_with
+from brachis.task import SpeedTable, task_with
 from support.arrays import assert_near
 from support.chains import gantry_robot
 from support.checks import check_of
@@ -20,7 +18,7 @@ FREE = range(120, 180)
 """Rows of the 300 on whose way no speed is prescribed."""
 
 
-def line(speed: np.ndarray | None) -> Task:
+def line(speed):
     """A gantry's task along 1 m."""
     points = np.column_stack([np.linspace(0.0, 1.0, 300), np.zeros(300)])
     path = brachis.fit_path(
@@ -80,7 +78,7 @@ def test_partials_of_tables_over_parts_of_the_path(robot):
     s, h = np.array([0.197, 0.3, 0.403, 0.5, 0.7, 0.902]), 1e-6
     q, qdot = np.random.default_rng(2).normal(size=(2, 6, 2))
 
-    def at(places: np.ndarray) -> Moments:
+    def at(places):
         return Moments(q, qdot, 0.0 * q, 0.0 * q, places)
 
     expected = (limit.values(at(s + h)) - limit.values(at(s - h))) / (2.0 * h)

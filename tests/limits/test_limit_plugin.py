@@ -1,19 +1,18 @@
 """The example of a plug-in: as an object, and named in a task file once it is installed."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import importlib.util
 import json
 import os
 import re
-import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 import brachis
 from brachis.errors import InputError, UnknownNameError
@@ -21,11 +20,13 @@ from brachis.limits import Bound, Label, Limit, Partials
 from brachis.verify import verify_trajectory
 from support.checks import check_of
 from support.effort import QUICK
+from support.scripts import output_of
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "examples/limit_plugin"
 MODULE = PLUGIN / "src/brachis_coupled/__init__.py"
 TASK = PLUGIN / "coupled.yaml"
+LINE = ROOT / "examples/01_scara_line.yaml"
 UPPER = 0.7
 
 
@@ -42,20 +43,15 @@ def plugin():
 @pytest.fixture
 def entry_point(plugin, monkeypatch):
     """The entry point as the plug-in's pyproject.toml names it."""
-    import tomllib
-
-    points = tomllib.loads((PLUGIN / "pyproject.toml").read_text())["project"][
-        "entry-points"
-    ]["brachis.limits"]
-    found = [
-        importlib.metadata.EntryPoint(name, value, "brachis.limits")
-        for name, value in points.items()
-    ]
+    project = tomllib.loads((PLUGIN / "pyproject.toml").read_text())["project"]
+    kind = "brachis.limits"
+    points = project["entry-points"][kind].items()
+    found = [importlib.metadata.EntryPoint(*point, kind) for point in points]
     own = importlib.metadata.entry_points
     monkeypatch.setattr(
         importlib.metadata,
         "entry_points",
-        lambda group: found if group == "brachis.limits" else own(group=group),
+        lambda group: found if group == kind else own(group=group),
     )
     return plugin
 
@@ -113,9 +109,8 @@ def test_a_check_of_its_own_takes_the_marks_place(plugin):
             )
             return np.abs(q[:, 1:].sum(axis=1))[:, None] / UPPER
 
-    result = brachis.plan(
-        LINE, own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)], **QUICK
-    )
+    model = Checked(("j2", "j3"), -UPPER, UPPER)
+    result = brachis.plan(LINE, own_limits=[model], **QUICK)
     check = check_of(result.verification, "coupled range ratio")
     assert check.remark == ""
     assert check.value == pytest.approx(1.0, abs=1e-3)
@@ -129,19 +124,17 @@ def test_a_kind_without_its_plugin_is_unknown():
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
-        (
-            {"joints": ["j2", "j3"], "lower": 1.0, "upper": 0.0},
-            "lower must be below upper",
-        ),
-        ({"joints": ["j2", "j3"]}, "missing"),
-        ({"joints": ["j2", "elbow"], "lower": -1.0, "upper": 1.0}, "elbow"),
+        ("{joints: [j2, j3], lower: 1.0, upper: 0.0}", "lower must be below upper"),
+        ("joints: [j2, j3]", "missing"),
+        ("{joints: [j2, elbow], lower: -1.0, upper: 1.0}", "elbow"),
     ],
 )
 @pytest.mark.usefixtures("entry_point")
 def test_wrong_parameters_have_a_reason(parameters, said):
     task = brachis.load_task(TASK).to_dict()
+    custom = {"coupled_range": yaml.safe_load(parameters)}
     with pytest.raises(InputError, match=said) as caught:
-        brachis.plan({**task, "custom_limits": {"coupled_range": parameters}})
+        brachis.plan({**task, "custom_limits": custom})
     assert "custom_limits.coupled_range" in str(caught.value)
 
 
@@ -149,7 +142,7 @@ def test_a_start_posture_beyond_it_is_an_error(plugin):
     model = plugin.CoupledRange(("j2", "j3"), 0.5, 0.7)
     said = "the range limit of 'j2 + j3' is exceeded at rest; found 0 rad at rest; allowed: 0.5 to 0.7 rad"
     with pytest.raises(brachis.errors.StartError, match=re.escape(said)):
-        brachis.plan(ROOT / "examples/01_scara_line.yaml", own_limits=[model])
+        brachis.plan(LINE, own_limits=[model])
 
 
 class Rate(Limit):
@@ -185,75 +178,53 @@ class Given:
         return limit
 
 
-LINE = ROOT / "examples/01_scara_line.yaml"
-
-
-@pytest.mark.parametrize(
-    ("parts", "where", "said"),
-    [
-        ({"labels": ()}, "own_limits[0].lower", "found (1,); allowed: (0,)"),
-        (
-            {"lower": np.ones(1)},
-            "own_limits[0]",
-            "the lower bounds are not below the upper bounds",
-        ),
-        (
-            {"values": lambda motion: motion.qdot[:, 2]},
-            "own_limits[0].values",
-            "found (6,) for 6 moments",
-        ),
-        (
-            {"values": lambda motion: np.full((len(motion.q), 1), np.nan)},
-            "own_limits[0].values",
-            "not finite",
-        ),
-        (
-            {"partials": lambda motion: Partials(qdot=motion.q)},
-            "own_limits[0].partials.qdot",
-            "(6, 1, 3)",
-        ),
-        (
-            {"partials": lambda _motion: Partials()},
-            "own_limits[0].partials",
-            "all partial derivatives are None",
-        ),
-        (
-            {"partials": lambda _motion: None},
-            "own_limits[0].partials",
-            "is not a brachis.limits.Partials",
-        ),
-        (
-            {"labels": (Label("j1", "torque", "Nm"),)},
-            "own_limits[0].labels",
-            "this label exists already",
-        ),
-        ({"labels": ("j3",)}, "own_limits[0].labels", "Label"),
-        (
-            {"values": lambda motion: motion.qdot[:, 2:].tolist()},
-            "own_limits[0].values",
-            "found list [[",
-        ),
-        (
-            {"values": lambda motion: motion.qdot[:, 2:] + 0j},
-            "own_limits[0].values",
-            "an array of complex128",
-        ),
-        (
-            {"labels": (), "lower": np.empty(0), "upper": np.empty(0)},
-            "own_limits[0].labels",
-            "no values",
-        ),
-    ],
-)
-def test_a_limit_whose_parts_do_not_fit_is_an_error(parts, where, said):
+def refusal_at(place, **parts):
+    """What is said of a limit with these parts, which is refused at a place."""
     with pytest.raises(InputError) as caught:
         brachis.plan(LINE, own_limits=[Given(**parts)])
-    assert str(caught.value).startswith(f"{where}: ")
-    assert said in str(caught.value)
+    assert caught.value.where == place
+    assert str(caught.value).startswith(f"{place}: ")
+    return str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong", "allowed"),
+    ("name", "spoilt", "place", "said"),
+    [
+        ("labels", (), ".lower", "found (1,); allowed: (0,)"),
+        ("lower", np.ones(1), "", "the lower bounds are not below the upper bounds"),
+        ("values", lambda m: m.qdot[:, 2], ".values", "found (6,) for 6 moments"),
+        ("values", lambda m: np.nan * m.q[:, :1], ".values", "not finite"),
+        ("values", lambda m: m.qdot[:, 2:].tolist(), ".values", "found list [["),
+        ("values", lambda m: m.qdot[:, 2:] + 0j, ".values", "an array of complex128"),
+        ("partials", lambda m: Partials(qdot=m.q), ".partials.qdot", "(6, 1, 3)"),
+        (
+            "partials",
+            lambda _m: Partials(),
+            ".partials",
+            "all partial derivatives are None",
+        ),
+        ("partials", lambda _m: None, ".partials", "is not a brachis.limits.Partials"),
+        (
+            "labels",
+            (Label("j1", "torque", "Nm"),),
+            ".labels",
+            "this label exists already",
+        ),
+        ("labels", ("j3",), ".labels", "Label"),
+    ],
+)
+def test_a_limit_whose_parts_do_not_fit_is_an_error(name, spoilt, place, said):
+    assert said in refusal_at(f"own_limits[0]{place}", **{name: spoilt})
+
+
+def test_a_limit_of_no_values_is_an_error():
+    none = np.empty(0)
+    text = refusal_at("own_limits[0].labels", labels=(), lower=none, upper=none)
+    assert "no values" in text
+
+
+@pytest.mark.parametrize(
+    ("member", "wrong", "allowed"),
     [
         ("kind", None, "a name"),
         ("kind", "torque", "a kind of its own"),
@@ -273,11 +244,8 @@ def test_a_limit_whose_parts_do_not_fit_is_an_error(parts, where, said):
         ("labels", (Label("j3", "rate", None),), "of texts"),
     ],
 )
-def test_a_member_that_is_not_allowed_is_in_the_message(name, wrong, allowed):
-    with pytest.raises(InputError) as caught:
-        brachis.plan(LINE, own_limits=[Given(**{name: wrong})])
-    assert caught.value.where == f"own_limits[0].{name}"
-    assert allowed in str(caught.value)
+def test_a_member_that_is_not_allowed_is_in_the_message(member, wrong, allowed):
+    assert allowed in refusal_at(f"own_limits[0].{member}", **{member: wrong})
 
 
 @pytest.mark.parametrize("centre", [np.zeros(3), np.array([5.0]), np.array([np.nan])])
@@ -437,8 +405,5 @@ print(result.verified, "coupled range ratio" in [check.name for check in result.
 def test_two_processes_take_it_as_well():
     folders = [str(PLUGIN / "src"), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
-    command = [sys.executable, "-c", TWO_PROCESSES]
-    done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == ["True", "True"]
+    printed = output_of("-c", TWO_PROCESSES, env=environment)
+    assert printed.split() == ["True", "True"]

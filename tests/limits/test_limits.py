@@ -1,20 +1,13 @@
 """Every kind of limit by itself: partials against differences, relaxation, lines of the phase plane, ratios."""
 
-from __future__ import annotations
-
 import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
-from brachis.limits import (
-    TABLE,
-    Label,
-    Limit,
-    Moments,
-    Partials,
-)
+from brachis.limits import TABLE, Label, Limit, Moments, Partials
 from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
 from brachis.task.tolerances import Margins
@@ -22,11 +15,11 @@ from support.arrays import assert_near
 from support.chains import planar_robot
 from support.phases import FRICTION
 
-FALLING = {
-    "j1": [[0, 90], [1, 80], [2, 40]],
-    "j2": [[0, 90], [0.5, 30], [1, 20]],
-    "j3": [[0, 100], [1, 100], [2, 20]],
-}
+FALLING = yaml.safe_load("""
+j1: [[0, 90], [1, 80], [2, 40]]
+j2: [[0, 90], [0.5, 30], [1, 20]]
+j3: [[0, 100], [1, 100], [2, 20]]
+""")
 ROBOT = planar_robot(
     "RRP",
     "xz",
@@ -169,13 +162,13 @@ def test_a_ratio_is_above_one_exactly_beyond_the_bounds(lower, upper):
             assert limit.ratio(np.array([[bound]]))[0, 0] == sign
 
 
-PAIRS = {
-    "torque": {"j1": [-20.0, 60.0], "j2": [-70.0, 5.0]},
-    "velocity": {"j2": [-1.0, 4.0], "j3": 3.0},
-}
+PAIRS = yaml.safe_load("""
+torque: {j1: [-20.0, 60.0], j2: [-70.0, 5.0]}
+velocity: {j2: [-1.0, 4.0], j3: 3.0}
+""")
 
 
-def pairs(kind: str) -> Limit:
+def pairs(kind):
     robot = planar_robot(
         "RRP", "xz", friction={**FRICTION, "viscous": 1.0}, limits=LimitSpec(**PAIRS)
     )

@@ -1,7 +1,5 @@
 """Margins from singular postures and from the ends of ranges: kept on request, reported in any case."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A new kind of joint limit is a row of the table with its keyword, a class and a formula: three files change."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Partial derivatives of a user's limit are compared with its values before anything is planned."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

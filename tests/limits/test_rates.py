@@ -1,7 +1,5 @@
 """Jerk and torque rate through all of it: refusals, plan, dense grid, verification, sensitivity, timeline."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

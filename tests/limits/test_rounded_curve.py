@@ -1,7 +1,5 @@
 """Curves rounded from below: beside the piecewise linear curve, and derivatives against differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,12 +1,11 @@
 """Tolerances of the tool: its virtual joints, the limits beside their ranges, and motions that use them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
@@ -21,16 +20,10 @@ from brachis.trajectory.samples import tool_motion
 from support.checks import check_of
 from support.spatial import START, rail_arm
 
-EVERYTHING = {
-    "orientation": {"tilt": 15, "roll": [-30, 40]},
-    "position": {
-        "sphere": 0.004,
-        "x": 0.002,
-        "y": [-0.001, 0.003],
-        "z": [-0.002, 0.001],
-        "axes": "world",
-    },
-}
+EVERYTHING = yaml.safe_load("""
+orientation: {tilt: 15, roll: [-30, 40]}
+position: {sphere: 0.004, x: 0.002, y: [-0.001, 0.003], z: [-0.002, 0.001], axes: world}
+""")
 
 
 def task_of(tolerances, space="pose"):
@@ -46,14 +39,8 @@ def robot_with(tolerances):
 
 def test_virtual_joints_have_the_ranges_of_the_task():
     robot = robot_with(EVERYTHING)
-    assert robot.joint_names[-6:] == (
-        "tool_roll",
-        "tool_lead",
-        "tool_side",
-        "tool_x",
-        "tool_y",
-        "tool_z",
-    )
+    names = [f"tool_{name}" for name in ("roll", "lead", "side", "x", "y", "z")]
+    assert list(robot.joint_names[-6:]) == names
     # A cone is as wide all around; a box in the world's axes fits into its own sphere, and into the one that is given.
     reach = 1.01 * min(0.004, np.linalg.norm([0.002, 0.003, 0.002]))
     tilt = 1.01 * np.radians(15)
@@ -132,24 +119,20 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
 @pytest.mark.parametrize(
     ("tolerances", "space", "match"),
     [
-        ({"orientation": {"tilt": 15}}, "position", "prescribe the orientation"),
-        ({"position": {"sphere": 0.1}}, ["x", "y"], "no tolerances of the position"),
-        ({"orientation": {"roll": 5}}, "pose_free_roll", "roll is free"),
-        ({"orientation": {"lead": [5, 2]}}, "pose", "not a range"),
-        ({"orientation": {"lead": 100}}, "pose", "within 80 of zero"),
-        ({"tilt": 15}, "pose", "tolerances.orientation.tilt"),
-        (
-            {"position": {"sphere": 0.1, "y": 0.1, "axes": "world"}},
-            "pose",
-            "all three lengths",
-        ),
-        ({"position": {"sphere": 0.1, "x": [0.2, 0.3]}}, "pose", "outside sphere"),
-        ({"orientation": {"tilt": 15, "lead": [20, 30]}}, "pose", "outside tilt"),
+        ("orientation: {tilt: 15}", "position", "prescribe the orientation"),
+        ("position: {sphere: 0.1}", ["x", "y"], "no tolerances of the position"),
+        ("orientation: {roll: 5}", "pose_free_roll", "roll is free"),
+        ("orientation: {lead: [5, 2]}", "pose", "not a range"),
+        ("orientation: {lead: 100}", "pose", "within 80 of zero"),
+        ("tilt: 15", "pose", "tolerances.orientation.tilt"),
+        ("position: {sphere: 0.1, y: 0.1, axes: world}", "pose", "all three ranges"),
+        ("position: {sphere: 0.1, x: [0.2, 0.3]}", "pose", "outside sphere"),
+        ("orientation: {tilt: 15, lead: [20, 30]}", "pose", "outside tilt"),
     ],
 )
 def test_tolerances_that_make_no_sense_are_errors(tolerances, space, match):
     with pytest.raises(TaskError, match=match):
-        task_of(tolerances, space)
+        task_of(yaml.safe_load(tolerances), space)
 
 
 def test_free_roll_is_a_tolerance():

@@ -1,7 +1,5 @@
 """The tool's speed, through all of it: task key, plan, refinement, verification, bottleneck, timeline."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """B-spline basis functions against SciPy's BSpline."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal

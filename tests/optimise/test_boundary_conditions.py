@@ -1,7 +1,5 @@
 """Boundary conditions hold for every x, whatever the solver does; and x keeps its meaning on other grids."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The evaluator against joint map and limits; its slopes are in the Jacobians of programs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal

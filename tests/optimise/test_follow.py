@@ -1,7 +1,5 @@
 """Splines along the fastest timing of a joint path."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -7,10 +7,6 @@ A mass m is pushed over a distance L by a force of at most F, with switch times 
     armature      bang-bang of the mass m + J_rotor ratio^2
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -28,21 +24,19 @@ FREE = {"intervals": 16, "knots": "free", "shortest_interval": 0.02}
 DYNAMICS = "<dynamics damping='{damping}' friction='{friction}'/>"
 
 
-def slide(damping: float = 0.0, friction: float = 0.0) -> brachis.Robot:
+def slide(damping=0.0, friction=0.0):
     extra = DYNAMICS.format(damping=damping, friction=friction)
     return slides([X], [FORCE], MASS, extra)
 
 
-def plan(
-    robot: brachis.Robot, spline: Mapping[str, object] = EVEN, **settings: object
-) -> brachis.Result:
+def plan(robot, spline=EVEN, **settings):
     return plan_slides(robot, ["x"], [LENGTH], settings=settings, spline=spline)
 
 
-def viscous_time() -> float:
+def viscous_time():
     steady, scale = FORCE / VISCOUS, MASS / VISCOUS
 
-    def beyond(pushing: float) -> float:
+    def beyond(pushing):
         braking = pushing - VISCOUS * LENGTH / FORCE
         speed = steady * (1.0 - np.exp(-pushing / scale))
         there = steady * (pushing - scale * (1.0 - np.exp(-pushing / scale)))
@@ -55,7 +49,7 @@ def viscous_time() -> float:
     return 2.0 * pushing - VISCOUS * LENGTH / FORCE
 
 
-def coulomb_time() -> float:
+def coulomb_time():
     pushing, braking = (FORCE - COULOMB) / MASS, (FORCE + COULOMB) / MASS
     speed = np.sqrt(2.0 * LENGTH * pushing * braking / (pushing + braking))
     return float(speed / pushing + speed / braking)

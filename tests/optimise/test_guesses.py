@@ -1,7 +1,5 @@
 """Initial guesses are reachable at every collocation point and within the limits that time relieves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Inserted knots leave the curves as they are; basis functions of interval lengths; times within intervals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -40,7 +38,7 @@ def test_the_same_curves(degree, old, new, seed):
         BSpline(knots, points.T, degree)(t_norm),
         BSpline(fine_knots, inserted.T, degree)(t_norm),
     )
-    np.testing.assert_allclose(after, before, atol=1e-13)
+    assert_allclose(after, before, atol=1e-13)
 
 
 @pytest.mark.parametrize("degree", range(2, 8))
@@ -57,7 +55,7 @@ def test_very_short_intervals_leave_the_curves_as_they_are(degree):
         t = rng.uniform(0.0, 1.0, 100)
         before = BSpline(knots, points.T, degree)(t)
         after = BSpline(fine_knots, inserted.T, degree)(t)
-        np.testing.assert_allclose(after, before, atol=1e-8)
+        assert_allclose(after, before, atol=1e-8)
 
 
 @pytest.mark.parametrize("degree", range(2, 7))

@@ -1,7 +1,5 @@
 """Phases over finer, free and frozen knots: x keeps its meaning from one to the other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

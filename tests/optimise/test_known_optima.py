@@ -14,8 +14,6 @@ With free knots the ramp in the middle takes one interval of the least length, l
     rest: full        t = t* / sqrt(1 - 2 l + l^2)
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -49,7 +47,7 @@ def plan(
     )
 
 
-def bang_bang(mass: float) -> float:
+def bang_bang(mass):
     return 2.0 * np.sqrt(mass * LENGTH / FORCE)
 
 
@@ -69,7 +67,7 @@ def test_slide_between_speeds(first, last, rest):
     assert result.t_end == pytest.approx(exact, rel=near)
     assert result.t_end > exact * (1.0 - 1e-4)
     ends = result.trajectory.at([0.0, result.t_end])
-    np.testing.assert_allclose(ends.qdot[:, 0], [first, last], atol=1e-9)
+    assert_allclose(ends.qdot[:, 0], [first, last], atol=1e-9)
     force = np.abs(ends.tau).max()
     assert force < 1e-6 if rest == "full" else force > 0.9 * FORCE
 
@@ -99,7 +97,7 @@ def test_rest_in_acceleration_costs_two_more_ramps(intervals):
     expected = bang_bang(2.0 * MASS) / np.sqrt(1.0 - 2.0 / intervals)
     assert result.t_end == pytest.approx(expected, rel=SLACK)
     ends = result.trajectory.acceleration(np.array([0.0, result.t_end]))
-    np.testing.assert_allclose(ends, 0.0, atol=1e-9)
+    assert_allclose(ends, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])

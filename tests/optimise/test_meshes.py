@@ -1,12 +1,10 @@
 """Meshes from coarse to fine, free knots and many knots from few, on the paper's arm: 90 degrees, 10 Nm, no gravity."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
@@ -23,13 +21,14 @@ from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings, task_with
 from support.effort import QUICK
 from support.scara import START, scara
+from support.solvers import solve
 from support.starts import starting_points
 
 FINE = {"velocity": 2.1207, "full": 2.1309}
 """End times with 100 (rest: velocity) and 200 (rest: full) even intervals, s."""
 
 
-def task(joint="j1", **spline) -> brachis.Task:
+def task(joint="j1", **spline):
     line = brachis.Line(length=1.0, angle_deg=90)
     return task_with(
         start=START,
@@ -39,10 +38,6 @@ def task(joint="j1", **spline) -> brachis.Task:
         spline=spline,
         **QUICK,
     )
-
-
-def solve(program, x):
-    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 @pytest.fixture(scope="module")
@@ -158,8 +153,8 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     nested = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
     assert not nested.not_completed
     (phase,), (expected,) = nested.program.phases, program.phases
-    np.testing.assert_array_equal(phase.knots, expected.knots)
-    np.testing.assert_array_equal(phase.t_norm, expected.t_norm)
+    assert_array_equal(phase.knots, expected.knots)
+    assert_array_equal(phase.t_norm, expected.t_norm)
     first, *later = nested.reports
     assert first is report
     assert max(level.iterations for level in later) <= 10

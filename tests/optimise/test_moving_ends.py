@@ -1,7 +1,5 @@
 """Ends in motion and periodic motions: conditions that hold for every x, and exact derivatives with them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole Jacobian of a program with every kind of limit, against central differences, and its sparsity pattern."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,7 @@ KINDS = [*(kind for kind in limits.TABLE if kind not in OTHER_ROBOTS), "branch_m
 UNTIMED = ("position", "branch_margin")
 
 
-def blocks(program) -> dict[str, np.ndarray]:
+def blocks(program):
     """Rows of every kind of limit in a program of one phase; means come last."""
     (phase,) = program.phases
     result = {limit.kind: program.rows_of(limit).ravel() for limit in phase.limits}

@@ -1,7 +1,5 @@
 """What a program minimises: values, exact gradients against differences, and bounds on durations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -40,7 +38,7 @@ def test_curvature_of_least_acceleration_is_that_of_its_squares(knots):
     gaps = np.diff(phase.t_norm)
     shares = 0.5 * (np.append(0.0, gaps) + np.append(gaps, 0.0))
 
-    def residuals(x: np.ndarray) -> np.ndarray:
+    def residuals(x):
         """Terms whose squares the objective adds up."""
         return (np.sqrt(shares)[:, None] * phase.state(x).qddot * weights).ravel()
 

@@ -1,7 +1,5 @@
 """How closely joint paths are looked for, and how closely they are timed."""
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

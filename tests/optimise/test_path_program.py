@@ -1,7 +1,5 @@
 """The NLP over the path: derivatives, and what it finds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ranges of joints: far, open, closed and very narrow ones hold a motion alike."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 A slide of mass m pushed by at most F moves, stops and moves on: each move over d takes 2 sqrt(d m / F).
 """
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np
@@ -21,19 +19,14 @@ from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
-from brachis.optimise.mesh import (
-    coarsest,
-    optimise_knots,
-    refine_mesh,
-    solve_by_levels,
-)
+from brachis.optimise.mesh import coarsest, optimise_knots, refine_mesh, solve_by_levels
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.task import SplineSettings
 from support.direct_map import DirectJointMap
 from support.slides import X, slides
-from support.solvers import INSTALLED
+from support.solvers import INSTALLED, solve
 
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 FREE = np.nan
@@ -44,7 +37,7 @@ ROBOT = slides([X], [FORCE], MASS)
 TORQUE = TorqueLimit(ROBOT, np.array(ALONE))
 
 
-def move(start, end, *further, degree=2, intervals=8, points=3) -> Phase:
+def move(start, end, *further, degree=2, intervals=8, points=3):
     """A free move of the slide from rest to rest."""
     breaks = np.linspace(0.0, 1.0, intervals + 1)
     grid = FixedGrid(
@@ -54,12 +47,12 @@ def move(start, end, *further, degree=2, intervals=8, points=3) -> Phase:
     return Phase(DirectJointMap(ROBOT, np.zeros(1)), [TORQUE, *further], grid, boundary)
 
 
-def within(lower, upper) -> PositionLimit:
+def within(lower, upper):
     robot = ROBOT.with_limits(position={"j1": [lower, upper]})
     return PositionLimit(robot, np.array(ALONE))
 
 
-def two_moves(stop=0.5, **options) -> Program:
+def two_moves(stop=0.5, **options):
     """Move from 0 to a stop and on to LENGTH."""
     return Program(
         [move(0.0, stop, **options), move(FREE, LENGTH, **options)],
@@ -72,12 +65,8 @@ def first_point(program, stop=0.5):
     return starting_point(program, ways, [None, None])
 
 
-def solve_first(program, **options) -> SolvedProgram:
+def solve_first(program, **options):
     return SolvedProgram(program, (solve(program, first_point(program, **options)),))
-
-
-def solve(program, x):
-    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def bang_bang(*distances):

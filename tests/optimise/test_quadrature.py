@@ -1,7 +1,5 @@
 """Weights of means over time at collocation points."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

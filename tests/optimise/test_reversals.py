@@ -1,7 +1,5 @@
 """Where joints with Coulomb friction reverse, against motions whose reversals are known; and plans under it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

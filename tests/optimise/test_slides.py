@@ -1,7 +1,5 @@
 """A slide of 2 kg over 1 m, from drives that hardly move it to those that take it to its speed within microseconds."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -19,7 +17,7 @@ SAME = 2e-4
 """Part of the time by which a motion with a stronger drive may be slower: `tolerances.GAIN`."""
 
 
-def least_time(speed: float, force: float) -> float:
+def least_time(speed, force):
     """Time of the trapezoid, or of the triangle where the speed is not reached, s."""
     acceleration = force / MASS
     if speed**2 > WAY * acceleration:

@@ -1,11 +1,8 @@
 """Drives that are stronger or faster in one direction: known optima, and that the limits hold on both sides."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-import brachis
 from brachis.apps.bottleneck import report
 from brachis.verify import verify_trajectory
 from support.checks import check_of, failed_checks
@@ -14,7 +11,7 @@ from support.slides import X, plan_slides, slides
 MASS, LENGTH, PUSH, BRAKE = 4.0, 1.2, 50.0, 20.0
 
 
-def plan(limits: dict, way: float = LENGTH, intervals: int = 70) -> brachis.Result:
+def plan(limits, way=LENGTH, intervals=70):
     return plan_slides(
         slides([X], [PUSH], MASS),
         ["x"],

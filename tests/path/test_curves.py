@@ -11,12 +11,17 @@ from brachis.errors import PathError
 from support.arrays import assert_near
 from support.poses import row_path
 
+XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "pitch"]
 
-def curve_of(segment, start, rows):
+
+def curve_of(segment, start, rows=XY):
     return row_path([segment], start, rows).spans[0].curve
 
 
-XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "pitch"]
+def spline_of(points, start=(0, 0), **keys):
+    return curve_of({"spline": {"through": points, **keys}}, start)
+
+
 CURVES = {
     "line": ("line: {to: [1, 2]}", [0.3, 0.4], XY),
     "line with yaw": ("line: {by: [1, 2, -3]}", [0.3, 0.4, 0.5], XYW),
@@ -87,33 +92,27 @@ def test_an_arc_keeps_its_radius_and_turns_by_its_angle(center, angle, aside):
     if np.linalg.norm(outward) < 1e-2:
         outward = np.cross(normal, [1.0, 0, 0])
     radius = np.linalg.norm(outward)
-    curve = curve_of(
-        {"arc": {"center": center, "angle_deg": angle, "normal": 2 * normal}},
-        center + outward,
-        XYZ,
-    )
+    arc = {"center": center, "angle_deg": angle, "normal": 2 * normal}
+    curve = curve_of({"arc": arc}, center + outward, XYZ)
     assert curve.length == pytest.approx(radius * np.deg2rad(abs(angle)))
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 30), 1)
     assert_allclose(np.linalg.norm(z - center, axis=1), radius, rtol=1e-9)
     assert_allclose((z - center) @ normal, 0, atol=1e-9)
     assert_allclose(np.linalg.norm(velocity, axis=1), 1.0)
-    turned = np.cos(np.deg2rad(angle)) * outward + np.sin(np.deg2rad(angle)) * np.cross(
-        normal, outward
-    )
+    turn = np.deg2rad(angle)
+    turned = np.cos(turn) * outward + np.sin(turn) * np.cross(normal, outward)
     assert_allclose(z[-1], center + turned, atol=1e-8)
 
 
 @given(st.floats(0.05, 0.95), st.floats(0.1, 6.2), st.booleans(), st.integers(2, 3))
 def test_an_arc_passes_via_and_then_ends(fraction, angle, clockwise, rows):
     center = np.array([0.3, -0.2, 0.5])[:rows]
-    u, v = (np.array([0.6, 0.8, 0.0])[:rows], np.array([0.8, -0.6, 0.0])[:rows])
-    if rows == 3:
-        v = np.array([0.8 * 0.6, -0.6 * 0.6, 0.8])
+    u = np.array([0.6, 0.8, 0.0])[:rows]
+    v = np.array([0.8, -0.6] if rows == 2 else [0.48, -0.36, 0.8])
+    sign = -1 if clockwise else 1
 
     def on_circle(phi):
-        return center + 1.5 * (
-            np.cos(phi) * u + (-1 if clockwise else 1) * np.sin(phi) * v
-        )
+        return center + 1.5 * (np.cos(phi) * u + sign * np.sin(phi) * v)
 
     via, end = on_circle(fraction * angle), on_circle(angle)
     curve = curve_of({"arc": {"via": via, "to": end}}, on_circle(0.0), XYZ[:rows])
@@ -124,17 +123,16 @@ def test_an_arc_passes_via_and_then_ends(fraction, angle, clockwise, rows):
 
 @pytest.mark.parametrize("turns", [1, -1.25])
 def test_yaw_turns_with_the_tangent(turns):
-    curve = curve_of(
-        {"circle": {"center": [0, 0], "turns": turns, "yaw": "tangent"}},
-        [2, 0, 0.7],
-        XYW,
+    circle = {"center": [0, 0], "turns": turns}
+    curve, fixed = (
+        curve_of({"circle": circle | yaw}, [2, 0, 0.7], XYW)
+        for yaw in ({"yaw": "tangent"}, {})
     )
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 40), 1)
     # By the right-hand rule about y, which turns z towards x.
     heading = -np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     assert_allclose(z[:, 2] - 0.7, heading - heading[0], atol=1e-12)
     assert z[-1, 2] - 0.7 == pytest.approx(-2 * np.pi * turns)
-    fixed = curve_of({"circle": {"center": [0, 0], "turns": turns}}, [2, 0, 0.7], XYW)
     assert_array_equal(fixed.derivatives(np.array([0.0, 1.0]), 0)[0, :, 2], 0.7)
 
 
@@ -142,7 +140,7 @@ def test_yaw_turns_with_the_tangent(turns):
 def test_a_spline_passes_its_waypoints_and_is_c4(count):
     rng = np.random.default_rng(count)
     points = np.cumsum(rng.uniform(0.1, 1.0, (count, 2)), axis=0)
-    curve = curve_of({"spline": {"through": points}}, [0, 0], XY)
+    curve = spline_of(points)
     knots = curve.knots
     assert_allclose(curve.derivatives(knots, 0)[0, 1:], points, atol=1e-12)
     assert_allclose(
@@ -161,19 +159,18 @@ def test_a_spline_passes_its_waypoints_and_is_c4(count):
     "points", [[[1e-4, 0], [1, 0.5]], [[0.5, 1], [0.5, 1.0001], [2, 0]]]
 )
 def test_a_spline_bears_short_chords(points):
-    curve = curve_of({"spline": {"through": points}}, [0, 0], XY)
+    curve = spline_of(points)
     assert_allclose(curve.derivatives(curve.knots, 0)[0, 1:], points, atol=1e-10)
 
 
 def test_a_spline_may_state_its_start():
     waypoints = [[1.5, 0], [2, 1]]
-    plain = curve_of({"spline": {"through": waypoints}}, [1, -1], XY)
-    stated = curve_of(
-        {"spline": {"through": waypoints, "starts_at": [1, -1.00009]}}, [1, -1], XY
-    )
-    moved = {"through": [[4.5, 4], [5, 5]], "starts_at": [4, 3], "relative": True}
+    start = [1, -1]
+    plain = spline_of(waypoints, start)
+    stated = spline_of(waypoints, start, starts_at=[1, -1.00009])
+    moved = spline_of([[4.5, 4], [5, 5]], start, starts_at=[4, 3], relative=True)
     sigma = np.linspace(0, plain.length, 9)
-    for curve in (stated, curve_of({"spline": moved}, [1, -1], XY)):
+    for curve in (stated, moved):
         assert_allclose(curve.derivatives(sigma), plain.derivatives(sigma), atol=1e-12)
 
 

@@ -83,8 +83,7 @@ def test_every_kind_of_segment_and_orientation_is_in_the_frame():
         local.target[:, :3] @ WORKPIECE.rotation.T + WORKPIECE.translation,
         atol=1e-12,
     )
-    rotations = (sample.target[:, 3:].reshape(-1, 3, 3) for sample in (world, local))
-    outer, inner = rotations
+    outer, inner = (sample.target[:, 3:].reshape(-1, 3, 3) for sample in (world, local))
     assert_allclose(outer, WORKPIECE.rotation @ inner, atol=1e-12)
     # Twists are those of the tool frame, whatever the frame of the path.
     for name in ("xi", "xi_ds", "xi_dds"):
@@ -152,9 +151,8 @@ def test_the_tool_is_where_the_frame_of_a_workpiece_says(tmp_path):
         assert_allclose(tool.translation[1:], start.translation[1:], atol=1e-7)
         turned = pin.log3(tool.rotation @ start.rotation.T)
         distance = tool.translation[0] - start.translation[0]
-        assert_allclose(
-            turned, [0.0, 0.0, np.radians(20.0) * distance / 0.1], atol=1e-6
-        )
+        angle = np.radians(20.0) * distance / 0.1
+        assert_allclose(turned, [0.0, 0.0, angle], atol=1e-6)
     assert_allclose(tool.translation, [0.12, 0.03, 0.05], atol=1e-7)
 
 
@@ -174,11 +172,8 @@ def test_frames_may_be_nested_as_deep_as_one_likes():
     }
     task = written(SEGMENTS, frames=frames, path_frame=names[-1])
     whole = pin.SE3(pin.exp6(count * pin.log6(place)))
-    assert_allclose(
-        place_frame(task.frames, names[-1]).transform.homogeneous,
-        whole.homogeneous,
-        atol=1e-9,
-    )
+    placed = place_frame(task.frames, names[-1]).transform
+    assert_allclose(placed.homogeneous, whole.homogeneous, atol=1e-9)
 
 
 TABLE = {"frame": "table", "segments": SEGMENTS}
@@ -216,7 +211,7 @@ TWO_FRAMES = {"workpiece": PLACE, "table": PLACE}
         (
             {"frame": "workpiece", "path": SEGMENTS},
             {},
-            r"path: a path in a frame is .*allowed: \{frame: NAME, segments",
+            r"path: a path in a frame needs .*allowed: \{frame: NAME, segments",
         ),
     ],
 )
@@ -227,10 +222,8 @@ def test_the_error_names_the_key_of_a_frame_that_does_not_fit(path, keys, messag
 
 def test_a_frame_cannot_turn_the_path_out_of_its_rows():
     tilted = written([{"line": {"by": [0.1, 0.0]}}], task_space=["x", "y"])
-    with pytest.raises(
-        PathError,
-        match=r"path_frame: .* turns the path out of the rows .*\[20.0, -35.0, 110.0\] with .*\[x, y\]",
-    ):
+    told = r"path_frame: .* turns the path out of the rows .*\[20.0, -35.0, 110.0\] with .*\[x, y\]"
+    with pytest.raises(PathError, match=told):
         brachis.plan(brachis.robots.scara3, tilted, start=[0.5, -2.0, 2.0])
 
 

@@ -119,7 +119,7 @@ def test_a_corner_is_refused_with_its_place():
         ({"knots": [1] * 5 + [0] * 5}, "not clamped"),
         (
             {"knots": [0] * 5 + [0.5, 0.5] + [1] * 5, "control_points": [START] * 7},
-            "occurs 2 times, so often .* third jumps; .*allowed: 1 times",
+            "occurs 2 times, so that .* third jumps; .*allowed: at most 1",
         ),
     ],
 )

@@ -20,14 +20,6 @@ from support.poses import (
     twist_by_difference,
 )
 
-SMOOTH = {
-    "rotate": {
-        "axis": [1, 2, -2],
-        "angle_deg": 140,
-        "frame": "tool",
-        "profile": "smooth",
-    }
-}
 ALONG = {"line": {"by": [0.6, 0, 0.3]}}
 
 SEGMENTS = yaml.safe_load("""
@@ -240,13 +232,13 @@ def test_the_twist_and_two_derivatives_continue_across_joins(name, breaks):
 
 
 def test_a_smooth_turn_joins_a_constant_orientation():
-    path = pose_path(
-        [
-            {"line": {"by": [0.3, 0, 0]}},
-            {"line": {"by": [0.4, 0, 0]}, "orientation": SMOOTH},
-            {"line": {"by": [0.2, 0, 0]}},
-        ]
-    )
+    segments = """
+    - line: {by: [0.3, 0, 0]}
+    - line: {by: [0.4, 0, 0]}
+      orientation: {rotate: {axis: [1, 2, -2], angle_deg: 140, frame: tool, profile: smooth}}
+    - line: {by: [0.2, 0, 0]}
+    """
+    path = pose_path(yaml.safe_load(segments))
     assert len(path.spans) == 3
     sample = path.sample(path.breaks)
     for what in (sample.xi, sample.xi_ds, sample.xi_dds):
@@ -256,15 +248,11 @@ def test_a_smooth_turn_joins_a_constant_orientation():
 
 
 def test_the_same_uniform_turn_may_go_on():
-    half = {
-        "line": {"by": [0.3, 0, 0]},
-        "orientation": {"rotate": {"axis": [0, 0, 1], "angle_deg": 30}},
-    }
-    other = {
-        "line": {"by": [0.6, 0, 0]},
-        "orientation": {"rotate": {"axis": [0, 0, 2], "angle_deg": 60}},
-    }
-    assert len(pose_path([half, other]).spans) == 2
+    segments = """
+    - {line: {by: [0.3, 0, 0]}, orientation: {rotate: {axis: [0, 0, 1], angle_deg: 30}}}
+    - {line: {by: [0.6, 0, 0]}, orientation: {rotate: {axis: [0, 0, 2], angle_deg: 60}}}
+    """
+    assert len(pose_path(yaml.safe_load(segments)).spans) == 2
 
 
 @pytest.mark.parametrize("frame", ["path", "tool"])
@@ -284,12 +272,8 @@ def test_a_rotation_has_a_constant_angular_velocity(frame):
 @pytest.mark.parametrize("profile", ["uniform", "smooth"])
 def test_to_ends_there_by_the_shortest_way(profile):
     target = Rotation.from_euler("xyz", [10, -80, 20], degrees=True)
-    path = pose_path(
-        [
-            ALONG
-            | {"orientation": {"to": {"rpy_deg": [10, -80, 20], "profile": profile}}}
-        ]
-    )
+    to = {"rpy_deg": [10, -80, 20], "profile": profile}
+    path = pose_path([ALONG | {"orientation": {"to": to}}])
     s = np.linspace(0, 1, 11)
     turned = (TURNED.inv() * rotations(path.sample(s).target)).as_rotvec()
     whole = (TURNED.inv() * target).as_rotvec()
@@ -322,12 +306,8 @@ def test_a_line_along_its_tangent_or_to_the_same_orientation_does_not_turn(orien
 def test_a_blend_of_a_turn_that_goes_on_keeps_close_to_it():
     """The polynomial of quaternions turns as the segments do, also by more than half a turn within the blend."""
     turning = {"rotate": {"axis": [0, 0, 1], "angle_deg": 500}}
-    path = pose_path(
-        [
-            {"line": {"by": [1, 0, 0]}, "orientation": turning, "blend": 0.3},
-            {"line": {"by": [1, 0, 0]}, "orientation": turning},
-        ]
-    )
+    line = {"line": {"by": [1, 0, 0]}, "orientation": turning}
+    path = pose_path([line | {"blend": 0.3}, line])
     s = np.linspace(0, 1, 200)
     turned = np.unwrap(
         (rotations(path.sample(s).target) * TURNED.inv()).as_rotvec()[:, 2]

@@ -22,35 +22,29 @@ def settings_of(**settings):
 
 
 def line(**robot):
-    return {
-        "brachis": 1,
-        "robot": robot,
-        "start": {"joints": START},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
-        "redundant_joints": ["j3"],
-        "spline": {"intervals": 10},
-        "search": {"effort": "single"},
-    }
+    content = yaml.safe_load("""
+    brachis: 1
+    task_space: [x, y]
+    path: [{line: {length: 0.5, angle_deg: 90}}]
+    redundant_joints: [j3]
+    spline: {intervals: 10}
+    search: {effort: single}
+    """)
+    return {"robot": robot, "start": {"joints": START}, **content}
 
 
 def test_every_part_of_the_task_counts():
-    settings = settings_of(
-        gravity=[0, -9.81, 0],
-        limits={
-            "torque": 7,
-            "velocity": 3,
-            "acceleration": 20,
-            "position": [[-3, 3]] * 3,
-            "scale": {"torque": 0.5},
-        },
-        friction={
-            "armature": 0.1,
-            "viscous": [1, 2, 3],
-            "coulomb": {"j2": 0.5},
-            "coulomb_velocity": 0.02,
-        },
-    )
+    text = """
+    gravity: [0, -9.81, 0]
+    limits:
+      torque: 7
+      velocity: 3
+      acceleration: 20
+      position: [[-3, 3], [-3, 3], [-3, 3]]
+      scale: {torque: 0.5}
+    friction: {armature: 0.1, viscous: [1, 2, 3], coulomb: {j2: 0.5}, coulomb_velocity: 0.02}
+    """
+    settings = settings_of(**yaml.safe_load(text))
     made = robot_for(Robot.from_urdf(SCARA), settings)
     alone = robot_for(SCARA, settings)
     assert made.settings == alone.settings
@@ -100,29 +94,30 @@ def test_limits_are_combined_joint_by_joint():
 
 
 @pytest.mark.parametrize(
-    ("settings", "key"),
+    ("options", "settings", "key"),
     [
-        ("gravity: [0, 0, -1.6]", "robot.gravity"),
-        ("tool_frame: link2", "robot.tool_frame"),
-        ("limits: {torque: {j2: 20}}", "robot.limits.torque.j2"),
-        ("limits: {velocity: 20}", "robot.limits.velocity.j1"),
-        ("limits: {scale: {torque: 0.5}}", "robot.limits.scale.torque"),
-        ("friction: {coulomb: {j3: 1.0}}", "robot.friction.coulomb.j3"),
-        ("locked_joints: {j3: 0.5}", "robot.locked_joints.j3"),
+        ("{}", "gravity: [0, 0, -1.6]", "gravity"),
+        ("tool_frame: tool", "tool_frame: link2", "tool_frame"),
+        ("{}", "limits: {torque: {j2: 20}}", "limits.torque.j2"),
+        ("{}", "limits: {velocity: 20}", "limits.velocity.j1"),
+        (
+            "limits: {scale: {torque: 0.25}}",
+            "limits: {scale: {torque: 0.5}}",
+            "limits.scale.torque",
+        ),
+        (
+            "friction: {coulomb: 0.5}",
+            "friction: {coulomb: {j3: 1.0}}",
+            "friction.coulomb.j3",
+        ),
+        ("locked_joints: {j3: 0.4}", "locked_joints: {j3: 0.5}", "locked_joints.j3"),
     ],
 )
-def test_a_contradiction_is_refused_with_its_key(settings, key):
-    options = {
-        "robot.tool_frame": {"tool_frame": "tool"},
-        "robot.limits.scale.torque": {"limits": {"scale": {"torque": 0.25}}},
-        "robot.friction.coulomb.j3": {"friction": {"coulomb": 0.5}},
-        "robot.locked_joints.j3": {"locked_joints": {"j3": 0.4}},
-    }
+def test_a_contradiction_is_refused_with_its_key(options, settings, key):
+    robot = scara(**yaml.safe_load(options))
     with pytest.raises(TaskError, match="contradict") as caught:
-        robot_for(
-            scara(**options.get(key, {})), settings_of(**yaml.safe_load(settings))
-        )
-    assert caught.value.where == key
+        robot_for(robot, settings_of(**yaml.safe_load(settings)))
+    assert caught.value.where == f"robot.{key}"
 
 
 def test_what_a_task_writes_counts_even_where_it_is_the_default():

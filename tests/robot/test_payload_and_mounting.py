@@ -18,18 +18,11 @@ from support.chains import Joint, chain_urdf, planar_urdf
 ROOT = Path(__file__).parents[2]
 IIWA = (ROOT / "robots/iiwa14/robot.urdf").read_text()
 TOOL = "tool"
-PAYLOAD = {
-    "mass": 4.5,
-    "com": [0.05, -0.02, 0.11],
-    "inertia": {
-        "ixx": 0.03,
-        "iyy": 0.04,
-        "izz": 0.02,
-        "ixy": 0.004,
-        "ixz": -0.002,
-        "iyz": 0.003,
-    },
-}
+PAYLOAD = yaml.safe_load("""
+mass: 4.5
+com: [0.05, -0.02, 0.11]
+inertia: {ixx: 0.03, iyy: 0.04, izz: 0.02, ixy: 0.004, ixz: -0.002, iyz: 0.003}
+""")
 LOAD = """
   <link name="load"><inertial><origin xyz="0.05 -0.02 0.11"/><mass value="4.5"/>
     <inertia ixx="0.03" ixy="0.004" ixz="-0.002" iyy="0.04" iyz="0.003" izz="0.02"/></inertial></link>
@@ -144,16 +137,8 @@ def test_rotors_that_cannot_be(friction, words):
         of(planar_urdf("RRP"), friction=friction)
 
 
-DAMPED = chain_urdf(
-    [
-        Joint(
-            "revolute",
-            xyz=(0.4, 0.0, 0.0),
-            extra="<dynamics damping='7' friction='3'/>",
-        ),
-        Joint("prismatic"),
-    ]
-)
+DYNAMICS = "<dynamics damping='7' friction='3'/>"
+DAMPED = chain_urdf([Joint("revolute", extra=DYNAMICS), Joint("prismatic")])
 
 
 def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
@@ -162,16 +147,12 @@ def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
         ({"viscous": {"j2": 4}}, [7, 4], [3, 0]),
         ({"viscous": "urdf", "coulomb": 1.5}, [7, 0], [1.5, 1.5]),
     ):
-        robot = robot_for(
-            of(DAMPED, friction=friction),
-            check_robot_settings({"friction": friction}),
-        )
+        settings = check_robot_settings({"friction": friction})
+        robot = robot_for(of(DAMPED, friction=friction), settings)
         assert_array_equal(robot.friction.viscous, viscous)
         assert_array_equal(robot.friction.coulomb, coulomb)
-    said = in_use(of(DAMPED))
-    assert (
-        said["viscous friction"] == "j1 7 Nm s/rad, j2 0 N s/m (as the URDF states it)"
-    )
+    said = in_use(of(DAMPED))["viscous friction"]
+    assert said == "j1 7 Nm s/rad, j2 0 N s/m (as the URDF states it)"
     off = in_use(of(DAMPED, friction={"viscous": None}))
     assert off["viscous friction"] == "none (other than the URDF's)"
 
@@ -204,49 +185,35 @@ def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
     full, half = (of(plain, speed_override=factor) for factor in (1.0, 0.5))
     assert_array_equal(half.limits.velocity, 0.5 * full.limits.velocity)
     assert_array_equal(half.limits.torque, full.limits.torque)
-    slow = robot_for(
-        half, check_robot_settings({"limits": {"scale": {"velocity": 0.5}}})
-    )
+    scale = {"limits": {"scale": {"velocity": 0.5}}}
+    slow = robot_for(half, check_robot_settings(scale))
     assert_array_equal(slow.limits.velocity, 0.25 * full.limits.velocity)
-    assert check_robot_settings(
-        {"speed_override": "30 %"}
-    ).speed_override == pytest.approx(0.3)
+    percent = check_robot_settings({"speed_override": "30 %"})
+    assert percent.speed_override == pytest.approx(0.3)
     for wrong in (0.0, 1.2, -1.0):
         with pytest.raises(TaskError, match="speed_override: out of range"):
             of(plain, speed_override=wrong)
     with pytest.raises(
         InputError, match="the speed override has no velocity limit to scale"
     ):
-        of(
-            plain,
-            speed_override=0.5,
-            limits=brachis.LimitSpec(velocity=None),
-        )
+        of(plain, speed_override=0.5, limits=brachis.LimitSpec(velocity=None))
 
 
 @pytest.mark.parametrize(
-    ("options", "settings", "key"),
+    ("section", "ours", "theirs", "key"),
     [
-        ({"payload": {"mass": 4.5}}, {"payload": {"mass": 2}}, "payload"),
-        (
-            {"tool_offset": {"xyz": [0, 0, 1]}},
-            {"tool_offset": {"xyz": [0, 0, 2]}},
-            "tool_offset.xyz",
-        ),
-        ({"mounting": "wall"}, {"mounting": "floor"}, "mounting.rpy_deg"),
-        ({"speed_override": 0.5}, {"speed_override": 0.7}, "speed_override"),
-        (
-            {"friction": {"coulomb": None}},
-            {"friction": {"coulomb": 1.0}},
-            "friction.coulomb",
-        ),
+        ("payload", {"mass": 4.5}, {"mass": 2}, ""),
+        ("tool_offset", {"xyz": [0, 0, 1]}, {"xyz": [0, 0, 2]}, ".xyz"),
+        ("mounting", "wall", "floor", ".rpy_deg"),
+        ("speed_override", 0.5, 0.7, ""),
+        ("friction", {"coulomb": None}, {"coulomb": 1.0}, ".coulomb"),
     ],
     ids=str,
 )
-def test_contradictions_are_refused_with_their_key(options, settings, key):
+def test_contradictions_are_refused_with_their_key(section, ours, theirs, key):
     with pytest.raises(TaskError, match="contradict") as caught:
-        robot_for(of(IIWA, **options), check_robot_settings(settings))
-    assert caught.value.where.startswith(f"robot.{key}")
+        robot_for(of(IIWA, **{section: ours}), check_robot_settings({section: theirs}))
+    assert caught.value.where.startswith(f"robot.{section}{key}")
 
 
 @pytest.mark.parametrize(
@@ -258,7 +225,7 @@ def test_contradictions_are_refused_with_their_key(options, settings, key):
             "payload: {mass: 1, inertia: {ixx: 1, iyy: 1, izz: 9}}",
             r"payload\.inertia: the payload has a non-physical inertia",
         ),
-        ("mounting: roof", "mounting: no mounting.*floor, wall, ceiling"),
+        ("mounting: roof", "mounting: this is not a mounting.*floor, wall, ceiling"),
         ("tool_offset: {xyz: [0, 0]}", r"tool_offset\.xyz"),
     ],
 )
@@ -283,8 +250,6 @@ def test_the_summary_names_joints_without_a_limit_on_their_acceleration():
 
 def test_slower_limits_are_said_to_be_in_use():
     slower = brachis.LimitSpec(scale={"velocity": 0.1})
-    assert (
-        in_use(of(DAMPED, limits=slower))["limits"]
-        == "velocity 10 % of what is stated (limits.scale)"
-    )
+    said = in_use(of(DAMPED, limits=slower))["limits"]
+    assert said == "velocity 10 % of what is stated (limits.scale)"
     assert "limits" not in in_use(of(DAMPED))

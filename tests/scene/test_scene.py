@@ -60,26 +60,43 @@ def task(name="iiwa14", scene=BODIES, mounting="floor", **collisions):
 
 
 def scene(name="iiwa14", bodies=BODIES, **collisions):
-    given = task(name, bodies, **collisions)
-    robot = robot_for(None, given.robot)
+    robot, given = robot_and_task(name, bodies, **collisions)
     return robot, scene_of(robot, given)
+
+
+def robot_and_task(*arguments, **options):
+    given = task(*arguments, **options)
+    return robot_for(None, given.robot), given
+
+
+def build_limit(name="iiwa14"):
+    """The limit, and postures of its robot."""
+    robot, given = robot_and_task(name)
+    return build_clearance(robot, given), postures(robot)
+
+
+def pair_names(found):
+    return [found.names(pair) for pair in range(len(found.pairs))]
 
 
 def postures(robot, count=40):
     return np.random.default_rng(1).uniform(-1.5, 1.5, (count, robot.n))
 
 
+def place(robot, count=40):
+    return Chain.of(robot.model).place(postures(robot, count))
+
+
 def everything(found, placed):
     """All pairs in all postures."""
-    count = len(found.pairs)
-    posture = np.arange(len(placed[0])).repeat(count)
-    return found.measure(placed, posture, np.tile(np.arange(count), len(placed[0])))
+    posture, pair = np.indices((len(placed[0]), len(found.pairs)))
+    return found.measure(placed, posture.ravel(), pair.ravel())
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_joints_and_solids_stand_where_pinocchio_and_the_text_say(name):
-    given = task(name, mounting={"xyz": [0.1, 0.2, 0.3], "rpy_deg": [5, 6, 7]})
-    robot = robot_for(None, given.robot)
+    mounting = {"xyz": [0.1, 0.2, 0.3], "rpy_deg": [5, 6, 7]}
+    robot, given = robot_and_task(name, mounting=mounting)
     q = postures(robot)
     placed = Chain.of(robot.model).place(q)
     for k, data in enumerate(robot.place_joints(q)):
@@ -100,16 +117,15 @@ def test_joints_and_solids_stand_where_pinocchio_and_the_text_say(name):
 
 
 def test_distances_of_balls_and_planes_are_those_of_formulas():
-    bodies = [
-        {"name": "ball", "sphere": 0.1, "position": [0.5, 0.3, 0.7]},
-        {"name": "held", "sphere": 0.05, "link": "tool", "position": [0, 0, 0.2]},
-        {"name": "floor", "half_space": {"normal": [0, 0, 2], "offset": 0.2}},
-    ]
+    bodies = yaml.safe_load("""
+    - {name: ball, sphere: 0.1, position: [0.5, 0.3, 0.7]}
+    - {name: held, sphere: 0.05, link: tool, position: [0, 0, 0.2]}
+    - {name: floor, half_space: {normal: [0, 0, 2], offset: 0.2}}
+    """)
     robot, found = scene(bodies=bodies)
-    q = postures(robot)
-    position, turned = robot.tool_placements(q)
+    position, turned = robot.tool_placements(postures(robot))
     held = position + turned @ [0.0, 0.0, 0.2]
-    near = everything(found, Chain.of(robot.model).place(q))
+    near = everything(found, place(robot))
     names = [found.names(pair) for pair in near.pair]
     apart = {
         "ball and held": np.linalg.norm(held - [0.5, 0.3, 0.7], axis=1) - 0.15,
@@ -123,7 +139,7 @@ def test_distances_of_balls_and_planes_are_those_of_formulas():
 @pytest.mark.parametrize("name", NAMES)
 def test_no_bound_is_above_the_distance(name):
     robot, found = scene(name)
-    placed = Chain.of(robot.model).place(postures(robot))
+    placed = place(robot)
     near = everything(found, placed)
     bounds = found.bounds(placed)[near.posture, near.pair]
     assert np.all(bounds <= near.distance + 1e-6)
@@ -140,7 +156,7 @@ def test_mujoco_finds_the_same_distances(name):
     model, order = mujoco_model(robot)
     data = mujoco.MjData(model)
     q = postures(robot, 10)
-    near = everything(found, Chain.of(robot.model).place(q))
+    near = everything(found, place(robot, 10))
     geoms = {}
     for geom in range(model.ngeom):
         link = model.body(model.geom_bodyid[geom]).name
@@ -166,19 +182,12 @@ def test_mujoco_finds_the_same_distances(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_slopes_agree_with_differences(name):
-    given = task(name)
-    robot = robot_for(None, given.robot)
-    limit = build_clearance(robot, given)
-    q = postures(robot)
+    limit, q = build_limit(name)
     values = limit.values(Moments.at_rest(q))
     exact = limit.partials(Moments.at_rest(q)).q
     step = 1e-5
-    for joint in range(robot.n):
-        moved = []
-        for sign in (1.0, -1.0):
-            other = q.copy()
-            other[:, joint] += sign * step
-            moved.append(limit.values(Moments.at_rest(other)))
+    for joint, move in enumerate(step * np.eye(q.shape[1])):
+        moved = [limit.values(Moments.at_rest(q + sign * move)) for sign in (1.0, -1.0)]
         far = values.max() - 1e-9
         is_near = (values > 0.0) & (values < far) & (moved[0] < far) & (moved[1] < far)
         slopes = (moved[0] - moved[1]) / (2.0 * step)
@@ -197,7 +206,7 @@ def test_links_that_meet_or_always_touch_are_no_pairs():
     }
     assert frozenset({"link_2", "link_5"}) in links
     assert frozenset({"link_3", "link_4"}) not in links
-    near = everything(found, Chain.of(robot.model).place(postures(robot, 300)))
+    near = everything(found, place(robot, 300))
     touching = np.bincount(near.pair[near.distance < 0.0], minlength=len(found.pairs))
     assert touching.max() < 300
 
@@ -205,9 +214,7 @@ def test_links_that_meet_or_always_touch_are_no_pairs():
 def test_pairs_are_disabled_by_link_and_by_name():
     _, found = scene()
     _, fewer = scene(disable=[["link_2", "link_5"], ["ball", "link_7"]])
-    names = {found.names(pair) for pair in range(len(found.pairs))}
-    kept = {fewer.names(pair) for pair in range(len(fewer.pairs))}
-    assert names - kept == {
+    assert {*pair_names(found)} - {*pair_names(fewer)} == {
         "link_2 and link_5 0",
         "link_2 and link_5 1",
         "link_7 and ball",
@@ -219,12 +226,11 @@ def test_pairs_are_disabled_by_link_and_by_name():
 def test_padding_makes_links_larger():
     robot, found = scene()
     _, padded = scene(padding={"link_6": 0.02})
-    placed = Chain.of(robot.model).place(postures(robot, 5))
-    apart = everything(found, placed).distance - everything(padded, placed).distance
-    own = np.array(
-        ["link_6" in found.names(pair) for pair in range(len(found.pairs))] * 5
-    )
-    is_apart = everything(padded, placed).distance > 0.0
+    placed = place(robot, 5)
+    remaining = everything(padded, placed).distance
+    apart = everything(found, placed).distance - remaining
+    own = np.array(["link_6" in pair for pair in pair_names(found)] * 5)
+    is_apart = remaining > 0.0
     assert_allclose(apart[own & is_apart], 0.02, atol=1e-8)
     assert_allclose(apart[~own], 0.0, atol=1e-8)
 
@@ -239,7 +245,7 @@ def test_padded_balls_are_found_from_as_far_away_as_they_are_large(tmp_path):
     urdf.write_text(text[:shape] + '<sphere radius="0.05"/>' + text[end:])
     robot = brachis.Robot.from_urdf(urdf)
     found = scene_of(robot, task(padding={"link_7": 0.3}))
-    placed = Chain.of(robot.model).place(postures(robot))
+    placed = place(robot)
     near = everything(found, placed)
     is_close = near.distance < 0.2
     assert len(found.find_close(placed, 0.2).pair) == np.count_nonzero(is_close)
@@ -249,7 +255,7 @@ def test_padded_balls_are_found_from_as_far_away_as_they_are_large(tmp_path):
 
 def test_every_posture_has_its_closest_pair():
     robot, found = scene()
-    placed = Chain.of(robot.model).place(postures(robot))
+    placed = place(robot)
     every = everything(found, placed)
     closest = found.find_closest(placed)
     assert_array_equal(closest.posture, np.arange(40))
@@ -259,10 +265,7 @@ def test_every_posture_has_its_closest_pair():
 
 
 def test_the_limit_has_only_pairs_that_come_close():
-    given = task()
-    robot = robot_for(None, given.robot)
-    limit = build_clearance(robot, given)
-    q = postures(robot)
+    limit, q = build_limit()
     kept = limit.restrict_to(q)
     assert 0 < len(kept.lower) < len(limit.lower)
     assert_allclose(kept.lower * UNIT, 0.01)
@@ -270,10 +273,7 @@ def test_the_limit_has_only_pairs_that_come_close():
 
 
 def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
-    given = task()
-    robot = robot_for(None, given.robot)
-    limit = build_clearance(robot, given)
-    q = postures(robot)
+    limit, q = build_limit()
     distances = limit.values(Moments.at_rest(q))
     apart = np.argmax(distances.min(axis=1))
     added = limit.keep_inside(q[[apart]]).lower - limit.lower
@@ -297,7 +297,10 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
         ("half_space: {normal: [0, 0, 0]}", "cannot have zero length"),
         ("{half_space: {normal: [0, 0, 1]}, link: tool}", "fixed to the world"),
         ("{sphere: 1.0, link: tol}", "tool"),
-        ("{half_space: {normal: [0, 0, 1]}, position: [0, 0, 1]}", "no other place"),
+        (
+            "{half_space: {normal: [0, 0, 1]}, position: [0, 0, 1]}",
+            "placed by its plane",
+        ),
         ("mesh: missing.stl", "missing.stl"),
     ],
 )
@@ -310,16 +313,15 @@ def test_names_of_bodies_are_unique_and_links_exist():
     twice = [{"name": "a", "sphere": 0.1}, {"name": "a", "sphere": 0.2}]
     with pytest.raises(InputError, match="two bodies have this name"):
         scene(bodies=twice)
-    with pytest.raises(InputError, match="link_6"):
-        scene(padding={"link_66": 0.1})
-    with pytest.raises(InputError, match="link_6"):
-        scene(disable=[["link_66", "ball"]])
+    for wrong in ({"padding": {"link_66": 0.1}}, {"disable": [["link_66", "ball"]]}):
+        with pytest.raises(InputError, match="link_6"):
+            scene(**wrong)
 
 
 def test_a_link_that_is_disabled_does_not_free_what_it_holds():
     held = {"name": "torch", "sphere": 0.05, "link": "link_7", "position": [0, 0, 0.2]}
     _, found = scene(bodies=[held, BODIES[0]], disable=[["link_7", "box"]])
-    names = {found.names(pair) for pair in range(len(found.pairs))}
+    names = pair_names(found)
     assert "torch and box" in names
     assert "link_7 and box" not in names
 
@@ -328,7 +330,7 @@ def test_a_body_that_is_always_hit_stays():
     """Only the robot's own links that always touch are left out."""
     stand = {"name": "stand", "box": [0.5, 0.5, 0.8], "position": [0, 0, 0.4]}
     _, found = scene(bodies=[stand])
-    names = {found.names(pair) for pair in range(len(found.pairs))}
+    names = pair_names(found)
     assert "link_1 0 and stand" in names
     assert "link_0 and stand" not in names
 

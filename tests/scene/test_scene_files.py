@@ -81,25 +81,16 @@ def write(folder, name, content):
 
 
 def test_bodies_in_python_are_those_of_a_file(tmp_path):
-    content = {
-        "brachis_scene": 1,
-        "bodies": [
-            {
-                "box": [0.1, 0.1, 1.2],
-                "position": [0.5, 0.2, 0.6],
-                "rpy_deg": [0, 0, 30],
-            },
-            {"name": "ball", "sphere": 0.04, "position": [0.4, 0.2, 0.5]},
-            {
-                "name": "torch",
-                "capsule": {"radius": 0.03, "length": 0.3},
-                "link": "tool",
-            },
-            {"name": "drum", "cylinder": {"radius": 0.3, "length": 0.1}},
-            {"name": "floor", "half_space": {"normal": [0, 0, 1], "offset": -0.1}},
-        ],
-    }
-    write(tmp_path, "cell.yaml", content)
+    text = """
+    brachis_scene: 1
+    bodies:
+    - {box: [0.1, 0.1, 1.2], position: [0.5, 0.2, 0.6], rpy_deg: [0, 0, 30]}
+    - {name: ball, sphere: 0.04, position: [0.4, 0.2, 0.5]}
+    - {name: torch, capsule: {radius: 0.03, length: 0.3}, link: tool}
+    - {name: drum, cylinder: {radius: 0.3, length: 0.1}}
+    - {name: floor, half_space: {normal: [0, 0, 1], offset: -0.1}}
+    """
+    write(tmp_path, "cell.yaml", text)
     file = write(tmp_path, "task.yaml", {**TASK, "scene": {"file": "cell.yaml"}})
     in_file = brachis.load_task(file).scene
     in_python = [
@@ -154,10 +145,7 @@ def test_an_srdf_disables_pairs(tmp_path):
 @pytest.mark.parametrize(
     ("scene", "says"),
     [
-        (
-            {"fil": "cell.yaml"},
-            r"allowed: a list.*file: cell.yaml",
-        ),
+        ({"fil": "cell.yaml"}, r"allowed: a list.*file: cell.yaml"),
         ({"file": "absent.yaml"}, r"absent.yaml"),
         ([{"bx": [1, 1, 1]}], r"scene\[0\].*bx"),
         ([{"name": "a", "sphere": "1"}], r"scene\[0\].sphere.*a number"),
@@ -302,13 +290,12 @@ def test_lengths_and_masses_whose_squares_overflow_are_errors(keys):
 @pytest.mark.parametrize(
     "body",
     [
-        {"box": [0.1, 1e5, 0.1]},
-        {"sphere": 1e5},
-        {"capsule": {"radius": 0.1, "length": 1e5}},
-        {"mesh": "body.stl", "scale": 1e5},
-        {"urdf": "cell.urdf"},
+        "box: [0.1, 100000.0, 0.1]",
+        "sphere: 100000.0",
+        "capsule: {radius: 0.1, length: 100000.0}",
+        "{mesh: body.stl, scale: 100000.0}",
+        "urdf: cell.urdf",
     ],
-    ids=str,
 )
 def test_bodies_that_are_too_large_for_exact_distances_are_errors(
     body, tmp_path, monkeypatch
@@ -319,7 +306,7 @@ def test_bodies_that_are_too_large_for_exact_distances_are_errors(
     cell = f'<link name="cell"><collision>{box}</collision></link>'
     (tmp_path / "cell.urdf").write_text(f'<robot name="cell">{cell}</robot>')
     with pytest.raises(InputError, match=r"too large .*allowed: at most 10000 m"):
-        scene_with(scene=[body])
+        scene_with(scene=[yaml.safe_load(body)])
 
 
 def test_padding_that_makes_a_link_too_large_is_an_error():

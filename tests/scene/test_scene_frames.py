@@ -28,17 +28,22 @@ def transform(place):
 
 
 def task(**keys):
-    box = {"box": [0.1, 0.05, 0.04], "name": "clamp", "frame": "user1"}
-    content = {
-        "brachis": 1,
-        "robot": {"urdf": "iiwa14"},
-        "frames": {"table": TABLE, "user1": USER},
-        "start": {"joints": START},
-        "task_space": "pose",
-        "collisions": {"self_collision": False},
-        "path": [{"line": {"by": [0.0, 0.1, 0.0]}}],
-        "scene": [{**box, "position": CLAMP["xyz"], "rpy_deg": CLAMP["rpy_deg"]}],
-    }
+    content = yaml.safe_load("""
+    brachis: 1
+    robot: {urdf: iiwa14}
+    start: {joints: [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0]}
+    task_space: pose
+    collisions: {self_collision: false}
+    path: [{line: {by: [0.0, 0.1, 0.0]}}]
+    """)
+    clamp = brachis.Box(
+        [0.1, 0.05, 0.04],
+        name="clamp",
+        frame="user1",
+        position=CLAMP["xyz"],
+        rpy_deg=CLAMP["rpy_deg"],
+    )
+    content |= {"frames": {"table": TABLE, "user1": USER}, "scene": [clamp]}
     changes = keys.pop("changes", None)
     return load_task(content | keys, changes=changes)
 
@@ -80,9 +85,8 @@ def test_the_plane_of_a_half_space_is_in_its_frame():
 
 def test_the_clearance_stays_where_robot_and_frame_move_together():
     """And changes where only one of them moves."""
-    step = transform({"xyz": [0.3, -0.1, 0.2], "rpy_deg": [0.0, 0.0, 40.0]})
-    table = step * transform(TABLE)
     mounting = {"xyz": [0.3, -0.1, 0.2], "rpy_deg": [0.0, 0.0, 40.0]}
+    table = transform(mounting) * transform(TABLE)
     robot = {"urdf": "iiwa14", "mounting": mounting}
     plain = clearance(task())
     both = task(robot=robot, frames={"table": table, "user1": USER})

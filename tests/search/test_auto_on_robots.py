@@ -1,7 +1,5 @@
 """Everything left open on spatial arms, and on random postures and lines (all of them: `benchmarks/random_auto.py`)."""
 
-from __future__ import annotations
-
 import pytest
 
 import brachis

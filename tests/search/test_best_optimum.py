@@ -3,8 +3,6 @@
 All lines, with more restarts: `studies/scara_restarts.py`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

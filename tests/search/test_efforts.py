@@ -1,7 +1,5 @@
 """The page on the search states the efforts as they are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from brachis.search.guesses import SCREENED, SEARCH_LEVELS

@@ -1,12 +1,9 @@
 """First guesses of motions with stops, given speeds and moving ends, on a slide."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 import brachis
-from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
@@ -15,7 +12,7 @@ from brachis.search.phase_plane import initial_guess
 from brachis.task import task_with
 
 
-def guess(content: dict, *, is_timed: bool) -> tuple[Problem, Program, np.ndarray]:
+def guess(content, *, is_timed):
     task = task_with(
         robot={"urdf": "gantry2"},
         gravity=[0, 0, 0],

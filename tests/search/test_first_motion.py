@@ -1,10 +1,7 @@
 """A first motion, where there is little time: near a joint path, and within all limits."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
+import yaml
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
@@ -12,24 +9,20 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_for
 from brachis.search.first_motion import find_first_motion
 from brachis.search.guesses import first_guess
-from brachis.search.stages import InitialGuess
 from brachis.task import task_with
 
-EXTRAS: dict[str, dict[str, Any]] = {
-    "nothing else": {},
-    "a process speed": {
-        "tool_limits": {"process_speed": {"speed": 0.2, "s": [0.3, 0.7]}}
-    },
-    "a stop": {
-        "path": [
-            {"line": {"by": [0.0, 0.5]}, "stop": True},
-            {"line": {"by": [0.0, 0.3]}},
-        ]
-    },
-}
+EXTRAS = yaml.safe_load("""
+nothing else: {}
+a process speed:
+  tool_limits: {process_speed: {speed: 0.2, s: [0.3, 0.7]}}
+a stop:
+  path:
+  - {line: {by: [0.0, 0.5]}, stop: true}
+  - {line: {by: [0.0, 0.3]}}
+""")
 
 
-def guess_with(extras: dict[str, Any]) -> InitialGuess:
+def guess_with(extras):
     keys = {"path": brachis.Line(by=[0.0, 0.8]), **extras}
     task = task_with(
         robot={"urdf": "scara3"},
@@ -44,12 +37,12 @@ def guess_with(extras: dict[str, Any]) -> InitialGuess:
 
 
 @pytest.mark.parametrize("extras", EXTRAS.values(), ids=EXTRAS)
-def test_a_first_motion_keeps_all_limits(extras: dict[str, Any]) -> None:
+def test_a_first_motion_keeps_all_limits(extras):
     outcome = find_first_motion(guess_with(extras), NEVER)
     assert outcome.status == "verified"
     assert outcome.t_end < 20.0
 
 
-def test_without_time_there_is_no_first_motion() -> None:
+def test_without_time_there_is_no_first_motion():
     guess = guess_with(EXTRAS["a process speed"])
     assert not find_first_motion(guess, Deadline(0.0)).verified

@@ -1,9 +1,6 @@
 """A root-mean-square torque below what holds the arm is named, with a number that is enough."""
 
-from __future__ import annotations
-
 import re
-from typing import Any
 
 import pytest
 
@@ -15,7 +12,7 @@ WEIGHT = 5.0 * 9.81
 """N, of what the gantry's y axis carries."""
 
 
-def lift(limit: float, **changes: Any) -> brachis.Task:
+def lift(limit, **changes):
     """Lift the tool of the gantry by 0.4 m."""
     limits = {"torque": 200.0, "rms_torque": {"y_axis": limit}}
     return task_with(

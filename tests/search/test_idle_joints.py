@@ -1,7 +1,5 @@
 """Joints that move no row of the task space stand still, unless moving them pays or a given posture asks for it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal

@@ -1,7 +1,5 @@
 """What a search says of bodies in the way of all joint paths that it knows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

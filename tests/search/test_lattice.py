@@ -3,16 +3,14 @@
 And lattices where ranges, turns, limits or paths are out of the ordinary.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 import brachis
 from brachis.errors import PathError, PlanningError
@@ -24,7 +22,7 @@ from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import stations
 from brachis.search.posture_lattice import PostureLattice
 from support.joint_paths import check_joint_path
-from support.scara import START, scara
+from support.scara import RANGES, START, scara
 from support.scara import problem as scara_problem
 
 ROOT = Path(__file__).parents[2]
@@ -43,24 +41,22 @@ LINE = {
 }
 
 
-def problem(robot: brachis.Robot, **changes: Any) -> Problem:
+def problem(robot, **changes):
     return scara_problem(robot, **(LINE | changes))
 
 
-def content_of(name: str) -> dict[str, Any]:
+def content_of(name):
     return brachis.load_task(ROOT / "examples" / name).to_dict()
 
 
-def problem_of(content: dict[str, Any]) -> Problem:
+def problem_of(content):
     task = brachis.load_task(content)
     return Problem.of(robot_from_settings(task.robot), task)
 
 
 CASES = {
     "planar": lambda: problem(scara()),
-    "ranges": lambda: problem(
-        scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}})
-    ),
+    "ranges": lambda: problem(scara(RANGES)),
     "free start": lambda: problem(
         scara(), start="free", path_start=[math.sqrt(3.0), 0.0]
     ),
@@ -72,7 +68,7 @@ CASES = {
 }
 
 
-def courses_of(line_problem: Problem, count: int) -> Any:
+def courses_of(line_problem, count):
     """Joint paths of the first closed form."""
     return ClosedFormLattice(decompositions_of(line_problem)[0]).joint_paths(count)
 
@@ -109,20 +105,20 @@ def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
 
 REASONS = {
     "out of reach": (
-        {},
-        {"path": [{"line": {"to": [4.0, 0.0]}}]},
+        "{}",
+        "path: [{line: {to: [4.0, 0.0]}}]",
         "it is out of reach",
         "out of reach from",
     ),
     "joint range": (
-        {"limits": {"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}},
-        {"redundant_joints": ["j1"]},
+        "limits: {position: {j1: [0.3, 0.8], j2: [-2.2, -1.9]}}",
+        "redundant_joints: [j1]",
         "the range of joint 'j",
         r"within the joint ranges .*joint 'j2' 0.\d+ rad beyond its range, -2.2 to -1.9 rad",
     ),
     "gravity": (
-        {"gravity": [0, -9.81, 0], "limits": {"torque": [280.0, 200.0, 100.0]}},
-        {"path": [{"line": {"to": [2.8, 0.0]}}]},
+        "{gravity: [0, -9.81, 0], limits: {torque: [280.0, 200.0, 100.0]}}",
+        "path: [{line: {to: [2.8, 0.0]}}]",
         "the torque limit of j1 cannot hold",
         "the torque limit cannot hold",
     ),
@@ -132,7 +128,8 @@ REASONS = {
 @pytest.mark.parametrize("case", REASONS)
 def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
-    line_problem = problem(scara(**options), **changes)
+    robot = scara(**yaml.safe_load(options))
+    line_problem = problem(robot, **yaml.safe_load(changes))
     ends = [
         lattice_guesses(decomposition, SEARCH_LEVELS["fast"][0])
         for decomposition in decompositions_of(line_problem)
@@ -153,10 +150,10 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
     task = content_of(RAIL)
     task["robot"]["limits"]["position"] = {"rail": [-0.01, 0.01]}
     task["path"] = [{"line": {"by": [0.0, 1.9, 0.0]}}]
-    with pytest.raises(
-        PathError,
-        match=r"within the joint ranges .*joint 'rail' .* beyond its range, -0.01 to 0.01 m",
-    ):
+    told = (
+        r"within the joint ranges .*joint 'rail' .* beyond its range, -0.01 to 0.01 m"
+    )
+    with pytest.raises(PathError, match=told):
         brachis.plan(task)
 
 
@@ -214,20 +211,15 @@ def test_small_circles_have_stations_enough(turns, joints):
 
 def test_an_end_posture_without_redundancy_may_have_few_digits():
     robot = scara(locked_joints={"j3": 0.4})
-    line = [{"line": {"by": [-0.3, 0.2]}}]
-    free = brachis.plan(
-        robot, problem(robot, start={"joints": [0.3, 0.9]}, path=line).task
-    )
-    end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
-    line_problem = problem(
-        robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end}
-    )
+    path = [{"line": {"by": [-0.3, 0.2]}}]
+    line = {"start": {"joints": [0.3, 0.9]}, "path": path}
+    free = brachis.plan(robot, problem(robot, **line).task)
+    end = free.trajectory.position(free.t_end).round(7).tolist()
+    line_problem = problem(robot, **line, end={"joints": end})
     assert not isinstance(courses_of(line_problem, 1), DeadEnd)
 
 
-def back_from(
-    end: np.ndarray, robot: brachis.Robot, by: list[float]
-) -> dict[str, object]:
+def back_from(end, robot, by):
     """A task of a line that ends in a posture and may begin in any."""
     placement = robot.tool_placement(end)
     return {
@@ -246,12 +238,12 @@ def back_from(
 @pytest.mark.parametrize(
     "turned",
     [
-        {},
-        {"shoulder_pan_joint": -1},
-        {"wrist_1_joint": 1},
-        {"wrist_3_joint": -1},
-        {"shoulder_lift_joint": 1, "wrist_2_joint": 1},
-        {"wrist_1_joint": 1, "wrist_3_joint": -1},
+        "{}",
+        "shoulder_pan_joint: -1",
+        "wrist_1_joint: 1",
+        "wrist_3_joint: -1",
+        "{shoulder_lift_joint: 1, wrist_2_joint: 1}",
+        "{wrist_1_joint: 1, wrist_3_joint: -1}",
     ],
 )
 def test_a_free_start_is_in_the_turn_that_leads_to_the_end_posture(turned):
@@ -259,7 +251,7 @@ def test_a_free_start_is_in_the_turn_that_leads_to_the_end_posture(turned):
     task = content_of("04_ur10_rail_weld.yaml")
     robot = problem_of(task).robot
     end = np.array(task["start"]["joints"])
-    for joint, turns in turned.items():
+    for joint, turns in yaml.safe_load(turned).items():
         end[robot.joint_names.index(joint)] += 2.0 * math.pi * turns
     task |= back_from(end, robot, [0.0, 0.4, 0.0])
     decompositions = decompositions_of(problem_of(task))
@@ -276,11 +268,11 @@ def test_a_motion_planned_one_way_is_found_the_other_way_round():
     robot = problem_of(task).robot
     begin = np.array(task["start"]["joints"])
     begin[robot.joint_names.index("wrist_1_joint")] += 2.0 * math.pi
-    task |= {
-        "redundant_joints": ["rail"],
-        "path": [{"line": {"by": [0.0, -0.4, 0.0]}}],
-        "search": {"effort": "single"},
-    }
+    task |= yaml.safe_load("""
+    redundant_joints: [rail]
+    path: [{line: {by: [0.0, -0.4, 0.0]}}]
+    search: {effort: single}
+    """)
     forwards = brachis.plan(task | {"start": {"joints": begin.tolist()}})
     back = brachis.plan(
         task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]}

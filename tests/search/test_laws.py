@@ -3,8 +3,6 @@
 The full count, 300, is `benchmarks/laws.py`.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The calmest motion among those that are as fast: what it is, what it costs, and when the fastest one stays."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -17,7 +15,7 @@ NOTEWORTHY = 0.01
 """A velocity above this part of its limit."""
 
 
-def reversals(trajectory: Trajectory) -> list[int]:
+def reversals(trajectory):
     """How often every joint turns round: changes of sign between velocities that are noteworthy."""
     velocity = trajectory.velocity(np.linspace(0.0, trajectory.t_end, 4001))
     limits = trajectory.robot.limits.velocity
@@ -29,12 +27,12 @@ def reversals(trajectory: Trajectory) -> list[int]:
     return [int((np.diff(np.sign(v)) != 0.0).sum()) for v in kept]
 
 
-def rms(trajectory: Trajectory) -> np.ndarray:
+def rms(trajectory):
     t = np.linspace(0.0, trajectory.t_end, 4001)
     return np.sqrt((trajectory.acceleration(t) ** 2).mean(axis=0))
 
 
-def plan(**search) -> brachis.Result:
+def plan(**search):
     """Plan the line of the paper's arm."""
     return brachis.plan(brachis.examples.scara_line, effort="single", **search)
 

@@ -1,7 +1,5 @@
 """Peaks that are narrower than the refinement's grid: the verification sees them, and the motion is refined again."""
 
-from __future__ import annotations
-
 import brachis
 from brachis.search import verified
 from brachis.task import load_task

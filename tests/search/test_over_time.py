@@ -1,6 +1,6 @@
 """Joint paths that are improved over time, where the arm waits between its phases."""
 
-from __future__ import annotations
+import yaml
 
 import brachis
 from brachis.search import pipeline
@@ -16,10 +16,10 @@ def test_dwells_do_not_keep_a_motion_from_being_improved_over_time(monkeypatch):
         return done
 
     monkeypatch.setattr(pipeline, "refine_and_verify", look)
-    waiting = [
-        {"line": {"by": [0.0, 0.4]}, "stop": True, "dwell": 1.0},
-        {"line": {"by": [0.3, 0.0]}},
-    ]
+    waiting = yaml.safe_load("""
+    - {line: {by: [0.0, 0.4]}, stop: true, dwell: 1.0}
+    - line: {by: [0.3, 0.0]}
+    """)
     result = brachis.plan(
         brachis.examples.scara_line,
         path=waiting,

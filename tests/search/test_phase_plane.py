@@ -1,7 +1,5 @@
 """Least times along fixed joint paths, against formulas."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +17,14 @@ GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
 S = np.linspace(0.0, 1.0, 201)
 
 
-def gantry(**limits: object) -> brachis.Robot:
+def gantry(**limits):
     spec = {"torque": None, "velocity": None, "acceleration": None} | limits
     return brachis.Robot.from_urdf(
         GANTRY, gravity=[0, 0, 0], limits=brachis.LimitSpec(**spec)
     )
 
 
-def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
+def least_time(robot, s, q):
     built = (
         build(robot, None)
         for build in (TorqueLimit.build, VelocityLimit.build, AccelerationLimit.build)
@@ -36,7 +34,7 @@ def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
     return np.inf if timing is None else timing.t_end
 
 
-def joint_path(distance: float) -> np.ndarray:
+def joint_path(distance):
     return np.column_stack([distance * S, np.zeros_like(S)])
 
 
@@ -44,7 +42,7 @@ LENGTH = 0.5
 FORCE = 20.0
 
 
-def slide(content: dict, **limits: object) -> tuple[Problem, np.ndarray, np.ndarray]:
+def slide(content, **limits):
     """A task on one slide, and its joint path, (S,) and (S, n)."""
     line = {"path": brachis.Line(by=[LENGTH, 0.0]), **content}
     task = task_with(task_space=["x", "y"], start=[0.0, 0.0], **line)
@@ -53,16 +51,16 @@ def slide(content: dict, **limits: object) -> tuple[Problem, np.ndarray, np.ndar
     return problem, s, np.column_stack([LENGTH * s, np.zeros_like(s)])
 
 
-def with_stop(dwell: float) -> dict:
+def with_stop(dwell):
     first = brachis.Line(by=[0.4 * LENGTH, 0.0], stop=True, dwell=dwell)
     return {"path": first + brachis.Line(by=[0.6 * LENGTH, 0.0])}
 
 
-def acceleration_of(force: float) -> float:
+def acceleration_of(force):
     return force / gantry(torque=force).chain.mass_matrices(np.zeros((1, 2)))[0, 0, 0]
 
 
-def way_beside(distance: float, speed: float, acceleration: float) -> float:
+def way_beside(distance, speed, acceleration):
     """Least time over a distance from rest to a speed, or from it to rest: as fast as can be, then at the speed."""
     peak = np.sqrt(acceleration * distance + 0.5 * speed**2)
     return (2.0 * peak - speed) / acceleration

@@ -1,7 +1,5 @@
 """The search as a whole: what is left open, order, limits, interruptions."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import os
@@ -9,10 +7,10 @@ import signal
 import sys
 import time
 import types
-from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 
 import brachis
@@ -23,24 +21,12 @@ from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import (
-    guesses,
-    over_time,
-    pipeline,
-    portfolio,
-    schedule,
-)
+from brachis.search import guesses, over_time, pipeline, portfolio, schedule
 from brachis.search.failure import explain_reach
 from brachis.search.guesses import SEARCH_LEVELS
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.stages import (
-    NOT_TRIED,
-    RANKED,
-    SLOW,
-    Candidate,
-    Marks,
-)
+from brachis.search.stages import NOT_TRIED, RANKED, SLOW
 from brachis.task import load_task
 from support.scara import START, scara
 
@@ -55,27 +41,27 @@ UNFINISHED = "the search that search.effort requires was not completed"
 ROBOT = scara()
 
 
-def task(**changes: Any) -> dict[str, Any]:
-    return {
-        "brachis": 1,
-        "start": {"joints": START},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"length": 0.6, "angle_deg": 90}}],
-        "spline": {"intervals": 10},
-    } | changes
+def task(**changes):
+    content = yaml.safe_load("""
+    brachis: 1
+    task_space: [x, y]
+    path: [{line: {length: 0.6, angle_deg: 90}}]
+    spline: {intervals: 10}
+    """)
+    return content | {"start": {"joints": START}} | changes
 
 
-def plan(**changes: Any) -> brachis.Result:
+def plan(**changes):
     return brachis.plan(ROBOT, task(**changes))
 
 
 @pytest.fixture(scope="module")
-def usual() -> brachis.Result:
+def usual():
     """Of the task as it is."""
     return plan()
 
 
-def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndarray]:
+def without_times(result):
     """Candidates, and their times, (K, 3); the order of equally fast ones differs from process to process."""
     rows = [candidate.to_dict() for candidate in result.candidates]
     rows.sort(key=lambda row: (row["redundant_joints"], row["branch"], row["origin"]))
@@ -102,15 +88,10 @@ def test_every_candidate_is_listed_the_fastest_first(usual, changes, choices):
         assert choices_of(result) == choices
     else:
         assert {candidate.redundant_joints for candidate in slower} <= choices
-    keys = {
-        (candidate.redundant_joints, candidate.origin)
-        for candidate in result.candidates
-    }
-    assert len(keys) == len(result.candidates)
-    finished = [
-        candidate.t_end for candidate in result.candidates if candidate.verified
-    ]
-    assert result.t_end == min(finished)
+    every = result.candidates
+    keys = {(candidate.redundant_joints, candidate.origin) for candidate in every}
+    assert len(keys) == len(every)
+    assert result.t_end == min(row.t_end for row in every if row.verified)
     unfinished = [
         candidate.estimate for candidate in slower if candidate.status in {RANKED, SLOW}
     ]
@@ -172,23 +153,21 @@ def test_a_free_start_needs_a_place_and_no_numeric_guess():
 def test_numeric_guesses_stay_an_option():
     result = plan(search={"guesses": "numeric"})
     assert result.verified
-    assert all(
-        candidate.origin.startswith("numeric") for candidate in result.candidates
-    )
+    assert all(row.origin.startswith("numeric") for row in result.candidates)
     assert choices_of(result) == {("j1",), ("j2",), ("j3",)}
 
 
-def choices_of(result: brachis.Result) -> set[tuple[str, ...]]:
+def choices_of(result):
     return {candidate.redundant_joints for candidate in result.candidates}
 
 
 class NoPosture:
     """A lattice that ends halfway."""
 
-    def __init__(self, *_arguments: object, **_options: object) -> None:
+    def __init__(self, *_arguments, **_options):
         pass
 
-    def joint_paths(self, _most: int) -> DeadEnd:
+    def joint_paths(self, _most):
         return DeadEnd(0.5, "nothing")
 
 
@@ -225,7 +204,7 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
 def test_a_real_ctrl_c_ends_worker_processes():
     """Pressed as soon as a motion is verified, while another process plans on."""
 
-    def listener(text: str) -> None:
+    def listener(text):
         if text.endswith(", verified"):
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -242,7 +221,7 @@ def ctrl_c_before_refinement(monkeypatch):
     """Ctrl-C as the first motion is finished; the second call is the last look at it."""
     honest, calls = pipeline.finish_candidate, []
 
-    def interrupt(*arguments: Any) -> Any:
+    def interrupt(*arguments):
         calls.append(1)
         if len(calls) == 1:
             raise KeyboardInterrupt
@@ -256,7 +235,7 @@ def splines_are_too_fast(monkeypatch):
     """A solve over time ends faster than the limits allow."""
     honest = pipeline.solve_over_time
 
-    def hurry(*arguments: Any) -> Any:
+    def hurry(*arguments):
         solved = honest(*arguments)
         x = solved.program.scale_time(solved.x, 0.6)
         report = dataclasses.replace(solved.report, x=x)
@@ -286,16 +265,16 @@ def test_ctrl_c_before_refinement_lengthens_the_best_motion():
 class Clock:
     """The clock of deadlines, which jumps by a minute and a half at the event that a test chooses."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch):
         self.now = 0.0
         self._monkeypatch = monkeypatch
         monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: self.now)
 
-    def jump(self, where: Any, name: str, *, at: int, by: float = 90.0) -> list[int]:
+    def jump(self, where, name, *, at, by=90.0):
         """Jump at the end of the `at`-th call of a function, and of every later one; the calls are counted."""
         honest, calls = getattr(where, name), []
 
-        def count(*arguments: Any) -> Any:
+        def count(*arguments):
             calls.append(1)
             made = honest(*arguments)
             self.now += by * (len(calls) >= at)
@@ -306,7 +285,7 @@ class Clock:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch):
     return Clock(monkeypatch)
 
 
@@ -323,8 +302,8 @@ def test_the_time_limit_gives_the_best_motion_so_far(clock):
 @pytest.mark.parametrize(
     ("changes", "solved", "remark"),
     [
-        ({}, 1, "of 2 candidates 1 not tried"),
-        (BRANCH, 2, "of 5 candidates 3 not tried, 1 not finished"),
+        ({}, 1, "of 2 candidates, 1 remained untried"),
+        (BRANCH, 2, "of 5 candidates, 3 remained untried, 1 remained unfinished"),
     ],
 )
 @pytest.mark.usefixtures("splines_are_too_fast")
@@ -338,9 +317,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     assert result.interrupted
     assert not result.verified
     assert result.verification.worst_ratio > 1.0
-    tried = [
-        candidate for candidate in result.candidates if candidate.status != NOT_TRIED
-    ]
+    tried = [row for row in result.candidates if row.status != NOT_TRIED]
     assert len(tried) == solved
     fastest = min(candidate.estimate for candidate in tried)
     assert result.t_end == pytest.approx(fastest, rel=0.1)
@@ -352,7 +329,7 @@ def test_time_is_kept_for_a_first_motion_while_nothing_is_verified(clock):
     result = plan()
     assert result.interrupted
     assert result.verified
-    assert any("first motion alone" in text for text in result.not_completed)
+    assert any("only for a first motion" in text for text in result.not_completed)
 
 
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
@@ -365,12 +342,12 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
 
 def test_no_solve_begins_without_time_and_its_start_is_the_motion(clock):
     calls = clock.jump(over_time, "initial_guess", at=1)
-    joints = {
-        "task_space": "joints",
-        "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
-        "solver": {"name": "uno"},
-    }
-    result = plan(**joints)
+    joints = """
+    task_space: joints
+    path: [{spline: {through: [[0.6, -2.0, 2.0]]}}]
+    solver: {name: uno}
+    """
+    result = plan(**yaml.safe_load(joints))
     assert result.interrupted
     assert result.verified
     assert any("far from the fastest" in text for text in result.not_completed)
@@ -391,10 +368,8 @@ def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(usual, clo
     result = plan(search={"effort": "thorough"})
     assert result.verified
     assert result.interrupted
-    assert (
-        "the lattice of all postures was not searched completely"
-        in result.not_completed
-    )
+    told = "the lattice of all postures was not searched completely"
+    assert told in result.not_completed
     assert len(result.candidates) == len(usual.candidates)
 
 
@@ -402,7 +377,7 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(clock):
     clock.jump(schedule, "lattice_guesses", at=1)
     message = (
         r"within the time limit of 60 s: the lattice of j. \| j. was not searched completely; "
-        r"of \d+ candidates \d+ not tried; .*\. Raise search\.time_limit"
+        r"of \d+ candidates, \d+ remained untried; .*\. Raise search\.time_limit"
     )
     with pytest.raises(PlanningError, match=message):
         plan(**EVERY_CHOICE)
@@ -424,24 +399,20 @@ def test_starts_from_their_part_of_the_time_have_plans(clock):
 def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     honest = uno.call_uno
 
-    def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
+    def hanging(watch, x, *rest):
         return time.sleep(1e6) if len(x) > 80 else honest(watch, x, *rest)
 
     monkeypatch.setattr(uno, "call_uno", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
-    result = brachis.plan(
-        scara({"jerk": 2000.0}),
-        task(
-            redundant_joints=["j1"],
-            spline={"intervals": 100, "degree": 4},
-            search={"time_limit": 12.0},
-        ),
+    changes = task(
+        redundant_joints=["j1"],
+        spline={"intervals": 100, "degree": 4},
+        search={"time_limit": 12.0},
     )
+    result = brachis.plan(scara({"jerk": 2000.0}), changes)
     assert result.verified
-    assert (
-        "the motion has 25 intervals, and was not solved with all 100"
-        in result.not_completed
-    )
+    told = "the motion has 25 intervals, and was not solved with all 100"
+    assert told in result.not_completed
 
 
 def test_within_other_workers_no_processes_start():
@@ -476,15 +447,15 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(usual, monkeypatch)
 def test_a_motion_no_faster_over_its_first_knots_gets_no_mesh(monkeypatch):
     robot = scara({"jerk": 2000.0})
     finish = pipeline.finish_candidate
-    meshes: list[int] = []
-    tried: list[Candidate] = []
+    meshes = []
+    tried = []
     adapt = pipeline.adapt_mesh
 
-    def note(*arguments: Any, **settings: Any) -> Any:
+    def note(*arguments, **settings):
         meshes.append(len(tried))
         return adapt(*arguments, **settings)
 
-    def against_faster(candidate: Any, to_beat: Marks, *arguments: Any) -> Candidate:
+    def against_faster(candidate, to_beat, *arguments):
         given = dataclasses.replace(to_beat, begun=0.0) if tried else to_beat
         tried.append(finish(candidate, given, *arguments))
         return tried[-1]

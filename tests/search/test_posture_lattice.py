@@ -1,18 +1,14 @@
 """The lattice of all postures: its joint paths are motions of the arm, and it goes wherever the arm can."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-import brachis
 from brachis.common.deadline import Deadline
-from brachis.problem.problem import Problem, decompositions_of
+from brachis.problem.problem import decompositions_of
 from brachis.robot import dynamics
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import NO_TIME, DeadEnd
@@ -20,7 +16,7 @@ from brachis.search.posture_lattice import PostureLattice
 from brachis.task import task_with
 from support.chains import planar_robot
 from support.joint_paths import check_joint_path
-from support.scara import START, problem, scara
+from support.scara import RANGES, START, problem, scara
 from support.screw_arms import seven_joints
 from support.spatial import START as RAIL_START
 from support.spatial import rail_arm
@@ -29,30 +25,25 @@ SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
 TURN = 2.0 * math.pi
 
 
-def line(
-    robot: brachis.Robot,
-    start: list[float],
-    by: list[float],
-    rows: Any = ("x", "y"),
-    **task: Any,
-) -> Problem:
-    return problem(
-        robot, rows, start={"joints": start}, path=[{"line": {"by": by}}], **task
-    )
+def line(robot, start, by, rows=("x", "y"), **task):
+    path = [{"line": {"by": by}}]
+    return problem(robot, rows, start={"joints": start}, path=path, **task)
 
 
-def joint_paths_of(line_problem: Problem, **options: Any) -> Any:
+def joint_paths_of(line_problem, **options):
     return PostureLattice(line_problem, [], **options).joint_paths(4)
+
+
+def shortest_of(decompositions):
+    """The least length of a joint path of a closed form."""
+    lattices = map(ClosedFormLattice, decompositions)
+    return min(lattice.joint_paths(1)[0].length for lattice in lattices)
 
 
 CASES = {
     "r = 0, 2R": lambda: line(scara(locked_joints={"j3": 0.4}), START[:2], [0.1, 0.4]),
     "r = 1, 3R": lambda: line(scara(), START, [0.0, 1.0]),
-    "r = 1, ranges": lambda: line(
-        scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}}),
-        START,
-        [0.0, 1.0],
-    ),
+    "r = 1, ranges": lambda: line(scara(RANGES), START, [0.0, 1.0]),
     "r = 1, gravity": lambda: line(
         scara({"torque": [330.0, 200.0, 70.0]}, gravity=[0.0, -9.81, 0.0]),
         START,
@@ -76,9 +67,9 @@ def test_joint_paths_are_motions_of_the_robot(case):
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
-        np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
+        assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
         check_joint_path(line_problem, joint_path, miss=1e-10, step=0.8 + 1e-12)
-        np.testing.assert_array_equal(joint_path.q[0], line_problem.start)
+        assert_array_equal(joint_path.q[0], line_problem.start)
 
 
 def test_gravity_and_ranges_turn_joint_paths_away():
@@ -90,10 +81,8 @@ def test_gravity_and_ranges_turn_joint_paths_away():
     load = dynamics.torque(strong, shortest.q, still, still)
     assert np.any(np.abs(load) > held.torque)
     bounded = CASES["r = 1, ranges"]().robot.limits
-    (shortest, *_) = joint_paths_of(line(scara(), START, [0.0, 1.0]))
-    assert np.any(
-        (shortest.q < bounded.position_lower) | (shortest.q > bounded.position_upper)
-    )
+    q = joint_paths_of(line(scara(), START, [0.0, 1.0]))[0].q
+    assert np.any((q < bounded.position_lower) | (q > bounded.position_upper))
 
 
 def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
@@ -121,14 +110,11 @@ def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_for
         start={"joints": START},
         path=[{"line": {"length": 1.0, "angle_deg": angle}}],
     )
-    best = min(
-        ClosedFormLattice(one).joint_paths(1)[0].length
-        for one in decompositions_of(line_problem)
-    )
+    best = shortest_of(decompositions_of(line_problem))
     assert joint_paths_of(line_problem)[0].length < 1.15 * best
 
 
-def component(q: np.ndarray) -> int:
+def component(q):
     """Of the self-motion of three links of 1 m: nearer than 1 m to the base, joint 2 never stretches nor folds."""
     return int(np.sign(np.sin(q[1])))
 
@@ -156,10 +142,7 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
     for joint_path in joint_paths:
         assert len({component(q) for q in joint_path.q}) == 1
     assert {component(joint_path.q[0]) for joint_path in joint_paths} == expected
-    best = min(
-        ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions
-    )
-    assert joint_paths[0].length < 1.15 * best
+    assert joint_paths[0].length < 1.15 * shortest_of(decompositions)
 
 
 CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
@@ -239,14 +222,10 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way, lattice):
 
 def test_the_same_seed_gives_the_same_joint_paths():
     line_problem = CASES["r = 2, 4R"]()
+    tasks = [task_with(line_problem.task, seed=seed) for seed in (3, 3, 4)]
     first, again, changed = (
-        joint_paths_of(
-            dataclasses.replace(
-                line_problem, task=task_with(line_problem.task, seed=seed)
-            ),
-            nodes=60,
-        )
-        for seed in (3, 3, 4)
+        joint_paths_of(dataclasses.replace(line_problem, task=task), nodes=60)
+        for task in tasks
     )
     gaps = [np.abs(a.q - b.q).max() for a, b in zip(first, again, strict=True)]
     assert max(gaps) <= 1e-9
@@ -272,7 +251,7 @@ def test_a_given_end_is_reached_with_several_redundant_joints(start, end):
     tool = [robot.tool_placement(np.array(q)).translation[:2] for q in (start, end)]
     by = (tool[1] - tool[0]).tolist()
     line_problem = line(robot, start, by, end={"joints": end})
-    joint_paths = PostureLattice(line_problem, [], nodes=60).joint_paths(4)
+    joint_paths = joint_paths_of(line_problem, nodes=60)
     assert isinstance(joint_paths, list)
     assert joint_paths
     assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)

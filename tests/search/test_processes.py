@@ -1,7 +1,5 @@
 """Work for several processes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Random joint paths: on the path, from the given ends, within the ranges, and of use where the lattice has few."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ from brachis.task import task_with
 START = [0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1]
 
 
-def problem_of(**keys) -> Problem:
+def problem_of(**keys):
     line = {
         "start": START,
         "task_space": "position",
@@ -52,7 +50,7 @@ def test_they_are_on_the_path_from_given_ends_within_the_ranges(end):
 class LateLattice(Deadline):
     """A deadline of which every part is over at once."""
 
-    def part(self, _share: float) -> Deadline:
+    def part(self, _share):
         return Deadline(0.0)
 
 

@@ -1,7 +1,5 @@
 """Numbers that an error advises are tried before."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -28,7 +26,7 @@ def task():
     )
 
 
-def hint(task, remedies, is_planned, *, seconds=60.0) -> str:
+def hint(task, remedies, is_planned, *, seconds=60.0):
     """Return the hint where `is_planned` says of a changed task, a deadline and a number of batches what is planned."""
     error = PlanningError("no motion", hint="Try another path").with_remedies(*remedies)
 
@@ -109,7 +107,7 @@ def test_the_hint_has_no_number_without_a_verified_plan(task, seconds):
     found = hint(task, remedies, lambda *_: False, seconds=seconds)
     assert (
         found
-        == "Lower boundary.end_speed and lower robot.payload.mass (how far is not known), or try another path"
+        == "Lower boundary.end_speed and lower robot.payload.mass (by how much is not known), or try another path"
     )
 
 
@@ -155,7 +153,7 @@ def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
         sweep = {"sweep": 1, "task": task.to_dict(), "rows": [{"spline.degree": 3}]}
         (row,) = brachis.sweep(sweep, tmp_path / "out", jobs=1).rows()
         message = row["message"]
-    assert "Raise robot.limits.torque.j1 (how far is not known)" in message
+    assert "Raise robot.limits.torque.j1 (by how much is not known)" in message
     assert bool(trials) is (way == "plan")
 
 

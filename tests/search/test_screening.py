@@ -1,7 +1,5 @@
 """Screening: the fastest guesses that differ, whatever time or backend is missing."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -20,7 +18,7 @@ from support.scara import scara
 MOST = 2
 
 
-def quiet(_text: str) -> None:
+def quiet(_text):
     """Listen to nothing."""
 
 
@@ -74,7 +72,7 @@ def test_without_time_guesses_pass_that_differ(guesses):
 def test_dwells_leave_few_guesses_to_improve(guesses, monkeypatch):
     tried = []
 
-    def improve(guess: object, *_arguments: object) -> object:
+    def improve(guess, *_arguments):
         tried.append(guess)
         time = 10.0 + int(guess.origin.split(",")[0].split()[-1]) / 10.0
         return dataclasses.replace(guess, estimate=time, is_improved=True)

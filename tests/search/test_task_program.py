@@ -1,7 +1,5 @@
 """The program that `transcribe` returns, for a solver of one's own: names of x, the guess, the trajectory."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import Bounds, NonlinearConstraint, minimize

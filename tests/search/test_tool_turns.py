@@ -1,7 +1,5 @@
 """Quick turns of the tool: stations follow them, so that lattices do; out of reach is only what is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -17,6 +17,9 @@ from brachis.robot import Robot, task_map_of
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import ToolLimits, load_task
 
+THREE_CIRCLES = [{"circle": {"center": [0.0, 0.0], "turns": 3}}]
+"""About the base."""
+TOO_FAR = [{"line": {"by": [3.0, 0.0]}}]
 PLANAR: dict[str, Any] = {
     "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
     "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),

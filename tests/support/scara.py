@@ -12,6 +12,8 @@ from brachis.problem.problem import Problem
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 START = [math.pi / 6, -2.0 * math.pi / 3.0, 2.0 * math.pi / 3.0]
 """The tool is at (sqrt(3), 0) m."""
+RANGES = {"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}}
+"""Limits within which the arm keeps its elbow as it is in the start posture."""
 
 
 def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:

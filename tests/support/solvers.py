@@ -4,6 +4,20 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from brachis.optimise.backends import TABLE
+import numpy as np
+
+from brachis.optimise.backends import (
+    TABLE,
+    NonlinearProgram,
+    SolverOptions,
+    solvers_for,
+)
+from brachis.optimise.backends.protocol import SolverReport
 
 INSTALLED = tuple(name for name in TABLE if name != "ipopt" or find_spec("ipyopt"))
+
+
+def solve(program: NonlinearProgram, x: np.ndarray) -> SolverReport:
+    """Solve a program from x with Uno."""
+    (uno,) = solvers_for("uno")
+    return uno.solve(program, x, SolverOptions(), None)

@@ -4,27 +4,28 @@ import re
 
 import numpy as np
 import pytest
+import yaml
 
 from brachis.errors import TaskError
 from brachis.task import read_assignment, with_keys
 from brachis.task.load import set_key
 
-TASK = {
-    "brachis": 1,
-    "start": {"joints": [0.1, 0.2, 0.3]},
-    "task_space": ["x", "y"],
-    "path": [{"line": {"by": [1.0, 0.0]}}, {"line": {"by": [0.0, 1.0]}}],
-}
+TASK = yaml.safe_load("""
+brachis: 1
+start: {joints: [0.1, 0.2, 0.3]}
+task_space: [x, y]
+path:
+- line: {by: [1.0, 0.0]}
+- line: {by: [0.0, 1.0]}
+""")
 
 
 @pytest.mark.parametrize("key", ["path.1.line.by", "path[1].line.by"])
 def test_keys_have_indices_of_lists(key):
     changed = with_keys(TASK, {key: [2.0, 2.0]})
-    assert changed["path"] == [
-        {"line": {"by": [1.0, 0.0]}},
-        {"line": {"by": [2.0, 2.0]}},
-    ]
-    assert TASK["path"][1] == {"line": {"by": [0.0, 1.0]}}
+    first, second = TASK["path"]
+    assert changed["path"] == [first, {"line": {"by": [2.0, 2.0]}}]
+    assert second == {"line": {"by": [0.0, 1.0]}}
 
 
 def test_keys_fill_absent_and_null_mappings():

@@ -15,12 +15,12 @@ from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.task import RobotSettings, load_task, read_limits, task_with
 
 ROOT = Path(__file__).parents[2]
-FILE = {
-    "brachis_limits": 1,
-    "source": "the maker",
-    "joints": ["j1", "j2", "j3"],
-    "limits": {"torque": [5, 6, [-7, 8]], "acceleration": 20, "velocity": {"j2": 2}},
-}
+FILE = yaml.safe_load("""
+brachis_limits: 1
+source: the maker
+joints: [j1, j2, j3]
+limits: {torque: [5, 6, [-7, 8]], acceleration: 20, velocity: {j2: 2}}
+""")
 
 
 @pytest.fixture
@@ -58,15 +58,8 @@ def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(load_be
     assert limits.acceleration == {"j1": 20.0, "j2": 20.0, "j3": 20.0}
     assert limits.velocity == {"j2": 2.0}
     assert limits.position == "urdf"
-    own = load_beside(
-        {
-            "limits": {
-                "torque": {"j2": 1},
-                "acceleration": None,
-                "scale": {"torque": 0.5},
-            }
-        }
-    ).robot
+    changes = "{torque: {j2: 1}, acceleration: null, scale: {torque: 0.5}}"
+    own = load_beside({"limits": yaml.safe_load(changes)}).robot
     assert own.limits.torque == {"j1": 5.0, "j2": 1.0, "j3": (-7.0, 8.0)}
     assert own.limits.acceleration is None
     assert_array_equal(robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0])
@@ -137,15 +130,11 @@ def test_the_error_names_joints_that_the_robot_does_not_have(load_beside):
 
 
 def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(load_beside):
-    limits = {
-        "torque": 30,
-        "total_power": 70,
-        "torque_speed": {"j2": [[0, 20], [2, 10]]},
-    }
+    text = "{torque: 30, total_power: 70, torque_speed: {j2: [[0, 20], [2, 10]]}}"
+    limits = yaml.safe_load(text)
     assert load_beside(None, limits=limits).robot.limits.total_power == 70.0
-    robot = robot_from_settings(
-        load_beside({"limits": {"total_power": 50}}, limits=limits).robot
-    )
+    task = load_beside({"limits": {"total_power": 50}}, limits=limits)
+    robot = robot_from_settings(task.robot)
     assert robot.limits.total_power == 50.0
     assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])
 
@@ -254,10 +243,7 @@ def test_a_file_of_universal_robots_is_read(robot_beside, names):
             ("    min_position: !degrees -170\n", ""),
             ["joint_limits.j1.min_position: this figure is missing"],
         ),
-        (
-            ("!degrees -170", "!degrees left"),
-            ["!degrees needs a number, not 'left'"],
-        ),
+        (("!degrees -170", "!degrees left"), ["!degrees needs a number, not 'left'"]),
         (
             ("!degrees -170", "!degres -170"),
             ["there is no tag named '!degres'", "Did you mean '!degrees'?"],

@@ -290,7 +290,7 @@ MISTAKES = [
     ("task_space: poze", r"found 'poze'.*Did you mean 'pose'\?"),
     ("search: {effort: fas}", r"found 'fas'.*Did you mean 'fast'\?"),
     ("task_space: poses", "task_space: .*found 'poses'.*pose_free_roll"),
-    ("path: []", "path: too few items"),
+    ("path: []", "path: there is no segment"),
     (
         "path: [{lien: {to: [1, 0]}}]",
         r"path\[0\]: a segment needs exactly one kind.*Did you mean 'line'\?",
@@ -353,10 +353,13 @@ MISTAKES = [
         "spline: {degree: 2}",
         "spline.degree: rest: full.*found 2.*allowed: >= 3, or rest: velocity",
     ),
-    ("spline: {degree: 8}", "spline.degree: out of range; found 8; allowed: <= 7"),
+    (
+        "spline: {degree: 8}",
+        "spline.degree: out of range; found 8; allowed: a whole number, 3 to 7",
+    ),
     (
         "spline: {intervals: 20.5}",
-        "spline.intervals: wrong type; found 20.5; allowed: a whole number",
+        "spline.intervals: wrong type; found 20.5; allowed: auto, or a whole number from 4 to 10000",
     ),
     (
         "spline: {knots: free}",
@@ -364,7 +367,7 @@ MISTAKES = [
     ),
     (
         "spline: {intervals: 3}",
-        "spline.intervals: out of range; found 3; allowed: >= 4",
+        "spline.intervals: out of range; found 3; allowed: auto, or a whole number from 4",
     ),
     (
         "spline: {rest: none}",
@@ -418,10 +421,13 @@ def test_an_array_of_mistakes_does_not_fill_the_screen():
     points = np.full((1000, 2), np.nan)
     with pytest.raises(TaskError) as caught:
         load_task(minimal(path=points))
+    assert "through[0][0] and 1997 more: not a finite number" in str(caught.value)
+    with pytest.raises(TaskError) as caught:
+        load_task(minimal(path=[[f"{row}", 0.0] for row in range(1000)]))
     lines = str(caught.value).splitlines()
-    assert lines[0] == "task: 2000 mistakes"
+    assert lines[0] == "task: 1000 mistakes"
     assert len(lines) == 22
-    assert lines[-1] == "  and 1980 more"
+    assert lines[-1] == "  and 980 more"
 
 
 def test_all_mistakes_are_in_one_message(tmp_path):

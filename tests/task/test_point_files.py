@@ -154,7 +154,7 @@ WRONG = [
     ),
     (
         {"units": {"length": "m"}},
-        r"seam.csv: line 1: the header contradicts the task's units",
+        r"seam.csv: line 1: the header contradicts the units in the task",
     ),
     ({"units": {"length": "feet"}}, r"path\[0\].csv.units.length.*found 'feet'"),
     (

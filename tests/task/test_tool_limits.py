@@ -7,13 +7,12 @@ import yaml
 import brachis
 from brachis.errors import TaskError
 
-TASK = {
-    "brachis": 1,
-    "start": {"joints": [-0.6, 0.0]},
-    "task_space": ["x", "y"],
-    "path": [{"line": {"by": [1.2, 0.0]}}],
-}
-PART = {"speed": 1.0, "s": [0.25, 0.75]}
+TASK = yaml.safe_load("""
+brachis: 1
+start: {joints: [-0.6, 0.0]}
+task_space: [x, y]
+path: [{line: {by: [1.2, 0.0]}}]
+""")
 
 
 @pytest.mark.parametrize(

@@ -1,25 +1,22 @@
 """The timing gap of plans: never much below zero, whatever limits there are, and small with ``intervals: auto``."""
 
-from __future__ import annotations
-
 import pytest
+import yaml
 
 import brachis
 from brachis.timing import TimingGap
 from support.effort import QUICK
 
-LIMITS = {
-    "torque": {},
-    "friction": {"friction": {"viscous": 0.5, "coulomb": 0.3}},
-    "power": {"limits": {"torque": 10, "power": 15}},
-    "total power": {"limits": {"torque": 10, "total_power": 20}},
-    "acceleration": {"limits": {"torque": 10, "acceleration": 6}},
-    "tool speed": {"tool_limits": {"speed": 0.6}},
-    "tool acceleration": {"tool_limits": {"acceleration": 1.5}},
-    "torque at speed": {
-        "limits": {"torque": 10, "torque_speed": {"j2": [[0, 10], [2, 4]]}}
-    },
-}
+LIMITS = yaml.safe_load("""
+torque: {}
+friction: {friction: {viscous: 0.5, coulomb: 0.3}}
+power: {limits: {torque: 10, power: 15}}
+total power: {limits: {torque: 10, total_power: 20}}
+acceleration: {limits: {torque: 10, acceleration: 6}}
+tool speed: {tool_limits: {speed: 0.6}}
+tool acceleration: {tool_limits: {acceleration: 1.5}}
+torque at speed: {limits: {torque: 10, torque_speed: {j2: [[0, 10], [2, 4]]}}}
+""")
 
 
 def plan(**keywords):
@@ -84,19 +81,14 @@ def test_the_warning_says_where_time_is_lost(part, where, has_fixed_intervals):
 )
 def test_a_spline_there_and_back_is_not_promised_a_faster_timing(through):
     """The arm stands where the spline turns round: no grid of the phase plane steps over it."""
-    result = brachis.plan(
-        {
-            "brachis": 1,
-            "robot": {
-                "urdf": "ur10_rail",
-                "locked_joints": {"rail": 0},
-                "limits": {"acceleration": 12},
-            },
-            "start": {"joints": [0, -1.2, 1.6, -0.4, 1.0, 0]},
-            "task_space": "pose",
-            "path": [{"spline": {"relative": True, "through": through}}],
-        }
-    )
+    content = yaml.safe_load("""
+    brachis: 1
+    robot: {urdf: ur10_rail, locked_joints: {rail: 0}, limits: {acceleration: 12}}
+    start: {joints: [0, -1.2, 1.6, -0.4, 1.0, 0]}
+    task_space: pose
+    """)
+    path = [{"spline": {"relative": True, "through": through}}]
+    result = brachis.plan(content | {"path": path})
     assert result.verified
     assert -1e-3 < result.timing_gap.gap < 3e-3
     assert not result.warnings

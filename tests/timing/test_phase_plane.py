@@ -1,7 +1,5 @@
 """The fastest timing of joint paths, against formulas, and against the same path by another parameter."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

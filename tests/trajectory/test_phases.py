@@ -1,11 +1,10 @@
 """Curves of phases are joined to one spline and split again; a trajectory says what its phases are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from brachis.errors import ResultFileError
 from brachis.trajectory import (
@@ -20,11 +19,11 @@ from support.result_files import with_parts
 
 
 @pytest.fixture(scope="module")
-def motion() -> Trajectory:
+def motion():
     return gantry_motion()
 
 
-def random_splines(degree: int) -> list[PhaseSpline]:
+def random_splines(degree):
     rng = np.random.default_rng(degree)
     splines = []
     for duration, inner in ((0.7, [0.2, 0.5]), (1e-3, []), (1 / 3, [1 / 7])):
@@ -47,8 +46,8 @@ def test_a_split_gives_back_the_splines_before_their_join(degree, motion):
     assert len(knots) == points.shape[1] + degree + 1
     for spline, other in zip(splines, again, strict=True):
         assert other.t_end == pytest.approx(spline.t_end, rel=1e-12)
-        np.testing.assert_allclose(other.knots, spline.knots, atol=1e-12)
-        np.testing.assert_array_equal(other.control_points, spline.control_points)
+        assert_allclose(other.knots, spline.knots, atol=1e-12)
+        assert_array_equal(other.control_points, spline.control_points)
 
 
 def test_derivatives_of_a_phase_are_per_second():
@@ -58,12 +57,12 @@ def test_derivatives_of_a_phase_are_per_second():
     orders = spline.at(t)
     for order in range(3):
         slope = (spline.at(t + h)[order] - spline.at(t - h)[order]) / (2.0 * h)
-        np.testing.assert_allclose(slope, orders[order + 1], rtol=1e-5, atol=1e-3)
+        assert_allclose(slope, orders[order + 1], rtol=1e-5, atol=1e-3)
 
 
 def test_times_of_path_coordinates():
     times = SPLINES[3].times_of(np.array([0.55, 0.7, 0.85]))
-    np.testing.assert_allclose(times, [0.0, 0.5, 1.0], atol=1e-12)
+    assert_allclose(times, [0.0, 0.5, 1.0], atol=1e-12)
 
 
 def test_a_trajectory_says_what_its_phases_are(motion):
@@ -73,7 +72,7 @@ def test_a_trajectory_says_what_its_phases_are(motion):
     assert motion.phases[1].duration == pytest.approx(DWELL)
     places = [(phase.s_begin, phase.s_end) for phase in motion.phases]
     expected = [(0.0, 0.4), (0.4, 0.4), (0.4, 0.55), (0.55, 0.85), (0.85, 1.0)]
-    np.testing.assert_allclose(places, expected)
+    assert_allclose(places, expected)
     assert motion.phases[-1].end == motion.t_end
 
 
@@ -90,19 +89,17 @@ def test_splines_of_the_whole_motion_are_those_of_the_phases(motion):
     for phase, spline in zip(motion.phases, motion.phase_splines, strict=True):
         t = np.linspace(phase.begin, phase.end, 7)[:-1]
         s, redundant = spline.at(t - phase.begin)[0].T
-        np.testing.assert_allclose(motion.path_coordinate(t), s, atol=1e-12)
-        np.testing.assert_allclose(
-            motion.redundant_spline(t)[:, 0], redundant, atol=1e-12
-        )
+        assert_allclose(motion.path_coordinate(t), s, atol=1e-12)
+        assert_allclose(motion.redundant_spline(t)[:, 0], redundant, atol=1e-12)
         speed = spline.at(t - phase.begin)[1][:, 0]
-        np.testing.assert_allclose(motion.path_spline(t, nu=1), speed, atol=1e-9)
+        assert_allclose(motion.path_spline(t, nu=1), speed, atol=1e-9)
         assert motion.path_coordinate(phase.end) == phase.s_end
 
 
 def test_at_the_end_of_a_phase_the_spline_is_the_next_ones(motion):
     end = motion.phases[1].end
     jerk = motion.path_spline(np.array([np.nextafter(end, 0.0), end]), nu=3)
-    np.testing.assert_allclose(jerk, [0.0, 60.0 * 0.15 - 24.0 * SPEED], atol=1e-9)
+    assert_allclose(jerk, [0.0, 60.0 * 0.15 - 24.0 * SPEED], atol=1e-9)
 
 
 WRONG = {

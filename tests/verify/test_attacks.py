@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 
 import brachis
 from brachis.errors import InputError
@@ -14,6 +13,7 @@ from brachis.robot.limits import MAGNITUDES
 from brachis.task.limit_models import ToolLimits
 from brachis.trajectory import Pieces
 from brachis.verify import verify_trajectory
+from support.checks import check_of, failing_checks, with_entry
 from support.effort import QUICK
 from support.motions import with_limits
 
@@ -21,37 +21,15 @@ MIDDLE = 60
 
 
 @pytest.fixture(scope="module")
-def rubbing(scara_urdf):
+def rubbing():
     """A motion of the planar arm under Coulomb friction, whose joints reverse, with a torque limit out of the way."""
-    task = yaml.safe_load(
-        (scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text()
-    )
-    task["robot"] |= {
-        "urdf": str(scara_urdf),
-        "friction": {"coulomb": 0.5, "coulomb_velocity": 0.01},
-    }
-    return brachis.plan(task, **QUICK).trajectory
-
-
-def failing_checks(trajectory):
-    return {
-        check.name for check in verify_trajectory(trajectory).checks if not check.passed
-    }
+    friction = {"coulomb": 0.5, "coulomb_velocity": 0.01}
+    line = brachis.examples.scara_line
+    return brachis.plan(line, friction=friction, **QUICK).trajectory
 
 
 def ratio(trajectory, kind):
-    (check,) = [
-        check
-        for check in verify_trajectory(trajectory).checks
-        if check.name == f"{kind} ratio"
-    ]
-    return check
-
-
-def with_entry(trajectory, name, place, by):
-    array = np.array(getattr(trajectory, name))
-    array[place] += by
-    return replace(trajectory, **{name: array})
+    return check_of(verify_trajectory(trajectory), f"{kind} ratio")
 
 
 def with_node(trajectory, t, **offsets):
@@ -71,13 +49,6 @@ def with_node(trajectory, t, **offsets):
     for name, offset in offsets.items():
         arrays[name][place] += offset
     return replace(trajectory, **arrays)
-
-
-def nodes_close_together(trajectory, gap, by, joint):
-    """Two nodes `gap` seconds apart that disagree by `by` rad."""
-    return with_node(
-        trajectory, trajectory.times[MIDDLE] + gap, q=by * np.eye(3)[joint]
-    )
 
 
 ORDERS = {
@@ -101,10 +72,7 @@ GROWTH = (0.5, 1.8, 5.0, 50.0)
 def limited_to(trajectory, kind):
     """The motion, limited by nothing but one kind, of which it uses two thirds."""
     free = with_limits(
-        replace(
-            trajectory,
-            task=trajectory.task.model_copy(update={"tool_limits": ToolLimits()}),
-        ),
+        with_tool_limits(trajectory),
         **dict.fromkeys(MAGNITUDES, np.full(3, np.inf)),
         position_lower=np.full(3, -np.inf),
         position_upper=np.full(3, np.inf),
@@ -175,18 +143,13 @@ def test_a_path_that_is_left_between_nodes_close_together(planned, gap):
 
 def true_worst_torque(trajectory, pieces=slice(None), places=100):
     """Largest ratio that the trajectory's own evaluation finds at so many places in every piece."""
+    begins = trajectory.times[:-1][pieces, None]
     lengths = np.diff(trajectory.times)[pieces, None]
-    t = (
-        trajectory.times[:-1][pieces, None] + lengths * np.linspace(0.0, 1.0, places)
-    ).ravel()
-    t = np.clip(t, 0.0, trajectory.t_end)
-    tau = dynamics.torque(
-        trajectory.robot,
-        trajectory.position(t),
-        trajectory.velocity(t),
-        trajectory.acceleration(t),
-    )
-    return float(np.abs(tau / trajectory.robot.limits.torque).max())
+    t = (begins + lengths * np.linspace(0.0, 1.0, places)).ravel()
+    states = trajectory.at(np.clip(t, 0.0, trajectory.t_end))
+    robot = trajectory.robot
+    tau = dynamics.torque(robot, states.q, states.qdot, states.qddot)
+    return float(np.abs(tau / robot.limits.torque).max())
 
 
 @pytest.mark.parametrize("joint", range(3))
@@ -194,8 +157,11 @@ def true_worst_torque(trajectory, pieces=slice(None), places=100):
     ("gap", "by"), [(1e-6, 5e-10), (1e-7, 5e-12), (1e-5, 1e-9), (1e-4, 2e-8)]
 )
 def test_nodes_close_together_that_disagree(planned, gap, by, joint):
-    """The torque in between is hidden from any grid of times; its limit and the acceleration's are exceeded."""
-    spiked = nodes_close_together(planned, gap, by, joint)
+    """Two nodes `gap` seconds apart disagree by `by` rad.
+
+    The torque in between is hidden from any grid of times; its limit and the acceleration's are exceeded.
+    """
+    spiked = with_node(planned, planned.times[MIDDLE] + gap, q=by * np.eye(3)[joint])
     assert "torque ratio" in failing_checks(spiked)
     check = ratio(spiked, "torque")
     assert check.value == pytest.approx(
@@ -211,15 +177,11 @@ def test_nodes_that_are_a_little_off(planned, name, by, joint):
 
 
 @pytest.mark.parametrize("row", [2, 3])
-@pytest.mark.parametrize("piece", ["shortest", "first", "last"])
+@pytest.mark.parametrize("piece", [None, 0, -1], ids=["shortest", "first", "last"])
 def test_a_coefficient_of_one_piece(planned, piece, row):
     """Inner coefficients leave both nodes as they are, or one of them: a spike of acceleration in between."""
     lengths = np.diff(planned.times)
-    chosen = {
-        "shortest": int(np.argmin(lengths)),
-        "first": 0,
-        "last": len(lengths) - 1,
-    }[piece]
+    chosen = int(np.argmin(lengths)) if piece is None else piece
     torn = replace(planned)
     coefficients = torn.pieces.c.copy()
     coefficients[row, chosen, 1] += 20.0 * lengths[chosen] ** 2
@@ -273,18 +235,15 @@ def test_a_position_beyond_the_near_end_of_a_far_range(
 
 @pytest.mark.parametrize("half", [1e-3, 1e-6])
 def test_a_narrow_range_is_measured_in_its_halves(planned, half):
-    still = replace(
-        planned, q=np.zeros_like(planned.q), qdot=0.0 * planned.q, qddot=0.0 * planned.q
-    )
-    still = replace(still, qddot_before=0.0 * planned.q)
-    open_end = np.full(3, np.inf)
+    zero = 0.0 * planned.q
+    still = replace(planned, q=zero, qdot=zero, qddot=zero, qddot_before=zero)
     ends = np.array([half, np.inf, np.inf])
     inside = with_limits(still, position_lower=-ends, position_upper=ends)
     assert "position ratio" not in failing_checks(inside)
     beyond = 2e-4 * max(half, 1e-5)
     outside = with_limits(
         still,
-        position_lower=np.array([beyond, *-open_end[1:]]),
+        position_lower=np.array([beyond, -np.inf, -np.inf]),
         position_upper=2.0 * ends + beyond,
     )
     assert "position ratio" in failing_checks(outside)
@@ -293,20 +252,14 @@ def test_a_narrow_range_is_measured_in_its_halves(planned, half):
 def test_position_velocity_and_acceleration_are_exact_between_the_nodes(planned):
     """The largest values of the polynomials lie between the nodes, and between the points of any grid."""
     t = np.linspace(0.0, planned.t_end, 200_001)
-    for kind, curve in (
-        ("velocity", planned.velocity),
-        ("acceleration", planned.acceleration),
-    ):
-        limit = np.abs(curve(t)).max(axis=0)
+    for kind in ("velocity", "acceleration"):
+        limit = np.abs(getattr(planned, kind)(t)).max(axis=0)
         found = ratio(with_limits(planned, **{kind: limit}), kind)
         assert 1.0 - 1e-12 <= found.value < 1.0 + 1e-7
     q = planned.position(t)
     limits = {"position_lower": q.min(axis=0), "position_upper": q.max(axis=0)}
-    assert (
-        1.0 - 1e-12
-        <= ratio(with_limits(planned, **limits), "position").value
-        < 1.0 + 1e-8
-    )
+    check = ratio(with_limits(planned, **limits), "position")
+    assert 1.0 - 1e-12 <= check.value < 1.0 + 1e-8
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
@@ -314,22 +267,17 @@ def test_a_peak_within_the_friction_of_a_reversal(rubbing, width):
     """The torque limit is put where the torque just beside a reversal is a little above it, and nowhere else."""
     friction = replace(rubbing.robot.friction, v_eps=np.full(3, width))
     narrow = replace(rubbing, robot=replace(rubbing.robot, friction=friction))
-    t, places = rubbing.times, []
-    for joint in range(3):
-        crossing = np.flatnonzero(
-            rubbing.qdot[1:, joint] * rubbing.qdot[:-1, joint] < 0.0
-        )
-        places += [(joint, k) for k in crossing]
-    assert places, "no joint reverses: the test would show nothing"
+    t, rates = rubbing.times, rubbing.qdot.T
+    places = np.argwhere(rates[:, 1:] * rates[:, :-1] < 0.0)
+    assert places.size, "no joint reverses: the test would show nothing"
     joint, k = places[len(places) // 2]
     low, high = t[k], t[k + 1]
     for _ in range(80):
         middle = 0.5 * (low + high)
         same = rubbing.velocity(middle)[joint] * rubbing.velocity(low)[joint] > 0.0
         low, high = (middle, high) if same else (low, middle)
-    offsets = np.concatenate(
-        [-np.logspace(-9, -4, 3000)[::-1], np.logspace(-9, -4, 3000)]
-    )
+    beside = np.logspace(-9, -4, 3000)
+    offsets = np.concatenate([-beside[::-1], beside])
     tau = narrow.torque(np.clip(0.5 * (low + high) + offsets, t[k], t[k + 1]))[:, joint]
     limit = np.full(3, 1e6)
     limit[joint] = np.abs(tau).max() / (1.0 + 2e-4)
@@ -338,22 +286,25 @@ def test_a_peak_within_the_friction_of_a_reversal(rubbing, width):
     assert not check.passed
 
 
+def with_knots(trajectory, added):
+    """The same motion with more knots."""
+    fine = np.sort(np.concatenate([trajectory.knots, added]))
+    points = insert_knots(
+        trajectory.control_points, trajectory.knots, fine, trajectory.degree
+    )
+    return replace(trajectory, knots=fine, control_points=points)
+
+
 @pytest.mark.parametrize("interval", range(2, 18, 3))
 def test_s_runs_backwards_within_one_interval(planned, interval):
     """So short and so little that ds/dt is negative between two points of a grid alone."""
-    points, knots = np.array(planned.control_points), np.unique(planned.knots)
+    knots = np.unique(planned.knots)
     middle = 0.5 * (knots[interval] + knots[interval + 1])
-    width = 1e-6
-    fine = np.sort(
-        np.concatenate([planned.knots, np.linspace(middle - width, middle + width, 8)])
-    )
-    points = insert_knots(points, planned.knots, fine, planned.degree)
-    place = int(np.searchsorted(fine, middle)) - 2
-    points[0, place] += 1e-6
-    points[0, place + 1] -= 1e-6
-    assert "ds/dt below zero" in failing_checks(
-        replace(planned, knots=fine, control_points=points)
-    )
+    finer = with_knots(planned, np.linspace(middle - 1e-6, middle + 1e-6, 8))
+    place = int(np.searchsorted(finer.knots, middle)) - 2
+    both = 0, [place, place + 1]
+    back = with_entry(finer, "control_points", both, [1e-6, -1e-6])
+    assert "ds/dt below zero" in failing_checks(back)
 
 
 @pytest.mark.parametrize("point", [2, 8, 13, 20])
@@ -364,15 +315,11 @@ def test_wrong_control_points(planned, row, point):
 
 def test_a_bump_of_a_spline_between_two_nodes(planned):
     """Knots of its own make room for it where no node is."""
-    t = planned.times / planned.t_end
-    fine = np.sort(
-        np.concatenate([planned.knots, np.linspace(t[MIDDLE], t[MIDDLE + 1], 10)[1:-1]])
-    )
-    points = insert_knots(planned.control_points, planned.knots, fine, planned.degree)
-    points[1, int(np.searchsorted(fine, 0.5 * (t[MIDDLE] + t[MIDDLE + 1]))) - 2] += 1e-5
-    assert failing_checks(replace(planned, knots=fine, control_points=points)) == {
-        "redundant joints' splines"
-    }
+    begin, end = planned.times[MIDDLE : MIDDLE + 2] / planned.t_end
+    finer = with_knots(planned, np.linspace(begin, end, 10)[1:-1])
+    place = int(np.searchsorted(finer.knots, 0.5 * (begin + end))) - 2
+    bump = with_entry(finer, "control_points", (1, place), 1e-5)
+    assert failing_checks(bump) == {"redundant joints' splines"}
 
 
 def test_the_torque_is_found_to_a_hundred_thousandth(planned):

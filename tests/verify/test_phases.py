@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 from brachis.verify import verify_trajectory
+from support.checks import check_of, failing_checks, with_entry
 from support.gantry import DEGREE, DWELL, SPEED, SPLINES, TASK, gantry_motion, quintic
 
 
-def failing_checks(trajectory):
-    return {
-        check.name for check in verify_trajectory(trajectory).checks if not check.passed
-    }
-
-
 def value_of(trajectory, name):
-    checks = {check.name: check for check in verify_trajectory(trajectory).checks}
-    return checks[name].value
+    return check_of(verify_trajectory(trajectory), name).value
 
 
 def with_curve(phase, place, by):
@@ -54,16 +48,13 @@ def test_a_dwell_of_another_length(duration):
 
 
 def test_a_dwell_that_is_missing():
-    assert failing_checks(gantry_motion((SPLINES[0], *SPLINES[2:]))) == {
-        "duration of dwells"
-    }
-
-
-def test_a_dwell_that_nobody_asked_for():
+    """It is missed, and one that nobody asked for is found."""
+    without = SPLINES[0], *SPLINES[2:]
+    assert failing_checks(gantry_motion(without)) == {"duration of dwells"}
     (line, *rest) = TASK["path"]
     path = [{"line": line["line"], "stop": True}, *rest]
     assert failing_checks(gantry_motion(path=path)) == {"duration of dwells"}
-    assert failing_checks(gantry_motion((SPLINES[0], *SPLINES[2:]), path=path)) == set()
+    assert failing_checks(gantry_motion(without, path=path)) == set()
 
 
 def test_a_stop_without_rest():
@@ -105,13 +96,10 @@ def test_a_jump_at_a_flying_link_is_refused_in_any_case():
 
 def test_a_motion_in_a_dwell():
     motion = gantry_motion(spline={"degree": DEGREE, "rest": "velocity"})
-    before = motion.qddot_before.copy()
-    before[2, 0] = 0.1
-    before[2, 1] = -0.1  # the tool stays
-    moving = replace(motion, qddot_before=before)
-    assert "velocity in dwells" in failing_checks(moving)
-    assert "velocity at stops" not in failing_checks(moving)
-    assert "path error" not in failing_checks(moving)
+    rates = [0.1, -0.1, 0.0]  # the tool stays
+    failed = failing_checks(with_entry(motion, "qddot_before", 2, rates))
+    assert "velocity in dwells" in failed
+    assert not failed & {"velocity at stops", "path error"}
 
 
 @pytest.mark.parametrize(
@@ -124,26 +112,22 @@ def test_another_speed_than_the_given_one(factor, passes):
     assert value_of(motion, "process speed") == pytest.approx(factor - 1.0, rel=1e-3)
 
 
-def test_a_speed_that_changes_within_its_part():
-    """At both ends it is as given, and so is its mean."""
-    splines = with_curve(3, 2, 1e-5)
-    assert "process speed" in failing_checks(gantry_motion(splines))
-
-
 def test_a_given_speed_that_begins_elsewhere():
     limits = {"process_speed": {"speed": SPEED, "s": [0.56, 0.85]}}
     found = failing_checks(gantry_motion(tool_limits=limits))
     assert found == {"s where process speeds begin and end"}
 
 
-def test_a_motion_that_goes_back():
-    assert "ds/dt below zero" in failing_checks(gantry_motion(with_curve(2, 1, -1e-6)))
-
-
-def test_a_jump_of_s_between_phases():
-    assert "s where phases meet" in failing_checks(
-        gantry_motion(with_curve(2, 0, 1e-6))
-    )
+@pytest.mark.parametrize(
+    ("phase", "place", "by", "check"),
+    [
+        (3, 2, 1e-5, "process speed"),  # at both ends it is as given, as is its mean
+        (2, 1, -1e-6, "ds/dt below zero"),
+        (2, 0, 1e-6, "s where phases meet"),
+    ],
+)
+def test_a_control_point_that_is_off(phase, place, by, check):
+    assert check in failing_checks(gantry_motion(with_curve(phase, place, by)))
 
 
 def test_holding_torque_in_a_dwell_counts():
@@ -170,7 +154,5 @@ def test_a_part_with_a_given_speed_is_checked_to_its_ends():
 
 def test_a_stop_between_nodes_is_looked_at_where_it_is_said_to_be():
     """The phase ends 0.1 s late: s is where it should be, and the arm is in motion."""
-    motion = gantry_motion()
-    ends = motion.phase_ends.copy()
-    ends[1] += 0.1
-    assert "velocity at stops" in failing_checks(replace(motion, phase_ends=ends))
+    late = with_entry(gantry_motion(), "phase_ends", 1, 0.1)
+    assert "velocity at stops" in failing_checks(late)

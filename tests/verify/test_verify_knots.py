@@ -7,6 +7,7 @@ import pytest
 
 import brachis
 from brachis.robot import dynamics
+from support.checks import check_of
 
 
 def test_the_verification_sees_an_excess_just_before_a_knot():
@@ -29,7 +30,7 @@ def test_the_verification_sees_an_excess_just_before_a_knot():
     before = np.array(motion.qddot_before)
     before[knot] *= 3.0
     verification = brachis.verify_trajectory(replace(motion, qddot_before=before))
-    (check,) = [c for c in verification.checks if c.name == "torque ratio"]
+    check = check_of(verification, "torque ratio")
     assert not check.passed
     assert check.time == motion.times[knot]
     # The grid beside the knot sees less than the torque on its left side, which this is.

@@ -7,36 +7,27 @@ import pytest
 
 import brachis
 from brachis import Trajectory, export, verify_trajectory
+from support.checks import check_of, with_entry
 from support.effort import QUICK
 from support.spatial import START, rail_arm
 
 
 @pytest.fixture(scope="module", params=["pose", "pose_free_roll"])
 def motion(request):
-    task = {
-        "brachis": 1,
-        "start": {"joints": START},
-        "task_space": request.param,
-        "path": [
-            {
-                "line": {"by": [0.1, 0.3, 0.0]},
-                "orientation": {"rotate": {"axis": [1, 0, 0], "angle_deg": 20}},
-            }
-        ],
-        "redundant_joints": ["j1"],
-        "spline": {"intervals": 10},
-        "search": QUICK,
-    }
-    return brachis.plan(rail_arm(tool=(0.0, 0.0, 0.12)), task).trajectory
+    turning = {"rotate": {"axis": [1, 0, 0], "angle_deg": 20}}
+    return brachis.plan(
+        rail_arm(tool=(0.0, 0.0, 0.12)),
+        start=START,
+        task_space=request.param,
+        path=brachis.Line(by=[0.1, 0.3, 0.0], orientation=turning),
+        redundant_joints=["j1"],
+        intervals=10,
+        search=QUICK,
+    ).trajectory
 
 
 def path_error(trajectory):
-    (check,) = [
-        check
-        for check in verify_trajectory(trajectory).checks
-        if check.name == "path error"
-    ]
-    return check
+    return check_of(verify_trajectory(trajectory), "path error")
 
 
 def test_the_motion_of_the_plan_passes(motion):
@@ -46,9 +37,8 @@ def test_the_motion_of_the_plan_passes(motion):
 @pytest.mark.parametrize("joint", range(1, 7))
 def test_it_sees_every_joint_that_is_a_little_off(motion, joint):
     """The last joint turns the tool about its own axis and does not move it."""
-    q = np.array(motion.q)
-    q[:, joint] += 1e-7
-    check = path_error(replace(motion, q=q))
+    off = with_entry(motion, "q", (slice(None), joint), 1e-7)
+    check = path_error(off)
     assert not check.passed
     assert check.value == pytest.approx(1e-7, rel=0.9)
 

@@ -5,7 +5,8 @@ import yaml
 
 import brachis
 from brachis.robot.from_task import robot_from_settings
-from brachis.task import check_robot_settings
+from brachis.task import check_robot_settings, task_with
+from support.checks import check_of, failing_checks
 from support.effort import QUICK
 
 ROBOT = yaml.safe_load("""
@@ -40,38 +41,24 @@ speed_override: 80 %
 @pytest.fixture(scope="module")
 def saved(scara_urdf, tmp_path_factory):
     """A planned motion, read back from its file."""
-    task = {
-        "brachis": 1,
-        "robot": {"urdf": str(scara_urdf), **ROBOT},
-        "start": {"joints": [0.5, -2.0, 2.0]},
-        "task_space": ["x", "y"],
-        "path": [{"line": {"by": [-0.5, 0.4]}}],
-        "redundant_joints": ["j3"],
-        "spline": {"intervals": 12},
-        "search": QUICK,
-    }
     path = tmp_path_factory.mktemp("saved") / "result.npz"
+    task = task_with(
+        robot={"urdf": str(scara_urdf), **ROBOT},
+        start=[0.5, -2.0, 2.0],
+        task_space=["x", "y"],
+        path=brachis.Line(by=[-0.5, 0.4]),
+        redundant_joints=["j3"],
+        intervals=12,
+        search=QUICK,
+    )
     brachis.plan(task).trajectory.save(path)
     return brachis.Trajectory.load(path)
 
 
-def failing_checks(trajectory, robot):
-    """Names of the checks that fail for a robot in the place of the saved one."""
-    return {
-        check.name
-        for check in brachis.verify_trajectory(trajectory, robot=robot).checks
-        if not check.passed
-    }
-
-
 def test_a_saved_motion_passes_again(saved):
-    assert brachis.verify_trajectory(saved).passed
-    ratios = [
-        check.value
-        for check in brachis.verify_trajectory(saved).checks
-        if check.name == "torque ratio"
-    ]
-    assert ratios[0] > 0.999
+    verification = brachis.verify_trajectory(saved)
+    assert verification.passed
+    assert check_of(verification, "torque ratio").value > 0.999
 
 
 @pytest.mark.parametrize(
@@ -95,4 +82,4 @@ def test_every_part_counts(saved, change, fault):
     other = robot_from_settings(
         check_robot_settings({**ROBOT, **change}), urdf_text=saved.urdf
     )
-    assert fault in failing_checks(saved, other)
+    assert fault in failing_checks(saved, robot=other)

@@ -1,4 +1,4 @@
-"""What holds a planned motion back, from the multipliers of its own optimum: no solve."""
+"""What holds a planned motion back, from the multipliers of its own optimum, without a further solve."""
 
 from __future__ import annotations
 
@@ -21,28 +21,29 @@ from brachis.problem.problem import Problem
 from brachis.trajectory.sensitivities import Sensitivities, Sensitivity
 
 _BALANCED = 0.02
-"""Part of the gradient that multipliers may leave unbalanced before the timings of the motion say more than they."""
+"""Fraction of the gradient that multipliers may leave unbalanced: beyond it, timings of the motion are more
+accurate."""
 
 
 def explain_motion(
     problem: Problem, motion: SolvedProgram, optimum: SolvedProgram
 ) -> Sensitivities:
-    """Derive what limits and figures of the task cost, and what other demands of the task would save.
+    """Derive what limits and figures of the task cost, and what different demands would save.
 
     Parameters
     ----------
     problem : Problem
-        Of which the programs are made.
+        Problem from which the programs were made.
     motion : SolvedProgram
         `FinishedCandidate.refined`.
     optimum : SolvedProgram
-        `FinishedCandidate.optimum`: what limits cost is the same part of its end time as of the motion's.
+        `FinishedCandidate.optimum`. A limit costs the same fraction of its end time as of the end time of the motion.
 
     Returns
     -------
     Sensitivities
-        From timings of the joint path if splines were laid along its timing, and no program over time balances the
-        gradient.
+        They come from timings of the joint path if splines were laid along its timing, and no program over time
+        balances the gradient.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def explain_motion(
 def _find_multipliers(
     motion: SolvedProgram, optimum: SolvedProgram
 ) -> Multipliers | None:
-    """Find the multipliers of the optimum; None if timings of the motion say more."""
+    """Find the multipliers of the optimum; None if timings of the motion are more accurate."""
     report = optimum.report
     if report.solver == SOLVER:
         return None
@@ -82,7 +83,7 @@ def _find_multipliers(
 def _merge_figures(
     costs: Iterable[Sensitivity], time_ratio: float
 ) -> tuple[Sensitivity, ...]:
-    """Add up what figures of the same name cost, times a ratio: some limits follow from process speeds."""
+    """Add up the costs of figures with the same name, times a ratio: some limits follow from process speeds."""
     joined: dict[tuple[str, str | None], Sensitivity] = {}
     for entry in costs:
         name = str(entry.label), entry.side

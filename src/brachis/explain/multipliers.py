@@ -1,15 +1,16 @@
-"""Multipliers of a program at its answer, and how well they balance the gradient.
+"""Multipliers of a program at its solution, and how well they balance the gradient.
 
 At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
 
     grad t_E = sum_i w_i p_i,    w_i >= 0,
 
-with p_i the gradient of a row or variable at its lower bound, or minus that at its upper bound. The norm of what is
-left over, relative to the gradient's, measures how far an answer is from being stationary. The multipliers are the
-solver's if they balance the gradient, otherwise those by least squares.
+where p_i is the gradient of a row or variable at its lower bound, or the negative gradient at its upper bound. The norm
+of the remainder, relative to that of the gradient, measures how far a solution is from being stationary. The
+multipliers are those of the solver if they balance the gradient; otherwise they are found by least squares.
 
-If the slopes are linearly dependent, many sets of multipliers balance the gradient. The one that holds for a relaxation
-is the one that promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+If the slopes are linearly dependent, many sets of multipliers balance the gradient. The set that is valid for a
+relaxation is the one that promises the least gain (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977). A linear program
+finds it.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 from brachis.optimise.program import Program
 
 _INDEPENDENT = 1e-9
-"""Length of a slope, or of what is left of it without those before it, below which it is rounding."""
+"""Length below which a slope, or its part that is independent of the slopes before it, counts as rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +33,9 @@ class ActiveSet:
     Attributes
     ----------
     slopes : (p, v) ndarray
-        Gradients of active rows, then of active variables; negative ones at upper bounds.
+        Gradients of active rows, then of active variables; at upper bounds, the negative gradients.
     rows : (a,) int ndarray
-        Rows to which the first a slopes belong.
+        Numbers of the rows to which the first a slopes belong.
     signs : (a,) ndarray
         1 at a lower bound, -1 at an upper one.
     equalities : int
@@ -48,7 +49,7 @@ class ActiveSet:
 
     @classmethod
     def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
-        """Collect rows and variables that are nearer to their bounds than `near`, dimensionless, at x, (v,).
+        """Collect rows and variables that are closer to their bounds than `near`, dimensionless, at x, (v,).
 
         Rows that no variable changes, such as those at a given start posture, are left out.
 
@@ -80,7 +81,7 @@ class ActiveSet:
 
     @cached_property
     def dependent(self) -> bool:
-        """Whether several sets of multipliers may balance a gradient; those of equalities have either sign."""
+        """Whether several sets of multipliers may balance a gradient; those of equalities may have either sign."""
         # A slope that depends on those before it leaves nothing on the diagonal.
         diagonal = np.diag(np.linalg.qr(self.slopes.T, mode="r"))
         remaining = np.count_nonzero(np.abs(diagonal) > _INDEPENDENT)
@@ -89,9 +90,10 @@ class ActiveSet:
     def weights_of(
         self, gradient: np.ndarray, multipliers: np.ndarray | None
     ) -> np.ndarray:
-        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can.
+        """Return weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance the rest.
 
-        Without multipliers, the weights that balance the gradient best: non-negative least squares (Lawson and Hanson).
+        Without multipliers, these are the weights that balance the gradient best, from non-negative least squares
+        (Lawson and Hanson).
         """
         if multipliers is not None:
             of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
@@ -110,17 +112,18 @@ class ActiveSet:
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multipliers at an answer, and how well they balance the gradient.
+    """Multipliers at a solution, and how well they balance the gradient.
 
     Attributes
     ----------
     active_set : ActiveSet
     weights : (p,) ndarray
-        Multipliers of the active_set, >= 0; s for a row, whose values are dimensionless.
+        Multipliers of the active set, >= 0; for rows, whose values are dimensionless, in s.
     source : str
         ``"solver"`` or ``"least squares"``.
     residual : float
-        Norm of what the weights leave of the gradient, relative to the gradient's; 1 if nothing balances.
+        Norm of the part of the gradient that the weights do not balance, relative to that of the gradient; 1 if nothing
+        is balanced.
     """
 
     active_set: ActiveSet
@@ -129,22 +132,22 @@ class Multipliers:
     residual: float
 
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
-        """Directional derivative of t_E if bounds are relaxed.
+        """Return the directional derivative of t_E if bounds are relaxed.
 
-        The residual is the part of the gradient that the weights leave. Multipliers that make up no larger part of what
-        the weights balance cannot be told from zero, and count as 0.
+        The residual is the fraction of the gradient that the weights do not balance. Multipliers that contribute no
+        more than this fraction to the balanced gradient cannot be distinguished from zero, and count as 0.
 
         Parameters
         ----------
         relaxation : (c,) ndarray
             Rates >= 0 at which the bounds of every row move outwards, dimensionless.
         side : {1, -1}, optional
-            Only lower, or only upper bounds move.
+            If given, only lower (1) or only upper (-1) bounds move.
 
         Returns
         -------
         float
-            <= 0, s.
+            The derivative, <= 0, s.
         """
         rates = np.zeros(len(self.weights))
         of_rows = relaxation[self.active_set.rows]
@@ -162,7 +165,8 @@ class Multipliers:
         from scipy.optimize import linprog
         from scipy.sparse import csc_array
 
-        # Of all weights that balance as much, those that promise the least. The stubs do not know sparse matrices.
+        # Of all weights that balance as much, take those that promise the least gain. The stubs do not know sparse
+        # matrices.
         columns = csc_array(slopes.T)
         modest = linprog(rates, A_eq=columns, b_eq=self.weights @ slopes).x  # type: ignore[call-overload]
         return -float(rates @ (self.weights if modest is None else modest))
@@ -171,14 +175,14 @@ class Multipliers:
 def multipliers_of(
     program: Program, x: np.ndarray, of_solver: np.ndarray | None = None
 ) -> Multipliers:
-    """Find the multipliers at an answer.
+    """Find the multipliers at a solution.
 
     Parameters
     ----------
     program : Program
     x : (v,) ndarray
     of_solver : (c,) ndarray, optional
-        The solver's multipliers of the rows; L = t_E - of_solver . rows.
+        The solver's multipliers of the rows; the Lagrangian is L = t_E - of_solver . rows.
 
     Returns
     -------
@@ -194,7 +198,7 @@ def multipliers_of(
     if of_solver is None:
         del sources["solver"]
     tried = []
-    # A row that is near its bound without being active would count as one that takes over within any step.
+    # A row that is close to its bound without being active would count as one that becomes active within any step.
     for near in (1e-8, 1e-7, 1e-6, 1e-5):
         active_set = ActiveSet.at(program, x, near)
         for source, of_rows in sources.items():

@@ -1,6 +1,7 @@
-"""What the motion would gain if the task asked for less: no wait, no stop, no rest, another posture at an end.
+"""The time that the motion would save if the task demanded less: no wait, no stop, no rest, another end posture.
 
-What a stop or rest costs comes from timings of the same joint path, what postures cost to first order from the optimum.
+The cost of a stop or of rest comes from timings of the same joint path. The cost of a posture comes from the optimum,
+to first order.
 """
 
 from __future__ import annotations
@@ -22,17 +23,18 @@ from brachis.robot.task_map import JointSpace
 from brachis.trajectory.sensitivities import Accuracy, TaskSaving
 
 _PLACES = 400
-"""Places at which the joint path of a phase is timed: right within 1 % of what a stop costs."""
+"""Number of points at which the joint path of a phase is timed: the cost of a stop is then accurate to within 1 %."""
 _RAMPS = (slice(3), slice(-3, None))
-"""Ends of the two intervals beside rest within which an acceleration that is zero there costs time. Estimates were 40
-to 129 % of what planning again saved on 15 motions, in the median 95 %; with one interval they were lower."""
+"""Breaks of the two intervals beside rest, within which an acceleration that is zero at rest costs time. On 15 motions,
+the estimates were 40 to 129 % of what planning again saved, with a median of 95 %; with one interval they were
+lower."""
 _RANGE_SHARE = 1e-3
-"""Part of the range of a joint by which a posture is changed: what it saves was up to 12 % off on 20 tasks, 2 % in the
-median. With 1 % it was 4 to 23 % off on six, and all of it on one."""
+"""Fraction of a joint's range by which a posture is changed. On 20 tasks, the estimated saving was up to 12 % off, with
+a median of 2 %. With a fraction of 1 % it was 4 to 23 % off on six tasks, and entirely wrong on one."""
 _SHARE_OF_SPEED = 0.1
-"""By how much the speed at an end is higher, as a part of it; from rest, as a part of the mean speed."""
+"""Fraction by which the speed at an end is raised; from rest, a fraction of the mean speed."""
 _SELF_MOTION_STEP = 1e-5
-"""By how much a posture is changed for a derivative, m or rad."""
+"""Change of a posture for a derivative by differences, m or rad."""
 
 PhasePoint = tuple[Phase, np.ndarray]
 """A phase and its variables."""
@@ -41,13 +43,13 @@ PhasePoint = tuple[Phase, np.ndarray]
 def task_savings(
     problem: Problem, motion: SolvedProgram, answer: OptimalMotion
 ) -> tuple[TaskSaving, ...]:
-    """List what other demands of the task would save, those that save most first; what saves nothing is left out.
+    """List what different demands would save, the largest savings first; demands that save nothing are left out.
 
     Parameters
     ----------
     problem : Problem
     motion : SolvedProgram
-        Of its program.
+        A solved program of the problem.
     answer : OptimalMotion
     """
     phase_points = motion.program.split(motion.x)
@@ -63,7 +65,7 @@ def task_savings(
 
 
 def _list_dwells(problem: Problem) -> Iterator[TaskSaving]:
-    """List what the task's waits take."""
+    """List how long the task's waits take."""
     for leg in problem.legs:
         yield TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
 
@@ -71,7 +73,7 @@ def _list_dwells(problem: Problem) -> Iterator[TaskSaving]:
 def _list_stops(
     problem: Problem, phase_points: list[PhasePoint]
 ) -> Iterator[TaskSaving]:
-    """Bound what the motion would gain along the same joint path without each of its stops."""
+    """Bound the time that the motion would save along the same joint path without each of its stops."""
     for number, leg in enumerate(problem.legs[:-1]):
         if not leg.stops:
             continue
@@ -86,9 +88,9 @@ def _list_stops(
 
 
 def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
-    """Derive what the motion would gain if the tool were faster at the ends of the path, or moved slowly there.
+    """Derive the time that would be saved if the tool were faster at the ends of the path, or moved slowly there.
 
-    Redundant joints stay at rest for that, although a motion that passes an end may move them too.
+    The redundant joints stay at rest there, although a motion that passes an end may move them too.
     """
     boundary = problem.task.boundary
     if boundary.periodic:
@@ -112,7 +114,7 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
 def _list_rest(
     problem: Problem, phase_points: list[PhasePoint]
 ) -> Iterator[TaskSaving]:
-    """Estimate what the motion would gain if its accelerations could jump where it rests."""
+    """Estimate the time that the motion would save if its accelerations could jump where it rests."""
     spline = problem.task.spline
     order = max((limit.order for limit in problem.limits), default=0)
     if spline.vanishing == 1 or order > 2:  # limits on jerk need a smooth acceleration
@@ -131,7 +133,7 @@ def _list_rest(
 
 
 def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
-    """Derive what self-motions of the postures that are given at the ends save."""
+    """Derive the time that self-motions of the given postures at the ends would save."""
     if problem.task.boundary.periodic or isinstance(problem.task_map, JointSpace):
         return
     robot = problem.robot
@@ -162,7 +164,7 @@ def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSavi
             amount += f" ({np.degrees(abs(step[joint_index])):.3g} deg)"
         side = "higher" if step[joint_index] > 0.0 else "lower"
         joint = robot.joint_names[joint_index]
-        change = f"another {name} posture, {joint} {amount} {side} and the tool in its place,"
+        change = f"another {name} posture, with {joint} {amount} {side} and the tool in the same place,"
         yield TaskSaving(change, saved, "estimate")
 
 

@@ -1,12 +1,12 @@
 """What a limit costs: the derivative of t_E with respect to every limit, from the multipliers.
 
 Every limit lists the figures that a user could change, and the rates d at which the bounds of its rows move outwards if
-one of them is relaxed (`brachis.limits.Bound`). With the multipliers w of these rows (see `multipliers`)
+one of these figures is relaxed (`brachis.limits.Bound`). With the multipliers w of these rows (see `multipliers`)
 
     dt_E / d(figure) = -sum w d.
 
-A motion along the timing of its joint path has the multipliers of the program over time that improved this joint path.
-Where there was none, the joint path is timed again with every limit a little raised.
+For a motion along the timing of its joint path, the multipliers are those of the program over time that improved this
+joint path. If there was no such program, the joint path is timed again with every limit slightly raised.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from brachis.trajectory.sensitivities import (
 )
 
 LimitFigure = tuple[Label, str | None]
-"""A figure that a user could change: what is limited, and the end of its range."""
+"""A figure that a user could change: what is limited, and which end of its range."""
 LimitBound = tuple[Limit, Bound]
 _RAISED = 1e-3
-"""Part by which limits are raised."""
+"""Fraction by which limits are raised."""
 _NEAR = 0.02
-"""Part of a limit within which a joint path may be held back by it."""
+"""Distance from a limit, as a fraction of it, within which the limit may hold a joint path back."""
 _LEAST_COST = 1e-9
-"""s; a branch boundary that costs less is not listed."""
+"""Cost, s, below which a branch boundary is not listed."""
 
 
 def figures_of(program: Program) -> dict[LimitFigure, list[LimitBound]]:
-    """List the figures of a program's limits; phases that keep a part of a limit each have an object of their own."""
+    """List the figures of a program's limits, each with all its bounds: phases may have limit objects of their own."""
     figures: defaultdict[LimitFigure, list[LimitBound]] = defaultdict(list)
     for limit in program.limits:
         for bound in limit.bounds:
@@ -56,12 +56,12 @@ def _figure(limit: Limit, bound: Bound) -> LimitFigure:
 
 
 def label_of_speed(cause: str, speed: float, key: str) -> Label:
-    """Name a speed, m/s, that holds on several parts of the path."""
+    """Return the label of a speed, m/s, that is given on several parts of the path."""
     return Label("tool", f"{cause} of {speed:.10g} m/s", "m/s", key, cause=cause)
 
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
-    """Derive what every limit costs from a problem and the multipliers of its answer."""
+    """Derive what every limit costs from a program and the multipliers at its solution."""
     costs = []
     boundaries = []
     for (label, side), bounds in figures_of(program).items():
@@ -86,7 +86,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
 
 
 def _sensitivity(label: Label, bound: Bound, saved_per_unit: float) -> Sensitivity:
-    """Write down what a figure costs whose relaxation by a unit changes t_E by `saved_per_unit`, s."""
+    """Return the sensitivity to a figure whose relaxation by one unit changes t_E by `saved_per_unit`, s."""
     outwards = -1.0 if bound.side == "lower" else 1.0
     derivative = outwards * saved_per_unit
     return Sensitivity(label, bound.side, bound.figure, bound.full_scale, derivative)
@@ -95,18 +95,18 @@ def _sensitivity(label: Label, bound: Bound, saved_per_unit: float) -> Sensitivi
 def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     """Time the joint path of a motion again with each limit raised by 0.1 %.
 
-    This is right where the joint path is given. Where it is free, two limits may be active at once all along it: then
-    raising one of them saves nothing unless the joint path changes too.
+    The result is exact if the joint path is given. If it is free, two limits may be active at once all along it.
+    Raising one of them then saves nothing unless the joint path changes too.
 
     Parameters
     ----------
     solved : SolvedProgram
-        Timed by the phase plane.
+        A motion timed by the phase plane.
 
     Returns
     -------
     Sensitivities
-        Those of limits that a slower motion does not relieve are zero.
+        The sensitivities to limits that a slower motion does not relieve are zero.
     """
     changes: defaultdict[LimitFigure, float] = defaultdict(float)
     bounds: dict[LimitFigure, Bound] = {}

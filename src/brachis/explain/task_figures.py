@@ -1,8 +1,9 @@
-"""What figures of the task cost that no row of a program has for a bound: process speeds and blends.
+"""The cost of figures of the task that are not bounds of rows in a program: process speeds and blends.
 
 At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is
-the change of L if such a figure changes and the free variables stay; durations that follow from a speed change with it.
-If only the timing is optimal, of a joint path that follows from the path of the tool, dt_E is the change of its time.
+the change of L if such a figure changes and the free variables stay the same; durations that follow from a speed change
+with it. If the joint path follows from the path of the tool and only its timing is optimal, dt_E is the change of the
+least time along it.
 """
 
 from __future__ import annotations
@@ -39,17 +40,18 @@ from brachis.task.segments import BSplineSegment
 from brachis.trajectory.sensitivities import Sensitivity
 
 Value = Callable[[Program, np.ndarray], float]
-"""A function of a program and a point, (v,), whose change is that of t_E, s, if a figure of the task changes."""
+"""A function of a program and a point, (v,), that changes by as much as t_E, s, if a figure of the task changes."""
 STEP_OF_TIMING = 1e-2
-"""Part by which figures are changed in timings, whose stations make an error of about 1e-6 of the time."""
+"""Fraction by which figures are changed in timings, whose stations cause an error of about 1e-6 of the time."""
 PROCESS_SPEED_KEY = "tool_limits.process_speed"
-"""Key of the task that lists process speeds which are not those of segments."""
+"""Key of the task that lists the process speeds that are not given by segments."""
 
 
 def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
-    """Return the Lagrangian, of rows of limits and links: where the tool moves at an end, others are not the same.
+    """Return the Lagrangian as a function of a program and a point.
 
-    Limits without active rows are left out: distances of bodies take long.
+    It has only the rows of limits and links, because the others change if the tool moves at an end. Limits without
+    active rows are left out: distances of bodies take long to compute.
     """
     active = multipliers.active_set
     of_rows = multipliers.weights[: len(active.rows)]
@@ -81,25 +83,25 @@ def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
 
 
 def least_time_of(program: Program, x: np.ndarray) -> float:
-    """Time the joint paths of a point, (v,); NaN where the speed of a phase is given."""
+    """Return the least time along the joint paths of a point, (v,); NaN if the speed of a phase is given."""
     return sum(least_time(lay_course(*pair, FINE_PLACES)) for pair in program.split(x))
 
 
 @dataclass(frozen=True, eq=False)
 class OptimalMotion:
-    """An answer, and how t_E changes with what its program is made of.
+    """A solution, and how t_E changes with the problem.
 
     Attributes
     ----------
     problem : Problem
     program : Program
-        Of the problem.
+        Program of the problem.
     x : (v,) ndarray
-        The answer.
+        The solution.
     value : callable
         `lagrangian_of` the program, or `least_time_of`.
     step : float
-        Part by which figures are changed.
+        Fraction by which figures are changed.
     """
 
     problem: Problem
@@ -109,7 +111,7 @@ class OptimalMotion:
     step: float = 1e-4
 
     def change(self, changed: Problem) -> float:
-        """Change of t_E, s, to first order, for another problem with as many legs; 0 if it leaves its joint maps."""
+        """Return the change of t_E, s, to first order, for a changed problem with as many legs; 0 if out of reach."""
         phases = []
         x_by_phase = []
         for number, (phase, x_of_phase) in enumerate(self.program.split(self.x)):
@@ -132,12 +134,12 @@ class OptimalMotion:
 
     @cached_property
     def _unchanged(self) -> float:
-        """Value of the answer itself."""
+        """Value of the solution itself."""
         return self.value(self.program, self.x)
 
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
-    """Give as many derivatives as before: from rest, those of redundant joints stay zero if the tool begins to move."""
+    """Prescribe as many derivatives as before: those of redundant joints stay zero if the tool now moves at an end."""
     sides: dict[str, Any] = {}
     for side in ("start", "end"):
         pairs = zip(getattr(before, side), getattr(after, side), strict=True)
@@ -149,7 +151,7 @@ def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
 
 
 def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
-    """Take a motion, (v,), over to a phase that passes the same leg at other path coordinates, or at another speed."""
+    """Carry a motion, (v,), over to a phase that travels the same leg at other path coordinates, or another speed."""
     carried = x.copy()
     if target.time_law is not None:
         carried[0] = target.time_law.duration
@@ -162,11 +164,11 @@ def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
 
 
 TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
-"""A figure of a task, what it costs not known yet, and the problem with another value of it."""
+"""A figure of a task whose cost is not known yet, and a function from a value of it to the changed problem."""
 
 
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
-    """Derive what the task's figures cost; figures that cannot be larger are left out."""
+    """Derive the costs of the task's figures; figures that cannot be made larger are left out."""
     costs = []
     for cost, change in (*_speeds(motion.problem), *_blends(motion.problem)):
         step = motion.step * cost.figure
@@ -179,11 +181,11 @@ def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
 
 
 def _speeds(problem: Problem) -> Iterator[TaskFigure]:
-    """List process speeds; parts of the path with the same speed have one figure."""
+    """List process speeds; parts of the path with the same speed share one figure."""
     limits = problem.task.tool_limits
 
     def change(before: float, after: float) -> Problem:
-        """Pass the parts with one speed, m/s, at another one."""
+        """Return the problem with one process speed, m/s, replaced by another."""
         sections = tuple(
             section.model_copy(update={"speed": after})
             if section.speed == before
@@ -210,7 +212,7 @@ def _speeds(problem: Problem) -> Iterator[TaskFigure]:
 
 
 def _blends(problem: Problem) -> Iterator[TaskFigure]:
-    """List blends: those of the same size are one figure, and so are all blends along the points of one file."""
+    """List blends; those of the same size share one figure, and so do all blends along the points of one file."""
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()
     places: dict[int | None, tuple[float, float]] = {}
@@ -227,7 +229,7 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
             groups[source if is_of_file else segment.blend].append(number)
 
     def change(numbers: list[int], before: float, after: float) -> Problem:
-        """Make the blends after some segments larger, as from one size to another, m."""
+        """Enlarge the blends after some segments in the ratio of two sizes, m."""
         path = list(segments)
         for number in numbers:
             size = (path[number].blend or 0.0) * after / before
@@ -249,12 +251,12 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:
-    """Return the problem with another path, and the process speeds and feed rates on it.
+    """Return the problem of another task, with its path, and the process speeds and feed rates on it.
 
     Raises
     ------
     PathError
-        The path is not possible.
+        The task describes no valid path.
     """
     task_map = problem.task_map
     path = path_of(task_map, task)

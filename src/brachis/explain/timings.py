@@ -1,4 +1,4 @@
-"""Timings of the joint path of a phase: of all of it, or of what is beside one of its ends."""
+"""Timings of the joint path of a phase, or of the part beside one of its ends."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from brachis.optimise.phase import Phase
 from brachis.timing import Course, TimedCourse
 
 FINE_PLACES = 3000
-"""Places at which a joint path is timed if a limit or a figure changes by 1 % or less: with 2000, three figures of four
-motions were 1.2 to 1.5 % off those with 4000."""
+"""Number of points at which a joint path is timed if a limit or a figure changes by 1 % or less. With 2000 points,
+three figures of four motions differed by 1.2 to 1.5 % from those with 4000."""
 
 
 def lay_course(
     phase: Phase, x: np.ndarray, places: int, intervals: slice = slice(None)
 ) -> TimedCourse | None:
-    """Lay the joint path of a motion, (v,), over some intervals of its phase; None where its speed is given.
+    """Return the timed course of a motion, (v,), over some intervals of its phase.
 
-    None too where it leaves the joint map.
+    It is None if the speed of the phase is given, or if the motion leaves the joint map.
     """
     if phase.time_law is not None:
         return None
@@ -43,10 +43,10 @@ def least_time(
     free_end: int | None = None,
     narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
 ) -> float:
-    """Time a joint path, s; NaN where that is not possible.
+    """Return the least time along a joint path, s; NaN if there is none.
 
-    The ends are passed as the motion passes them; one of them, 0 or -1, may be free. Limits may be `narrower`,
-    see `PhasePlane.narrow`.
+    The speeds at the ends are those of the motion; the speed at one end, 0 or -1, may be free. Limits may be
+    `narrower`; see `PhasePlane.narrow`.
     """
     if course is None:
         return np.nan

@@ -174,8 +174,7 @@ class Phase:
     def restrict_to(self, curves: np.ndarray, *, is_followed: bool = False) -> Phase:
         """Return the same phase with `limits_near` curves, (S, c).
 
-        If splines are laid along the motion later and postures are free, limits on postures are narrowed by their
-        inset.
+        If splines are laid along the motion later and postures are free, limits on these are narrowed by their inset.
         """
         limits = self.limits_near(curves)
         if is_followed and self.joint_map.r:
@@ -266,8 +265,7 @@ class Phase:
         x : (v,) ndarray
         factor : float
         held : tuple of int, optional
-            Numbers of time derivatives of the redundant joints that stay the same at start and end. The correction that
-            this needs fades away from the ends.
+            Numbers of time derivatives of the redundant joints that stay the same at start and end.
         """
         if self.time_law is not None:
             return x

@@ -1,1 +1,1 @@
-"""A task on a robot: path, postures, choices of redundant joints; what is refused at once, and what is implausible."""
+"""A task bound to a robot: path, postures, choices of redundant joints, and checks of the task and the robot."""

@@ -1,4 +1,4 @@
-"""Start and end postures that are refused at once: out of range, too heavy to hold, off the path, on another branch."""
+"""Checks that refuse postures and task spaces at once, such as a posture that is out of range or too heavy to hold."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from brachis.robot.task_map.protocol import TURN_ROWS
 from brachis.task import SplineSettings, Task
 
 _REGULAR = 1e-6
-"""Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+"""Least singular value of the Jacobian, in m and rad, below which a posture counts as a singularity of the arm."""
 
 
 _MOVE_BODIES = (
@@ -39,7 +39,7 @@ def check_postures(
     postures: Mapping[str, np.ndarray],
     path: Path,
 ) -> tuple[Limit, ...]:
-    """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
+    """Refuse start and end postures that are out of range, exceed a limit at rest, or are off the path.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ def check_postures(
     task_map : TaskMap
     limits : tuple of Limit
     postures : mapping of str to (n,) ndarray
-        Those of ``start`` and ``end`` that are given.
+        The given postures among ``start`` and ``end``.
     path : Path
 
     Returns
     -------
     tuple of Limit
-        Widened where such a posture, or a path of joints, exceeds them within ``refinement.tolerance``.
+        The limits, widened where such a posture, or a path of joints, exceeds them by up to ``refinement.tolerance``.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def check_postures(
 
 
 def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
-    """Let a limit hold at rest in postures, (K, n), that exceed it within the tolerance."""
+    """Widen a limit so that it allows postures, (K, n), at rest that exceed it by up to the tolerance."""
     if limit.at_rest == "nothing":
         return limit
     values, beyond = beyond_at_rest(limit, postures, 0.0)
@@ -127,7 +127,12 @@ def _check_range(
     raise error(
         f"joint {name!r} is out of its range",
         where=where,
-        found=f"{position} {unit}{place}",
+        found="; likewise ".join(
+            [
+                f"{position} {unit}{place}",
+                *np.array(robot.joint_names)[joints[1:]],
+            ]
+        ),
         allowed=f"{first} {unit} to {last} {unit}",
         hint=hint or f"{advice} robot.limits.position.{name}",
     )
@@ -136,7 +141,7 @@ def _check_range(
 def beyond_at_rest(
     limit: Limit, q: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a limit in postures (K, n) at rest, (K, c), and how far beyond its tolerance they are, if positive."""
+    """Return the values, (K, c), of a limit in postures (K, n) at rest, and their violation less the tolerance."""
     values = limit.values(Moments.at_rest(q))
     return values, limit.violation(values) - tolerance
 
@@ -164,7 +169,7 @@ def _check_at_rest(
         further_subjects = name_first(subjects, ", ")
         likewise = ""
         if further_subjects:
-            # No number for one of several joints is enough.
+            # With several joints, changing the limit of one of them is not enough.
             likewise = f"; likewise {further_subjects}"
             remedies = [remedy for remedy in remedies if remedy.key != label.key]
         hint = "Choose another posture"
@@ -185,9 +190,9 @@ def _check_at_rest(
 def load_remedies(
     robot: Robot, limit: Limit, column: int, ratio: float
 ) -> list[Remedy]:
-    """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload.
+    """List remedies if holding the arm takes `ratio` times a limit: a larger limit, or a smaller payload.
 
-    A payload changes nothing in a limit of postures alone.
+    The payload does not affect limits on postures.
     """
     label = limit.labels[column]
     scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
@@ -195,7 +200,7 @@ def load_remedies(
     for bound in limit.bounds if label.key else ():
         if bound.column == column and bound.side is None:
             figure = bound.figure / scale
-            # 5 % more than holding the arm takes.
+            # The new limit is 5 % more than what is needed to hold the arm.
             enough = 1.05 * ratio * figure
             remedies.append(Remedy(label.key, figure, enough, label.unit))
     payload = robot.settings.payload
@@ -206,7 +211,7 @@ def load_remedies(
 
 
 def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
-    """Refuse limits on a derivative that is unbounded, where the one before it jumps: at knots, or at the ends.
+    """Refuse limits on a derivative that is unbounded because the derivative before it jumps, at knots or at the ends.
 
     Raises
     ------
@@ -232,7 +237,7 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
 
 
 def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
-    """Write a value and its bounds in the unit of the value's label, which is left out."""
+    """Write a value and its bounds in the unit of the value's label, without the unit itself."""
     bounds = [bound for bound in limit.bounds if bound.column == column]
     if not bounds:
         written, low, high = write_apart(
@@ -256,7 +261,7 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
 def check_regular(
     task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> None:
-    """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
+    """Refuse a start or end posture that is a singularity of the arm, because no coordinates describe motions from it.
 
     Raises
     ------
@@ -275,13 +280,13 @@ def check_regular(
 
 
 _TURNS_ALONE = (
-    "rx, ry and rz are turns of the tool about x, y and z; if it turns about one of these alone, prescribe rows of its "
-    "position, and yaw, pitch or roll"
+    "rx, ry and rz are turns of the tool about x, y and z; if it turns about only one of these axes, prescribe rows of "
+    "its position, and yaw, pitch or roll"
 )
 
 
 def check_independent(task_map: TaskMap) -> None:
-    """Refuse rows of the task space that no joint changes, such as z of an arm in a plane, or that depend on others.
+    """Refuse rows of the task space that no joint changes, such as z of a planar arm, or that depend on each other.
 
     Raises
     ------
@@ -289,6 +294,8 @@ def check_independent(task_map: TaskMap) -> None:
     """
     rows = task_map.rows
     jacobians = task_map.sample_jacobians()
+    if _least_singular_values(jacobians).max() >= _REGULAR:
+        return
     numbers = range(len(rows))
     subsets = [
         subset
@@ -296,8 +303,6 @@ def check_independent(task_map: TaskMap) -> None:
         for subset in combinations(numbers, size)
         if _least_singular_values(jacobians[:, list(subset)]).max() < _REGULAR
     ]
-    if not subsets:
-        return
     fixed = [subset[0] for subset in subsets if len(subset) == 1]
     dependent = fixed or subsets[0]
     together = ", ".join(rows[row] for row in dependent)
@@ -323,12 +328,12 @@ def check_independent(task_map: TaskMap) -> None:
 
 
 def _least_singular_values(jacobians: np.ndarray) -> np.ndarray:
-    """Least singular values, (K,), of Jacobians, (K, m, n)."""
+    """Return the least singular values, (K,), of Jacobians, (K, m, n)."""
     return np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, -1])
 
 
 def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, key: str) -> int:
-    """Index of the closed form's branch on which the posture at the path's start or end, stated at `key`, lies.
+    """Return the index of the closed form's branch that contains a start or end posture, stated at `key`.
 
     Raises
     ------

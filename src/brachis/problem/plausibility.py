@@ -1,6 +1,6 @@
-"""Implausible figures of a task or a robot: unusually large ones look like another unit.
+"""Checks for implausible figures of a task or a robot: an unusually large figure looks like a different unit.
 
-`USUAL` is the table of the largest usual figures; `brachis.task.LIMIT_KINDS` has those of joint limits.
+`USUAL` is the table of the largest usual figures; those of joint limits are in `brachis.task.LIMIT_KINDS`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _OR_NULL = ", or null for no limit"
 _OF_SIZE = " for an arm of this size"
 _OF_MASS = " for this mass"
 USUAL = {
-    # Delta robots move at 10 m/s, and accelerate with 15 g.
+    # Delta robots move at 10 m/s and accelerate at 15 g.
     "tool_limits.speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
     "tool_limits.process_speed": ("the speed looks like mm/s", 50.0, "m/s", ""),
     "tool_limits.acceleration": (
@@ -62,7 +62,7 @@ USUAL = {
     "path": ("the turn of the angle looks like degrees", 2.0 * TURN, "rad", ""),
     "path.dwell": ("the time looks like ms", 100.0, "s", ""),
     "link": ("the distance from the joint before looks like mm", 20.0, "m", ""),
-    # Times the arm's length.
+    # This is multiplied by the arm's length.
     "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
     "robot.mounting.xyz": ("the distance looks like mm", 200.0, "m", ""),
     "scene": ("the length looks like mm", 30.0, "m", ""),
@@ -70,14 +70,14 @@ USUAL = {
     "robot.gravity": ("the acceleration looks like mm/s^2", 100.0, "m/s^2", ""),
     # The strongest arms of 1 m reach carry 130 kg, and more with the square of the reach.
     "robot.payload.mass": ("the mass looks like g", 150.0, "kg", _OF_SIZE),
-    # Times the arm's length.
+    # This is multiplied by the arm's length.
     "robot.payload.com": (
         "the distance from the tool frame looks like mm",
         1.0,
         "m",
         _OF_SIZE,
     ),
-    # Times mass and length squared.
+    # This is multiplied by the mass and the square of the length.
     "robot.payload.inertia": (
         "the inertia looks like kg mm^2",
         1.0,
@@ -86,9 +86,9 @@ USUAL = {
     ),
     # A body of the heaviest arms weighs 150 kg for each square metre of their reach.
     "body mass": ("the mass looks like g", 1e3, "kg", _OF_SIZE),
-    # Times the mass: bodies 10 m wide.
+    # This is multiplied by the mass: bodies 10 m wide.
     "body inertia": ("the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS),
-    # Of a gram at 10 cm: smaller moments do not show in torques.
+    # The moment of a gram at 10 cm: smaller ones do not show in torques.
     "massless inertia": (
         "moments of inertia without mass are left out",
         1e-5,
@@ -96,27 +96,26 @@ USUAL = {
         ", or a mass > 0 kg",
     ),
 }
-"""By key of the task or part of the robot: what a larger figure looks like, the largest usual one, its unit, for what.
-
-Some of the largest figures are ratios to the robot's own measure.
+"""For each key of the task or part of the robot: what a larger figure looks like, the largest usual figure, its unit,
+and a remark on it. Some of the largest figures are relative to the size or the mass of the robot.
 """
 
 
 def _figure(
     key: str, value: float, scale: float = 1.0, where: str = ""
 ) -> Iterator[Issue]:
-    """Compare a value with `scale` times the largest usual one."""
+    """Compare a value with `scale` times the largest usual value."""
     message, largest, unit, aside = USUAL[key]
     return issue_above(where or key, message, value, largest * scale, unit, aside)
 
 
 def of_task(task: Task) -> tuple[Issue, ...]:
-    """Look at limits of the tool, bodies, angles, and points that the path was fitted to."""
+    """Check limits of the tool, bodies, angles, and points that the path was fitted to."""
     return (*_tool(task), *_bodies(task), *_angles(task), *_fits(task))
 
 
 def _fits(task: Task) -> Iterator[Issue]:
-    """Look at the points that the path was fitted to, and at how far from them it may be."""
+    """Check the points that the path was fitted to, and the allowed distance from them."""
     for fit in task.fits:
         where = f"path: {fit.source}"
         if fit.doubt:
@@ -135,7 +134,7 @@ def _fits(task: Task) -> Iterator[Issue]:
 
 
 def _bodies(task: Task) -> Iterator[Issue]:
-    """Compare sizes and places of a scene's bodies, and what keeps clear of them, with a large cell."""
+    """Compare the sizes and positions of a scene's bodies, and the clearances around them, with a large cell."""
     for body in task.scene:
         largest = max(body.size, *map(abs, body.position))
         yield from _figure("scene", largest, where=f"scene: {body.name}")
@@ -146,7 +145,7 @@ def _bodies(task: Task) -> Iterator[Issue]:
 
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
-    """Look at what a task says about where the robot is, in postures or along a path of joints."""
+    """Check the joint positions and tool angles that a task states, in postures and along the path."""
     task_map = problem.task_map
     along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
     issues: list[Issue] = []
@@ -164,34 +163,34 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
 
 
 def of_postures(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
-    """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
+    """Check the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
-    # A joint without a range may have wound up five times; of a posture in degrees one joint is beyond that.
+    # A joint without a range may have made five turns. In a posture in degrees, at least one joint exceeds this.
     farthest = np.abs(postures[..., robot.revolute]).max(initial=0.0)
     turns = 1.0 if farthest > 5.0 * TURN + 1e-3 else 5.0
     for i in np.flatnonzero(robot.revolute):
         values = postures.reshape(-1, robot.n)[:, i]
         value = float(values[np.argmax(np.abs(values))])
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
-        # Neither the path nor an option is a key of a posture.
+        # Only the key of a posture has a dot; a path and an option have none.
         advice = f"; in a task file: !degrees {value:.6g}" if "." in key else ""
         yield from angle_issue(f"{key}.{robot.joint_names[i]}", value, usual, advice)
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
-    """Look at a motion's end time, s, beside the `least` that the planner allows, s."""
+    """Compare a motion's end time, s, with the `least` end time that the planner allows, s."""
     if t_end > 1.01 * least:
         return ()
     message = (
         "the end time is the smallest that the planner allows, so no limit is active"
     )
-    usual = "more; see the units of limits, lengths and masses"
+    usual = "more; check the units of limits, lengths and masses"
     return (Issue("t_end", message, f"{t_end:.6g} s", usual),)
 
 
 def _tool(task: Task) -> Iterator[Issue]:
-    """Look at the largest of every kind of limit, and at dwells; feed rates have units of their own."""
+    """Check the largest limit of every kind, and dwells; feed rates are left out, because they have their own units."""
     limits = task.tool_limits
     speed = limits.speed
     values = {
@@ -213,16 +212,16 @@ def _tool(task: Task) -> Iterator[Issue]:
 
 
 def _largest(values: Iterable[float | None]) -> float:
-    """Return the largest value; those from 1e5 on are written for "no limit"."""
+    """Return the largest value below 1e5; larger values stand for "no limit"."""
     return max(
         (value for value in values if value is not None and value < 1e5), default=0.0
     )
 
 
 def _angles(task: Task) -> Iterator[Issue]:
-    """Look for eighths of up to two turns in rad where degrees belong.
+    """Look for angles in rad where degrees belong: multiples of an eighth of a turn, up to two turns.
 
-    They are written with two decimals: 3.14 is half a turn, 5.5 is not seven eighths.
+    They have to agree in two decimals: 3.14 is half a turn, but 5.5 is not seven eighths of a turn.
     """
     content = task.model_dump(
         include={
@@ -254,7 +253,7 @@ def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
 
 
 def of_robot(robot: Robot) -> tuple[Issue, ...]:
-    """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
+    """Check the limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
     return (
         *_scales(robot),
@@ -278,7 +277,7 @@ def _scales(robot: Robot) -> Iterator[Issue]:
 
 
 def _friction(robot: Robot) -> Iterator[Issue]:
-    """Look at damping of the URDF, which is often there to calm a simulation."""
+    """Check the damping in the URDF, which often serves only to stabilise a simulation."""
     message = "the damping of the URDF takes more than the largest torque at the largest speed"
     for i, damping in enumerate(robot.urdf_dynamics.friction["viscous"]):
         fastest = robot.limits.velocity[i]
@@ -294,7 +293,7 @@ def _friction(robot: Robot) -> Iterator[Issue]:
 
 
 def _lengths(robot: Robot) -> Iterator[Issue]:
-    """Look at the way from joint to joint, tool offset, mounting and gravity."""
+    """Check the distances from joint to joint, the tool offset, the mounting and gravity."""
     *links, last = link_lengths(robot)
     settings = robot.settings
     offset = math.hypot(*settings.tool_offset.xyz)
@@ -307,7 +306,7 @@ def _lengths(robot: Robot) -> Iterator[Issue]:
 
 
 def _payload(robot: Robot, bare: Robot) -> Iterator[Issue]:
-    """Look at what the tool carries."""
+    """Check the payload."""
     payload = robot.settings.payload
     if payload is None:
         return
@@ -338,7 +337,7 @@ def _masses(robot: Robot) -> Iterator[Issue]:
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
-    """Say how far along its way the tool is at a path coordinate; nothing at the start, and of a path of joints."""
+    """Say how far the tool has moved at a path coordinate; empty at the start, and for a path of joints."""
     if not task_map.axes or s == 0.0:
         return ""
     places = path.sample(np.append(np.linspace(0.0, s, 201), np.linspace(s, 1.0, 201)))
@@ -356,7 +355,7 @@ def check_within_reach(problem: Problem) -> None:
     """
     task_map = problem.task_map
     path = problem.path
-    if not task_map.axes:  # of joints
+    if not task_map.axes:  # a path of joints
         return
     s = np.linspace(0.0, 1.0, 401)
     robot = task_map.robot
@@ -372,14 +371,14 @@ def check_within_reach(problem: Problem) -> None:
         f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",
         s_interval=(float(beyond[0]), float(beyond[-1])),
         found=f"{distance} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
-        allowed=f"at most {largest} m, which is all links and slides in one line",
+        allowed=f"at most {largest} m, the length of all links and slides in one line",
         hint=distance_hint(furthest, far)
         or "Shorten or move the path, or the robot's mounting",
     )
 
 
 def _magnitudes(robot: Robot) -> Iterator[Issue]:
-    """Look at the limits around zero of a robot without payload."""
+    """Check the limits around zero of a robot without payload."""
     for kind, row in LIMIT_KINDS.items():
         usual = row.usual
         if usual is None:
@@ -393,7 +392,7 @@ def _magnitudes(robot: Robot) -> Iterator[Issue]:
             if has_curve or not 0.0 < value < math.inf:
                 continue
             largest = _largest_usual(robot, usual, i)
-            # A power of ten is written for "no limit"; of torques one that no figure in mNm can be.
+            # A power of ten stands for "no limit"; for torques, only one that cannot be a figure in mNm.
             is_placeholder = round(math.log10(value), 9).is_integer()
             if usual.compares_weight:
                 is_stated = value == _stated(robot, usual, i)
@@ -411,7 +410,7 @@ def _magnitudes(robot: Robot) -> Iterator[Issue]:
 
 
 def _stated(robot: Robot, usual: UsualLimit, joint: int) -> float | None:
-    """Return the URDF's limit that a joint's is compared with."""
+    """Return the limit in the URDF with which a joint's limit is compared."""
     kind = usual.urdf_kind
     return robot.urdf_limits[joint].of_kind(kind) if kind else None
 
@@ -420,20 +419,20 @@ def _largest_usual(robot: Robot, usual: UsualLimit, joint: int) -> float:
     """Return the largest usual limit of a joint."""
     unit = robot.position_units[joint]
     candidates = [usual.largest[unit]]
-    # What holds the arm's own weight at full reach, Nm.
+    # Torque that holds the arm's own weight at full reach, Nm.
     holding = pin.computeTotalMass(robot.model) * 9.81 * sum(link_lengths(robot))
     if usual.compares_weight and unit == "rad" and holding > 0.0:
         # Arms hold a tenth to five times their own weight at full reach.
         candidates.append(50.0 * holding)
     stated = _stated(robot, usual, joint)
-    # URDFs state 1 for a limit that nobody knows.
+    # URDFs state 1 for an unknown limit.
     if stated and stated != 1.0:
         candidates.append(max(usual.urdf_factor * stated, usual.urdf_least))
     return float(min(candidates))
 
 
 def _ranges(robot: Robot) -> Iterator[Issue]:
-    """Look at position ranges: joints with cables make a dozen turns at most."""
+    """Check position ranges: joints with cables make a dozen turns at most."""
     limits = robot.limits
     columns = zip(
         robot.joint_names,
@@ -450,7 +449,7 @@ def _ranges(robot: Robot) -> Iterator[Issue]:
         if stated > 0.0:
             least = 4.0 * math.pi if unit == "rad" else 5.0
             usual = min(usual, max(5.0 * stated, least))
-        # An end beyond this is written for "no limit": in degrees, ranges end at 720.
+        # A larger figure stands for "no limit": in degrees, ranges end at 720.
         if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
             yield from issue_above(
                 f"robot.limits.position.{name}",
@@ -464,11 +463,11 @@ def _ranges(robot: Robot) -> Iterator[Issue]:
 
 
 def _curves(robot: Robot) -> Iterator[Issue]:
-    """Look at the torques and the speeds of torque-speed curves."""
+    """Check the torques and the speeds of torque-speed curves."""
     scale = robot.settings.limits.scale.torque
     usual_torque = LIMIT_KINDS["torque"].usual
     assert usual_torque is not None
-    # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
+    # Without load, motors turn at up to twice the rated speed; a figure in rpm is 9.5 times that in rad/s.
     rpm = {"rad": "rpm", "m": "mm per second"}
     usual_speed = UsualLimit(rpm, FASTEST, "velocity", 5.0, 5.0)
     behind_gear = "; at the joint, behind its gear"

@@ -1,4 +1,4 @@
-"""What a task comes to on a robot: path and postures, and the choices of redundant joints and branch."""
+"""A task bound to a robot: path and postures, and the choices of redundant joints and branch."""
 
 from __future__ import annotations
 
@@ -42,25 +42,25 @@ from brachis.task import Task
 
 @dataclass(frozen=True, repr=False)
 class Problem(Summary):
-    """A task on a robot.
+    """A task bound to a robot.
 
     Attributes
     ----------
     task : Task
     robot : Robot
-        With the virtual roll joint where the tool may roll.
+        The robot, with a virtual roll joint if the tool may roll.
     task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
-        Postures, None where free; the same one where the motion is periodic. Otherwise the end is the posture nearest
-        to the given one that is on the path, which that one may miss by what its digits leave out.
+        Postures at the ends; None if free. They are the same if the motion is periodic. Otherwise the end is the
+        posture on the path that is closest to the given one, which may miss the path by the rounding of its digits.
     limits : tuple of Limit
     legs : tuple of Leg
-        Parts of the path that are passed in one go.
+        Parts of the path that are travelled in one go.
     time_laws : tuple of TimeLaw or None
-        One for each leg; None where its speed is free.
+        Time law of each leg; None if its speed is free.
     user_limits : tuple of LimitModel
-        Those of the limits that are not in the task, as the user gave them.
+        Limits that are not in the task, as the user gave them.
     """
 
     task: Task
@@ -90,14 +90,16 @@ class Problem(Summary):
         Raises
         ------
         InputError
-            Task space, postures, path or a limit of the user's do not fit the robot; the splines are not smooth enough
-            for a limit.
+            The task space, the postures, the path or a limit of the user does not fit the robot, or the splines are not
+            smooth enough for a limit.
         """
         robot, task_map = bind(robot, task.task_space, task.tolerances)
         at_start = task.joints_at("start")
         at_end = task.joints_at("end")
         start = at_start and robot.posture(*at_start)
         end = at_end and robot.posture(*at_end)
+        if robot.n >= task_map.m and not isinstance(task_map, JointSpace):
+            check_independent(task_map)
         path = path_of(task_map, task)
         task = with_held_speeds(with_feed_rates(task, path), task_map, path)
         if task.boundary.periodic:
@@ -132,14 +134,14 @@ class Problem(Summary):
 
     @cached_property
     def leg_paths(self) -> tuple[Path, ...]:
-        """The path of each leg, of which only the pieces of the leg are sampled."""
+        """The path of each leg; only the pieces on the leg are sampled."""
         return tuple(self.path.between(leg.begin, leg.end) for leg in self.legs)
 
     @cached_property
     def leg_rates(self) -> tuple[tuple[float, float], ...]:
-        """ds/dt at begin and end of each leg, 1/s.
+        """ds/dt at the beginning and end of each leg, 1/s.
 
-        It is 0 at rest. At the ends of a periodic motion it is 0 if no speed is given there.
+        The rate is 0 at rest. At the ends of a periodic motion it is 0 if no speed is given there.
         """
         first, last = self.end_rates
         inner = [self._rate_between(*pair) for pair in pairwise(range(len(self.legs)))]
@@ -159,11 +161,11 @@ class Problem(Summary):
 
     @property
     def r(self) -> int:
-        """Degree of redundancy: by how many the joints outnumber the rows of the task space."""
+        """Degree of redundancy: the number of joints minus the number of rows of the task space."""
         return self.robot.n - self.task_map.m
 
     def _law_rate(self, leg: int, end: int) -> float:
-        """Return ds/dt at an end (0 or -1) of a leg, 1/s; 0 where its speed is free."""
+        """Return ds/dt at an end (0 or -1) of a leg, 1/s; 0 if its speed is free."""
         law = self.time_laws[leg]
         return 0.0 if law is None else float(law.ends[end, 1])
 
@@ -189,7 +191,7 @@ class Problem(Summary):
 
 
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
-    """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
+    """Return the posture at the end of the path closest to a given one, (n,), which may already be there."""
     place = path.sample(np.ones(1)).target
     if isinstance(task_map, JointSpace):
         return np.asarray(place[0])
@@ -211,7 +213,7 @@ class Decomposition(Summary):
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branches : tuple of int
-        Indices into ``match.solver.branches``; one where start or end posture is given.
+        Indices into ``match.solver.branches``; only one if the start or end posture is given.
     """
 
     problem: Problem
@@ -226,7 +228,7 @@ class Decomposition(Summary):
 
     @property
     def clearance(self) -> float:
-        """Least branch margin of the start posture, of the end posture where the start is free; zero without both."""
+        """Least branch margin of the start posture, or of the end posture if the start is free; zero if both are."""
         posture = self.problem.end if self.problem.start is None else self.problem.start
         if posture is None:
             return 0.0
@@ -234,7 +236,7 @@ class Decomposition(Summary):
         return float(margins.min(initial=np.inf))
 
     def joint_map(self, start: np.ndarray, branch: int) -> ClosedFormMap:
-        """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
+        """Combine robot, path and closed form for a motion that begins at, or close to, `start`, (n,)."""
         task_map = self.problem.task_map
         path = self.problem.path
         solver = self.match.solver
@@ -245,7 +247,7 @@ class Decomposition(Summary):
 class Decompositions(Sequence[Decomposition]):
     """The decompositions that the task allows. They are computed when first used; see `decompositions_of`.
 
-    Searches in charts that begin at a given posture never ask for them.
+    Searches in charts that begin at a given posture never need them.
 
     Attributes
     ----------
@@ -261,18 +263,18 @@ class Decompositions(Sequence[Decomposition]):
         return decompositions_of(self.problem, self.families)
 
     def __len__(self) -> int:
-        """How many they are."""
+        """Return the number of decompositions."""
         return len(self._found)
 
     def __getitem__(self, index: Any) -> Any:
-        """Return one of them, or some."""
+        """Return one of the decompositions, or several."""
         return self._found[index]
 
 
 def decompositions_of(
     problem: Problem, families: Sequence[ik.Family] = ()
 ) -> list[Decomposition]:
-    """List the choices that the task allows.
+    """List the decompositions that the task allows.
 
     Parameters
     ----------
@@ -283,16 +285,17 @@ def decompositions_of(
     Returns
     -------
     list of Decomposition
-        With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first; none where
-        the robot has no closed form, or the path is one of joints. At least one if the task names the joints.
+        With ``redundant_joints: auto``, the decomposition with the largest branch margin at the start posture comes
+        first. The list is empty if the robot has no closed form, or if the path is one of joints. If the task names the
+        joints, it has at least one item.
 
     Raises
     ------
     DecompositionError
-        No closed form fits.
+        No closed form fits the robot and the task.
     StartError
-        A given posture is singular, or on another branch than the task's or the end posture's where a branch or named
-        joints bind the motion to one.
+        A given posture is singular. Or a branch or named joints bind the motion to one branch, and a given posture is
+        on another.
     UnknownNameError
         The robot has no such joint, or the closed form no such branch.
     """
@@ -309,11 +312,9 @@ def decompositions_of(
     tried = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in tried if isinstance(candidate, ik.Match)]
     is_bound = task.branch != "auto" or task.search.guesses != "lattice"
-    if not matches and robot.n >= task_map.m:
-        check_independent(task_map)
     if not matches and (is_bound or robot.n < task_map.m):
         if len(tried) <= 1:
-            # Nothing to choose: the reasons of the only choice, or the wrong number of joints.
+            # There is nothing to choose: report the reasons for the only choice, or the wrong number of joints.
             ik.find(robot, task_map, (), families=families)
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
@@ -338,7 +339,7 @@ def decompositions_of(
 
 
 def _with_tool_joints(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Add the virtual joints of the tool where these are the redundant joints that are left out."""
+    """Add the virtual joints of the tool if these are the redundant joints that `names` leaves out."""
     robot = task_map.robot
     virtual = [joint.name for joint in robot.tool_joints if joint.name not in names]
     is_short = robot.n - task_map.m - len(names) == len(virtual)

@@ -1,4 +1,4 @@
-"""Search for the fastest motion: joint paths from lattices, a portfolio over decompositions, branches and guesses."""
+"""Search for the fastest motion: lattices give joint paths, and the most promising ones are optimised."""
 
 from brachis.search.guesses import first_guess
 from brachis.search.portfolio import Search

@@ -11,11 +11,11 @@ from brachis.search.stages import coordinates
 WORDS = ("joints", "branch", "origin")
 TIMES = ("estimate [s]", "t_end [s]")
 STATUS = "status"
-"""The columns; named as in the JSON."""
+"""The names of the columns, as in the JSON."""
 
 
 def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Return a row of text for each candidate, as `Candidate.to_dict` gives it."""
+    """Return a row of text for each candidate, which is a dictionary from `Candidate.to_dict`."""
     rows = []
     for candidate in candidates:
         status = str(candidate.get("status", ""))

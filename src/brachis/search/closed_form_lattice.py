@@ -1,10 +1,12 @@
 """The lattice of one choice of redundant joints, whose closed form gives the postures.
 
-The redundant joints are cut into cells. Every node (a cell, a branch and the posture that
-the closed form gives there) is joined to the cells around it at the next station, on the
-same branch and clear of its boundary. One redundant joint is searched completely at the
-lattice's spacing. Of several, all neighbours along one joint at a time and random ones,
-and a layer keeps a bounded number of nodes, half of them the nearest and half far apart.
+The ranges of the redundant joints are cut into cells. A node is a cell, a branch and
+the posture that the closed form gives there. Every node is joined to the surrounding
+cells at the next station, on the same branch and clear of its boundary. A single
+redundant joint is searched completely at the lattice's spacing. With several redundant
+joints, nodes are joined to neighbours along one joint at a time and to random ones, and
+a layer keeps a bounded number of nodes: half of them with the shortest joint paths,
+half far apart.
 """
 
 from __future__ import annotations
@@ -31,11 +33,11 @@ class Cells:
     origin : (r,) ndarray
         Position of cell 0, rad or m.
     size : (r,) ndarray
-        rad or m.
+        Size of a cell, rad or m.
     first, last : (r,) int ndarray
-        Cells at which a motion with a free start may begin.
+        First and last cells at which a motion with a free start may begin.
     window : int
-        Cells within which the next station's are looked for, of a single redundant joint.
+        Number of cells to either side that are searched at the next station, with a single redundant joint.
     """
 
     origin: np.ndarray
@@ -53,8 +55,9 @@ class Cells:
     ) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
-        The posture, (n,), from which joint paths begin is the middle of a cell. Without one the cells cover closed
-        ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
+        If joint paths begin at a given posture, (n,), it is the middle of a cell. Without one, the cells cover closed
+        ranges, one turn of an open revolute joint, and the part of an open prismatic joint close to the beginning of
+        the path.
         """
         problem = decomposition.problem
         joints = list(decomposition.redundant)
@@ -68,7 +71,7 @@ class Cells:
         else:
             origin = posture[joints]
         reach = np.where(turning, 0.5 * TURN, 2.0 + problem.path.length)
-        # Closed ranges are covered whole, up to 20 rad or m: every cell takes memory.
+        # Closed ranges are covered completely, up to 20 rad or m to either side: every cell takes memory.
         closed = np.isfinite(low) & np.isfinite(high)
         reach = np.where(closed, np.maximum(reach, 20.0), reach)
         first = np.ceil((np.maximum(low, origin - reach) - origin) / size).astype(int)
@@ -81,21 +84,21 @@ class Cells:
         return len(self.size)
 
     def positions(self, cells: np.ndarray) -> np.ndarray:
-        """Redundant joints, (K, r), rad or m, at the middle of cells (K, r)."""
+        """Return the redundant joints, (K, r), rad or m, in the middle of cells (K, r)."""
         return self.origin + cells * self.size
 
     def near(self, positions: np.ndarray) -> np.ndarray:
-        """Cells, (..., r), in which positions, (..., r), are."""
+        """Return the cells, (..., r), that contain positions, (..., r)."""
         return np.rint((positions - self.origin) / self.size).astype(int)
 
     def everywhere(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """List the cells at which a motion may begin, (C, r); of several joints `count` random ones."""
+        """List the cells at which a motion may begin, (C, r); with several joints, `count` random cells."""
         if self.r == 1:
             return np.arange(self.first[0], self.last[0] + 1)[:, None]
         return rng.integers(self.first, self.last + 1, (count if self.r else 1, self.r))
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
-        """Offsets to the cells that the next station may be in, (O, r): all within the window, or a sample."""
+        """Return offsets to the cells that are tried at the next station, (O, r): all in the window, or a sample."""
         if self.r == 1:
             return np.arange(-self.window, self.window + 1)[:, None]
         still = np.zeros((1, self.r), dtype=int)
@@ -107,15 +110,15 @@ class Cells:
 
 
 def cell_sizes(robot: Robot, cells_per_turn: int) -> np.ndarray:
-    """Return cell sizes of the joints, (n,), rad or m: at least four cells in a range."""
+    """Return the cell sizes of the joints, (n,), rad or m; a range has at least four cells."""
     limits = robot.limits
     size = np.where(robot.revolute, TURN, 3.0) / cells_per_turn
     return np.minimum(size, 0.25 * (limits.position_upper - limits.position_lower))
 
 
 def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the different cells, (C, r), and the index, (K,), among them of each of `cells`, (K, r)."""
-    # A number for each cell: NumPy's sorting of rows takes many times as long.
+    """Return the distinct cells, (C, r), and for each of `cells`, (K, r), its index among them, (K,)."""
+    # Each cell gets a number, because NumPy takes many times as long to sort rows.
     span = np.ptp(cells, axis=0) + 1
     weights = np.append(np.cumprod(span[:0:-1])[::-1], 1)[: len(span)]
     keys = (cells - cells.min(axis=0)) @ weights.astype(int)
@@ -124,7 +127,7 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near_start(problem: Problem, joint: int) -> float:
-    """Where a joint takes the tool nearest to the path's beginning, if it is prismatic, others at zero, m."""
+    """Return where a prismatic joint brings the tool closest to the path's beginning, other joints at zero, m."""
     axes = list(problem.task_map.axes)
     q = np.zeros((2, problem.robot.n))
     q[1, joint] = 1.0
@@ -137,7 +140,7 @@ def _near_start(problem: Problem, joint: int) -> float:
 def solve_all(
     decomposition: Decomposition, targets: np.ndarray, q_r: np.ndarray
 ) -> np.ndarray:
-    """Postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r); NaN out of reach."""
+    """Return postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r); some are NaN."""
     n = decomposition.problem.robot.n
     answers = decomposition.match.solver.solve(targets, q_r)
     q = np.empty((*answers.shape[:3], n))
@@ -147,13 +150,13 @@ def solve_all(
 
 
 class ClosedFormLattice(Lattice):
-    """Lattice of a choice of redundant joints.
+    """Lattice for one choice of redundant joints.
 
     Parameters
     ----------
     decomposition : Decomposition
     **options
-        As of `Lattice`.
+        See `Lattice`.
     """
 
     def __init__(
@@ -169,7 +172,7 @@ class ClosedFormLattice(Lattice):
         self._modulo = turning
         self._given_branch = decomposition.branches[0]
         self._cells = Cells.of(decomposition, self._cells_per_turn, self._origin)
-        # Branch margin that nodes keep: half that of the given posture, where that is less.
+        # Branch margin that nodes keep: 0.02, or half that of the given posture if this is less.
         self._clear = 0.02
         if self._origin is not None:
             margins = self._solver.branch_margins(
@@ -178,13 +181,13 @@ class ClosedFormLattice(Lattice):
             self._clear = min(0.02, 0.5 * margins.min(initial=np.inf))
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are in the end's cell: the plan goes on to the end."""
+        """Tell which nodes, (K,) bool, are in the cell of the given end, which the plan then reaches exactly."""
         allowed = np.full(self._robot.n, LARGEST_STEP)
         allowed[self._redundant] = self._cells.size
         return np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1)
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Make nodes all over the ranges of the redundant joints."""
+        """Create nodes all over the ranges of the redundant joints."""
         cells = self._cells.everywhere(4 * self._nodes, rng)
         branches = np.array(self.decomposition.branches)
         q = self._postures(cells, 0)[:, branches]
@@ -192,12 +195,12 @@ class ClosedFormLattice(Lattice):
         return Layer.start(q[exists], branches[np.nonzero(exists)[1]])
 
     def _postures(self, cells: np.ndarray, station: int) -> np.ndarray:
-        """Postures, (C, B, A, n), of cells, (C, r), on all branches."""
+        """Return the postures, (C, B, A, n), in cells, (C, r), on all branches."""
         targets = np.repeat(self._targets[station][None], len(cells), axis=0)
         return solve_all(self.decomposition, targets, self._cells.positions(cells))
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
-        """List edges to the cells around; at the very end to the given end's, too."""
+        """List edges to the surrounding cells; at the last station, also to the cell of the given end."""
         offsets = self._cells.neighbours(rng)
         nodes = np.arange(len(before.branch))
         node_cells = self._cells.near(before.q[:, self._redundant])
@@ -226,7 +229,7 @@ class ClosedFormLattice(Lattice):
         )
 
     def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
-        """Choose among the nodes clear of the branch boundary that can be held."""
+        """Choose among the nodes that are clear of the branch boundary and can be held at rest."""
         clear = np.ones(len(layer.branch), dtype=bool)
         for branch in np.unique(layer.branch):
             on_branch = layer.branch == branch
@@ -235,7 +238,7 @@ class ClosedFormLattice(Lattice):
         return super()._keep(layer[clear], choose) or OTHER_BRANCH
 
     def _thin(self, layer: Layer) -> Layer:
-        """Keep a bounded number of nodes with several redundant joints."""
+        """Keep a bounded number of nodes if several joints are redundant."""
         if self._cells.r <= 1:
             return layer
         return layer[self._choose_some(layer, self._nodes)]

@@ -1,7 +1,7 @@
 """Joint paths by differential inverse kinematics along the path.
 
-As in the paper, it carries the start posture along the path. Its null-space motion climbs the branch margin and stays
-within the joint ranges, so that the closed form can follow.
+As in the paper, the start posture is carried along the path. The null-space motion increases the branch margin and
+stays within the joint ranges, so that the closed form can follow.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class Strategy:
     push : float
         Strength with which a branch margin below `threshold` is raised.
     threshold : float
-        Dimensionless.
+        Branch margin below which `push` acts, dimensionless.
     drift : float
-        Constant motion along the first null-space direction, rad or m per unit s; other valleys lie beyond it.
+        Constant motion along the first null-space direction, rad or m per unit s, which may lead to another valley.
     centre : float
         Strength with which joints are pulled to the middle of their ranges.
     """
@@ -53,7 +53,7 @@ STRATEGIES = (
 def differential_ik_paths(
     joint_map: ClosedFormMap, deadline: Deadline = NEVER
 ) -> Iterator[np.ndarray]:
-    """Yield joint paths, (steps, 1 + r), strategy after strategy; those not complete by the deadline are left out."""
+    """Yield a joint path, (steps, 1 + r), for each strategy, unless it fails or is not complete by the deadline."""
     for strategy in STRATEGIES if joint_map.r else STRATEGIES[:1]:
         joint_path = differential_ik_path(joint_map, strategy, deadline)
         if joint_path is not None:
@@ -63,10 +63,10 @@ def differential_ik_paths(
 def differential_ik_path(
     joint_map: ClosedFormMap, strategy: Strategy, deadline: Deadline = NEVER
 ) -> np.ndarray | None:
-    """Redundant joints along the path by numeric inverse kinematics from the start posture.
+    """Compute the redundant joints along the path by numeric inverse kinematics from the start posture.
 
-    Near a branch boundary the posture is unfolded first, while the tool stays where it is: there any motion of the tool
-    would need fast joints.
+    Close to a branch boundary the posture is first unfolded while the tool stays where it is, because any motion of the
+    tool would need fast joints there.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def differential_ik_path(
     Returns
     -------
     (steps, 1 + r) ndarray or None
-        Successive values of s and the redundant joints; None if the target cannot be followed, or not in time.
+        Successive values of s and the redundant joints; None if the path cannot be followed, or not in time.
     """
     if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
@@ -113,9 +113,9 @@ def _follow(
     target: np.ndarray,
     step_s: float | None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """One step to the next target: the new posture and the null-space motion made; None if it is not met.
+    """Take one step to the next target; return the new posture and the null-space motion, or None if it is not met.
 
-    `step_s` is the step in s, None for unfolding on the spot.
+    `step_s` is the step in s, or None to unfold on the spot.
     """
     task_map = joint_map.task_map
     for correction in range(5):
@@ -129,7 +129,7 @@ def _follow(
             wish = _wish(joint_map, strategy, q, previous)
             free = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
             size = max(np.abs(free).max(), 1e-9)
-            # No joint moves by more than 0.2 rad or m; unfolding, one does by 0.06.
+            # No joint moves by more than 0.2 rad or m; to unfold, the fastest joint moves by 0.06.
             factor = 0.06 / size if step_s is None else min(step_s, 0.2 / size)
             previous = free * factor
             step = step + previous
@@ -140,11 +140,11 @@ def _follow(
 def _wish(
     joint_map: ClosedFormMap, strategy: Strategy, q: np.ndarray, previous: np.ndarray
 ) -> np.ndarray:
-    """Joint motion per unit s that the null space may realise, (n,)."""
+    """Return the desired joint motion per unit s, (n,), which is then projected onto the null space."""
     lower = joint_map.robot.limits.position_lower
     upper = joint_map.robot.limits.position_upper
     stroke = upper - lower
-    # A tenth of the range, or of a radian or metre of an open one, is kept clear at each end.
+    # At each end a tenth of the range is kept clear, or 0.1 rad or m if the range is open.
     clear = 0.1 * np.where(np.isfinite(stroke), stroke, 1.0)
     wish = 20.0 * np.maximum(lower + clear - q, 0.0)
     wish -= 20.0 * np.maximum(q - upper + clear, 0.0)

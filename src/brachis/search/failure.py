@@ -1,7 +1,7 @@
-"""Why a plan failed: explanations of paths that cannot be followed, as the errors that say so.
+"""Why a plan failed: errors that explain why a path cannot be followed.
 
-What a decomposition reaches of a path is found by random postures at stations along it: is a station out of reach,
-beyond the joint ranges, on another branch, or too heavy to hold?
+Random postures at stations along the path show which part of it a decomposition reaches, and whether a station is out
+of reach, beyond the joint ranges, on another branch, or too heavy to hold.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ def explain_reach(
     ----------
     decomposition : Decomposition
     deadline : Deadline, optional
-        When the search for the reason ends; the advice then says so.
+        When the search for the reason ends; if it found none by then, the advice says so.
 
     Returns
     -------
     PathError or str
-        Advice where every station is within reach.
+        The error, or a text of advice if every station is within reach or the time is up.
     """
     problem = decomposition.problem
     robot = problem.robot
@@ -63,7 +63,7 @@ def explain_reach(
         return _NO_TIME
     anywhere = postures
     if not _has_any(_exist(postures)).all():
-        # Wider ranges tell whether the ranges of the redundant joints or the arm are to blame.
+        # Wider ranges tell whether the ranges of the redundant joints or the arm itself is to blame.
         wider = _sample_postures(decomposition, s, near, deadline, opened=True)
         if wider is None:
             return _NO_TIME
@@ -81,7 +81,7 @@ def explain_reach(
 
     joint_advice = "other redundant joints, " if decomposition.redundant else ""
     return (
-        "Every point of the path is within reach of this branch, but no joint path through them was found; "
+        "Every point of the path is within reach of this branch, but no joint path through all of them was found; "
         f"try {joint_advice}another {posture_name} posture"
     )
 
@@ -93,10 +93,10 @@ def _find_obstacles(
     postures: np.ndarray,
     anywhere: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
-    """Yield at which of S stations something is possible, (S,) bool, and, if it is not: cause, hint and remedies.
+    """Yield, for each obstacle, which of S stations are free of it, (S,) bool, and its cause, hint and remedies.
 
-    The redundant joints of `postures`, (S, T, B, A, n), are within their ranges, those of `anywhere` also beyond them.
-    On the branch of the task's posture, named ``start`` or ``end``, less is possible.
+    The redundant joints of `postures`, (S, T, B, A, n), are within their ranges; `anywhere` also has postures beyond
+    them. If the task gives a posture, named ``start`` or ``end``, the last obstacles are those on its branch.
     """
     problem = decomposition.problem
     robot = problem.robot
@@ -136,7 +136,7 @@ def _find_obstacles(
 
 
 def _unit_hint(problem: Problem) -> str | None:
-    """Say what figure of the path looks like another unit; None if all are plausible."""
+    """Say which figure of the path looks like a different unit; None if all are plausible."""
     issues = [issue for issue in of_places(problem) if issue.where == "path"]
     texts = [
         f"{issue.message[:1].upper()}{issue.message[1:]}: {issue.found}"
@@ -156,13 +156,13 @@ def _are_within(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def _excess(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """How far joints are beyond their ranges, (..., n), rad or m; negative within, NaN where no posture exists."""
+    """Return how far joints are beyond their ranges, (..., n), rad or m; negative within, NaN without a posture."""
     limits = robot.limits
     return np.maximum(limits.position_lower - q, q - limits.position_upper)
 
 
 def _has_any(mask: np.ndarray) -> np.ndarray:
-    """Tell at which stations, (S,), any random joints, branch and alternative of a mask, (S, T, B, A), are true."""
+    """Tell at which stations, (S,), any entry of a mask, (S, T, B, A), is true."""
     return np.asarray(mask.any(axis=(1, 2, 3)))
 
 
@@ -174,10 +174,11 @@ def _sample_postures(
     *,
     opened: bool = False,
 ) -> np.ndarray | None:
-    """Draw T random redundant joints: postures (S, T, B, A, n) that reach stations s, (S,), on all branches.
+    """Draw T values of the redundant joints; return postures (S, T, B, A, n) at stations s, (S,), on all branches.
 
-    Angles are turned into their ranges, and what does not exist is NaN; None if the time is up. `opened` ignores the
-    ranges of the redundant joints; otherwise those of the posture `near` are tried as well.
+    Angles are moved into their ranges by whole turns, and postures that do not exist are NaN. If the time is up, the
+    result is None. With `opened`, the ranges of the redundant joints are ignored; otherwise the redundant joints of the
+    posture `near` are tried as well.
     """
     robot = decomposition.problem.robot
     redundant = list(decomposition.redundant)
@@ -202,7 +203,7 @@ def _sample_postures(
 
 
 def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
-    """Say which joint the posture nearest to the ranges, of (T, B, A, n), has beyond its own, and by how much."""
+    """Say which joint is out of its range, and how far, in the posture of (T, B, A, n) closest to the ranges."""
     q = q[_exist(q)]
     if not len(q):
         return ""
@@ -221,16 +222,16 @@ def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
 def _check_at_rest(
     robot: Robot, limit: Limit, q: np.ndarray
 ) -> tuple[np.ndarray, str, list[Remedy]]:
-    """Tell at which stations a limit allows some posture of (S, T, B, A, n) at rest, (S,) bool.
+    """Tell at which stations, (S,) bool, a limit allows at least one posture of (S, T, B, A, n) at rest.
 
-    Also say what is lacking at the station whose best posture is farthest beyond the limit, and what to change.
+    Also say by how much the limit is exceeded at the station whose best posture is the worst, and what to change.
     """
     allowed = np.zeros(len(q), dtype=bool)
     worst = 0.0
     lack = ""
     remedies = []
     for station, postures in enumerate(q):
-        # A few dozen postures tell enough.
+        # A few dozen postures are enough.
         within = postures[_are_within(robot, postures)][:60]
         if not len(within):
             continue
@@ -248,17 +249,18 @@ def explain_first_failures(
     candidates: Sequence[Candidate],
     deadline: Deadline,
 ) -> PathError | None:
-    """Tell whether the path is out of reach, so that further candidates would be in vain.
+    """Tell whether the path is out of reach, so that further candidates would be futile.
 
-    Where no lattice has a joint path, any part of the path counts; where no lattice was looked at, a tenth of it.
+    If lattices were searched and none has a joint path, any unreachable part of the path counts. If no lattice was
+    searched, the unreachable part has to be more than a tenth of the path.
 
     Parameters
     ----------
     decompositions : sequence of Decomposition
     candidates : sequence of Candidate
-        So far.
+        Candidates so far.
     deadline : Deadline
-        A reason that is not found by then is not given.
+        If no reason is found by then, the result is None.
     """
     if not decompositions or _has_joint_path(candidates):
         return None
@@ -290,18 +292,18 @@ def explain_no_motion(
     decompositions : sequence of Decomposition
     candidates : sequence of Candidate
     dead_ends : mapping of str to DeadEnd
-        Where the lattices end, by the names of the redundant joints.
+        The place where each lattice ends, by the names of its redundant joints.
     deadline : Deadline
         When the search for the reason ends.
     not_completed : sequence of str, optional
-        What the time did not suffice for: then that is the reason, where the lattices do not tell more.
+        Work for which the time did not suffice. It is then given as the reason, unless the lattices tell more.
     """
     has_joint_path = _has_joint_path(candidates)
     if not_completed:
         limit = f"within the time limit of {problem.task.search.time_limit:g} s"
         undone = "; ".join(not_completed)
         if dead_ends and not has_joint_path:
-            hint_end = f". Not all was done {limit}: {undone}: raise search.time_limit"
+            hint_end = f". The search was not completed {limit} ({undone}): raise search.time_limit"
             return _explain_dead_ends(problem.task, dead_ends, hint_end)
         return PlanningError(
             f"no motion was found {limit}: {undone}", hint="Raise search.time_limit"
@@ -333,7 +335,7 @@ def explain_no_motion(
 def _explain_dead_ends(
     task: Task, dead_ends: Mapping[str, DeadEnd], hint_end: str
 ) -> PathError:
-    """Say where the lattice ends that reached farthest."""
+    """Say where the lattice that reached farthest ends."""
     name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
     lattice_name = name if name == ALL_POSTURES else f"redundant joints {name}"
     lattice_note = f" ({lattice_name}; the furthest of {len(dead_ends)} lattices)"
@@ -348,7 +350,7 @@ def _explain_dead_ends(
 
 
 def _advise(task: Task, candidates: Sequence[Candidate]) -> str:
-    """Say what may help where there are joint paths, but no motion along them: only what has not been tried."""
+    """Say what may help if there are joint paths, but no motion along them; name only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
     defaults = SolverSettings()
     solver = task.solver
@@ -374,7 +376,7 @@ def _is_of_lattice(candidate: Candidate) -> bool:
 
 
 def _has_joint_path(candidates: Sequence[Candidate]) -> bool:
-    """Tell whether a lattice that was looked at has a joint path."""
+    """Tell whether any lattice that was searched has a joint path."""
     return any(
         candidate.branch for candidate in candidates if _is_of_lattice(candidate)
     )

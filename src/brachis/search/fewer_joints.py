@@ -1,7 +1,7 @@
-"""The search for a plan's motion, and plans with fewer joints beside it.
+"""The search for the motion of a plan, supported by plans with fewer joints.
 
-A plan whose tool stays exactly on the path is looked for before tolerances are used. Idle joints, which move no row of
-the task space, are held still afterwards, unless moving them pays.
+A plan whose tool stays exactly on the path is sought before tolerances are used. Afterwards, idle joints, which move no
+row of the task space, are held still unless moving them saves time.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from brachis.task import Task, Tolerances
 from brachis.trajectory import Trajectory
 
 Opening = Callable[[Problem, Deadline], Search]
-"""Opens the search for a problem."""
+"""A function that opens the search for a problem."""
 _WORTH_MOVING = 2.0
-"""Tolerances of splines that moving idle joints has to gain: either plan may have lost one of them."""
+"""Multiple of the spline tolerance that moving idle joints has to save: either plan may be slower by one tolerance."""
 
 
 def search_motion(
@@ -34,7 +34,7 @@ def search_motion(
     deadline: Deadline,
     report: Listener,
 ) -> SearchOutcome:
-    """Search for the fastest motion, from a known one if one is given; raise what explains that none was found."""
+    """Search for the fastest motion, from a known one if given; raise the error that explains why none was found."""
     search = open_search(problem, deadline)
     exact = None
     if known_motion is None and problem.task.tolerances != Tolerances():
@@ -66,12 +66,12 @@ def _hold_idle_joints(
     open_search: Opening,
     deadline: Deadline,
 ) -> FinishedCandidate | None:
-    """Plan again, from the best motion, with idle joints at rest; None without idle joints, or if moving them pays."""
+    """Plan again from the best motion with idle joints at rest; None if none is idle, or if moving them saves time."""
     postures = problem.given_postures
     try:
         idle = lock_idle(robot, problem.task, problem.task_map, postures)
     except UrdfError:
-        # The task lets them stand outside of the URDF's ranges, where they cannot be locked.
+        # The task allows idle joints to be outside the URDF's ranges, where they cannot be locked.
         return None
     if idle is None:
         return None
@@ -90,7 +90,7 @@ def _plan_simpler(
     open_search: Opening,
     deadline: Deadline,
 ) -> FinishedCandidate | None:
-    """Plan with fewer joints: a short search, or from a known motion alone. The motion need not be verified."""
+    """Plan with fewer joints, by a search or from a known motion alone; the motion need not be verified."""
     try:
         simpler = Problem.of(robot, task, problem.user_limits)
         search = open_search(simpler, deadline)

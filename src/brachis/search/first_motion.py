@@ -1,12 +1,12 @@
-"""A motion within the limits near a joint path, found without a solve: the first one where there is little time.
+"""A motion within the limits close to a joint path, found without a solve; it comes first if there is little time.
 
-Splines along a joint path nearly keep the limits if they are slow enough. Phases that are laid one by one do not quite
-meet, and limits are exceeded beside their ends. The smoothest change d of the variables after which the linearised
-rows hold,
+Splines along a joint path nearly meet the limits if they are slow enough. But the splines of the phases are laid one by
+one, so they do not quite meet each other, and limits are exceeded close to their ends. The remedy is the smoothest
+change d of the variables after which the linearised rows are within their bounds:
 
     minimise   the mean over time of sum_i (weights_i d qddot_i)^2    subject to    lower <= rows(x) + J d <= upper,
 
-is made again and again. That takes hundredths of a second, where a solve takes tenths, or seconds.
+It is repeated a few times. This takes hundredths of a second, whereas a solve takes tenths of a second, or seconds.
 """
 
 from __future__ import annotations
@@ -48,38 +48,38 @@ from brachis.search.stages import (
 from brachis.search.verified import refine_and_verify
 
 LITTLE_TIME = 5.0
-"""Time left, s, below which a first motion is looked for: a search that is not short has a verified one by then."""
+"""Remaining time, s, below which a first motion is sought: a search with more time has a verified motion by then."""
 _NOT_COMPLETED = (
-    "there was time for a first motion alone, which may be far from the fastest"
+    "there was time only for a first motion, which may be much slower than the fastest"
 )
 _SOLVE_SHARE = 0.6
-"""Part of the time left in which a first motion is improved by a solve."""
+"""Fraction of the remaining time in which a first motion is improved by a solve."""
 _LONGEST_SOLVE = 0.5
-"""Longest time of this solve, s: in 0.4 s motions of process speeds got 15 to 35 % faster."""
+"""Longest time of this solve, s. Within 0.4 s, motions at process speeds became 15 to 35 % faster."""
 _NEARLY = 0.05
-"""Violation up to which its last iterate counts."""
+"""Largest violation with which the last iterate of this solve is used."""
 _ROOM = 1.03
-"""Factor on the time of this iterate: at their bounds rows are not held between the collocation points."""
+"""Factor on the end time of this iterate: rows at their bounds would exceed them between the collocation points."""
 _SLOWER = (1.1, 1.5, 2.5)
-"""Factors on the times of the first splines, one tried after the other: with 1 most rows are at their bounds."""
+"""Factors on the end times of the first splines, tried one after the other: with 1 most rows are at their bounds."""
 _CHANGES = 10
-"""Changes that are made, no more."""
+"""Largest number of changes."""
 _LEAST_SHARE = 0.02
-"""Part of a change that is made, at least: where no larger one is better the rows are far from linear."""
+"""Smallest fraction of a change that is tried: if no larger one is better, the rows are far from linear."""
 _ROUNDS = 12
-"""Sets of rows that are tried for a change, no more."""
+"""Largest number of sets of rows that are tried for a change."""
 _MARGIN = 1e-3
 """Distance from their bounds at which rows are held, so that few are exceeded between the collocation points."""
 _ENOUGH = 1e-10
-"""Violation that is small enough: with 1e-8 the tool went back on its path between knots that are close together."""
+"""Violation that is small enough: with 1e-8 the tool moved backwards on its path between knots close to each other."""
 _DAMPING = 1e-8
-"""Part of the largest entry that is added to a diagonal: some joints do not count, and rows may depend on others."""
+"""Fraction of a diagonal's largest entry that is added to it: some joints do not count, and rows may be dependent."""
 
 
 def find_first_motion_of(
     guesses: Sequence[InitialGuess], deadline: Deadline, listener: Listener
 ) -> FinishedCandidate | None:
-    """Find a verified motion near the joint path of one of the guesses; None where that takes too long."""
+    """Find a verified motion close to the joint path of one of the guesses; None if none is found in time."""
     for guess in sorted(guesses, key=lambda guess: guess.estimate):
         if deadline.passed:
             break
@@ -91,7 +91,7 @@ def find_first_motion_of(
 
 
 def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
-    """Find a verified motion near the joint path of a guess, over few knots.
+    """Find a verified motion close to the joint path of a guess, over few knots.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
     Returns
     -------
     Candidate
-        A finished one where there is a motion.
+        A finished candidate if there is a motion.
     """
     outcome = begin_candidate(guess, "no motion was found near the joint path")
     try:
@@ -135,9 +135,9 @@ def _improve(
     solve: Solve,
     options: RefinementOptions,
 ) -> FinishedCandidate:
-    """Solve for a short time from a first motion, and keep what is nearest to the last iterate if it is faster.
+    """Solve for a short time from a first motion; use the feasible motion closest to the last iterate if it is faster.
 
-    An interior-point method comes far in a dozen iterations from such a motion, which no limit holds.
+    From such a motion, at which no limit is active, an interior-point method makes much progress in a dozen iterations.
     """
     task = candidate.problem.task
     backends = [
@@ -166,7 +166,7 @@ def _improve(
 
 
 def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> SolverReport:
-    """Find a point within the limits near x, (v,); `ACCEPTABLE` where it is feasible."""
+    """Find a point within the limits close to x, (v,); the status is `ACCEPTABLE` if it is feasible."""
     began = time.perf_counter()
     violation = residual(program, x)
     count = 0
@@ -199,7 +199,7 @@ def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> Solver
 
 
 def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
-    """Find the smoothest change of x, (v,), after which the linearised rows hold; see the module."""
+    """Find the smoothest change of x, (v,), after which the linearised rows are within their bounds; see the module."""
     import scipy.sparse as sp
 
     values = program.rows(x)
@@ -223,21 +223,21 @@ def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
         rows = np.flatnonzero(held)
         if len(rows) > len(x):
             break
-        # Rows are held at the bound that is nearer, or exceeded.
+        # Rows are held at the closer bound, or at the one that they exceed.
         at_low = beyond[rows] - low[rows] < high[rows] - beyond[rows]
         goals = np.where(at_low, low[rows], high[rows])
         slopes = jacobian[rows].toarray()
         moved = np.linalg.solve(metric, slopes.T)
         forces = np.linalg.solve(_damp(slopes @ moved), goals)
         change = moved @ forces
-        # Rows that are pulled towards their bound are let go.
+        # Rows that are pulled towards their bound are released.
         is_pulled = np.where(at_low, forces < 0.0, forces > 0.0)
         held[rows[is_pulled & ~is_equal[rows]]] = False
     return change
 
 
 def _measure_smoothness(program: Program, x: np.ndarray) -> np.ndarray:
-    """Make the matrix by which changes of x count: by the accelerations of the joints, and durations by their parts."""
+    """Return the matrix that weighs changes of x: by joint accelerations, and for durations by the relative change."""
     smooth = program.with_objective(least_acceleration(program, x, 1.0))
     curvature = smooth.curvature(x)
     assert curvature is not None

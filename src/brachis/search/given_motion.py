@@ -1,7 +1,8 @@
-"""The initial guess from a motion that is known already, of the same task or of one like it.
+"""The initial guess from a motion that is already known, of the same task or of a similar one.
 
-What is taken over are curves: the postures over the path coordinate, brought onto the path if it is another one, and
-the time law. So limits, splines, coordinates and the path may be others than when the motion was planned.
+Only curves are taken from the motion: the postures over the path coordinate, which are brought onto the path if it has
+changed, and the time law. So limits, splines, coordinates and the path may differ from those with which the motion was
+planned.
 """
 
 from __future__ import annotations
@@ -50,20 +51,20 @@ def given_guess(
     motion: Trajectory,
     origin: str,
 ) -> InitialGuess:
-    """Make an initial guess of a known motion.
+    """Turn a known motion into an initial guess.
 
     Parameters
     ----------
     problem : Problem
     decompositions : sequence of Decomposition
     motion : Trajectory
-        Its tool may have other tolerances, or none.
+        Its task may have different tolerances, or none.
     origin : str
 
     Returns
     -------
     InitialGuess
-        For the solver that is tried first.
+        A guess for the solver that is tried first.
 
     Raises
     ------
@@ -74,9 +75,9 @@ def given_guess(
     motion_joints = motion.robot.urdf_joints
     if not set(joints) <= set(motion_joints):
         raise UnreachableError(
-            f"its joints are {', '.join(motion_joints)}, the robot's {', '.join(joints)}"
+            f"its joints are {', '.join(motion_joints)}, but the robot's are {', '.join(joints)}"
         )
-    # The postures over s, and on every leg the time law.
+    # The postures over s, and the time law on every leg.
     splits = [leg.end for leg in problem.legs[:-1]]
     t = np.linspace(0.0, motion.t_end, 4001)
     passed = np.clip(motion.path_coordinate(t), 0.0, 1.0)
@@ -114,16 +115,16 @@ def without_tolerances(task: Task) -> Task:
 def lock_idle(
     robot: Robot, task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> tuple[Robot, Task] | None:
-    """Lock the idle joints, which no row of the task space depends on, of a robot and its task; None without any.
+    """Lock the idle joints, on which no row of the task space depends, in a robot and its task; None if none is idle.
 
     Parameters
     ----------
     robot : Robot
-        Without the virtual joints of tolerances.
+        A robot without the virtual joints of tolerances.
     task : Task
     task_map : TaskMap
     postures : mapping of str to (n,) ndarray
-        Those of ``start`` and ``end`` that are given; joints that differ in them are not idle.
+        The given postures among ``start`` and ``end``. Joints whose positions differ between them are not idle.
     """
     count = len(robot.urdf_joints)
     moves = np.abs(task_map.sample_jacobians()).max(axis=(0, 1)) > tolerances.ANGLE
@@ -154,14 +155,14 @@ def lock_idle(
 
 
 def stand_still(robot: Robot, postures: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the positions, (n,), at which idle joints stand still: as in a given posture, or else at zero."""
+    """Return the positions, (n,), at which idle joints stand still: those of a given posture, or else zero."""
     limits = robot.limits
     nearest = np.clip(np.zeros(robot.n), limits.position_lower, limits.position_upper)
     return next(iter(postures.values()), nearest)
 
 
 def widen_plan(planned: Planned, problem: Problem) -> Planned:
-    """Return a plan with fewer joints, see `lock_idle` and `without_tolerances`, as one of the problem itself."""
+    """Turn a plan with fewer joints (see `lock_idle` and `without_tolerances`) into a plan of the problem itself."""
     motion = planned.trajectory
     robot = problem.robot
     columns = [robot.joint_names.index(name) for name in motion.joint_names]
@@ -189,9 +190,9 @@ def widen_plan(planned: Planned, problem: Problem) -> Planned:
 
 
 def narrow_motion(motion: Trajectory) -> Trajectory:
-    """Undo `widen_plan`: the motion as one of its simpler task, of which it is an optimum.
+    """Undo `widen_plan`: return the motion as one of the simpler task of which it is an optimum.
 
-    A motion that has curves for idle joints, or for the virtual joints of tolerances, stays as it is.
+    A motion that has curves for idle joints, or for the virtual joints of tolerances, is returned unchanged.
     """
     wider = motion.robot
     _, task_map = bind(wider, motion.task.task_space, motion.task.tolerances)
@@ -225,7 +226,7 @@ def narrow_motion(motion: Trajectory) -> Trajectory:
 
 
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
-    """Positions at times, (K, n), of the problem's joints; others than the motion's stand still."""
+    """Return positions of the problem's joints at times, (K, n); joints that the motion does not have stand still."""
     robot = problem.robot
     motion_positions = dict(zip(motion.joint_names, motion.position(t).T, strict=True))
     still = stand_still(robot, problem.given_postures)
@@ -243,7 +244,7 @@ def _in_coordinates(
     s: np.ndarray,
     q: np.ndarray,
 ) -> tuple[SearchMap, np.ndarray, str]:
-    """Joint map, its curves (S, 1 + r), and family, for path coordinates (S,) and postures (S, n)."""
+    """Return the joint map, its curves (S, 1 + r), and the family, for path coordinates (S,) and postures (S, n)."""
     if isinstance(problem.task_map, JointSpace):
         return JointSpaceMap(problem.robot, problem.path), s[:, None], FAMILY
     first = q[0] if problem.start is None else problem.start
@@ -271,7 +272,7 @@ def _in_coordinates(
 def _lay_chart(
     problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray
 ) -> ChartMap:
-    """Lay a chart around postures, with the motion's own rows if these are in the same joints, and transversal."""
+    """Lay a chart around postures, with the motion's own rows if these refer to the same joints and are transversal."""
     joints = [motion.joint_names.index(name) for name in motion.redundant_joints]
     rows = ChartRows.constant(np.eye(motion.robot.n)[joints])
     if len(motion.chart_rows):

@@ -1,8 +1,8 @@
 """Initial guesses: joint paths from lattices, each smoothed, with coordinates and an estimate of its least time.
 
-Of an arm with several redundant joints the lattice's sample of postures may hold a single class of joint paths, above
-all between two given ends, and a solve from it ends at the optimum next to it. Solves from random joint paths end at
-others.
+If several joints are redundant, the lattice's sample of postures may contain only one class of joint paths, above all
+between two given ends, and a solve from such a path ends at the closest optimum. Solves from random joint paths end at
+other optima.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
 
 SCREENED = 4
-"""Joint paths that are looked at for each one that a level plans."""
+"""Number of joint paths that are examined for each one that a level plans."""
 FAMILY = "path of joints"
-"""Family, and origin, of the guess for a path of joints."""
+"""Family and origin of the guess for a path of joints."""
 
 
 @dataclass(frozen=True)
@@ -53,23 +53,23 @@ class SearchLevel:
     Attributes
     ----------
     decompositions : int
-        Decompositions that are looked at; those farthest from singularity at the start come first.
+        Number of decompositions that are searched; those farthest from a singularity at the start come first.
     joint_paths : int
-        Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
+        Number of joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
-        Joint paths by numeric inverse kinematics as well, if the start posture is given.
+        Number of further joint paths by numeric inverse kinematics, if the start posture is given.
     in_charts : int
-        Guesses in charts that are ranked; four times as many joint paths are looked at.
+        Number of guesses in charts that are ranked; four times as many joint paths are examined.
     in_closed_forms : int
-        Guesses in closed forms that are ranked; those with the least estimated time come first.
+        Number of guesses in closed forms that are ranked; those with the least estimated time come first.
     refined : int
-        Candidates that are refined and verified, no more, as long as they may beat the best one.
+        Largest number of candidates that are refined and verified, as long as they may beat the best one.
     cells_per_turn, nodes : int
-        Of the lattice.
+        Options of the lattice.
     only_minima : bool
-        Whether of the lattice of all postures only joint paths of locally least length are taken.
+        Whether only joint paths of locally least length are taken from the lattice of all postures.
     fallback : bool
-        Whether it is gone through only while no motion is verified.
+        Whether the level is tried only while no motion is verified.
     """
 
     decompositions: int
@@ -85,23 +85,25 @@ class SearchLevel:
 
 
 _LATTICE_SHARE = 0.5
-"""Part of the time left after which the lattice is given up, and only random joint paths are tried."""
+"""Fraction of the remaining time after which the lattice is abandoned, and only random joint paths are tried."""
 _RANDOM = 4
-"""Random joint paths for each one that a level plans."""
+"""Number of random joint paths for each one that a level plans."""
 _RANDOM_STATIONS = 97
-"""Stations along a random joint path, about: in 14 tasks 81 % of the drawn postures arrive, as with 385; 78 with 13."""
+"""Approximate number of stations along a random joint path. In 14 tasks, 81 % of the drawn postures reach the end, the
+same as with 385 stations; with 13 stations 78 % do."""
 _DRAWN = 8
-"""Postures drawn for each random joint path: 81 % arrive in the mean of 14 tasks, 14 % in the worst one."""
+"""Number of postures drawn for each random joint path: on average over 14 tasks 81 % reach the end, 14 % in the
+worst."""
 _DRIFT = 2.0
-"""Largest standard deviation of a drift, rad or m, in the scales of the joints; half of it is left at the end.
+"""Largest standard deviation of a drift, rad or m, in the scales of the joints; it displaces the end by half as much.
 
-The best of 16 joint paths is 0.5 % slower than with the best drift of 1, 2, 4 and 8, in the mean of 14 tasks; with the
-other drifts 0.8 to 1.1 %, although larger ones lead to more distinct joint paths.
+On average over 14 tasks, the best of 16 joint paths is 0.5 % slower than with the best of the drifts 1, 2, 4 and 8 for
+each task. With the other drifts it is 0.8 to 1.1 % slower, although larger drifts lead to more distinct joint paths.
 """
 _LOOKED_AT = 4
-"""Joint paths that are looked at for each one that is chosen, if several joints are redundant."""
+"""Number of joint paths that are examined for each one that is chosen, if several joints are redundant."""
 _NEARLY = 0.2
-"""Violation of a limit at rest with which a joint path still is a guess."""
+"""Largest violation of a limit at rest with which a joint path still counts as a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
 _FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
 _THOROUGH = SearchLevel(
@@ -117,7 +119,7 @@ SEARCH_LEVELS = {
     "thorough": (_FAST, _THOROUGH),
     "exhaustive": (_FAST, _THOROUGH, _EXHAUSTIVE),
 }
-"""Levels that are gone through one after the other, by the task's ``search.effort``; so a good motion is known soon."""
+"""Levels that are tried one after the other, by the task's ``search.effort``, so that a good motion is found soon."""
 
 
 def lattice_guesses(
@@ -126,9 +128,9 @@ def lattice_guesses(
     deadline: Deadline = NEVER,
     listener: Listener = ignore,
 ) -> list[InitialGuess] | DeadEnd:
-    """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
+    """Take the shortest distinct joint paths from a decomposition's lattice; if it has none, from a finer one.
 
-    If several joints are redundant, more joint paths are looked at, and the most promising ones are chosen.
+    If several joints are redundant, more joint paths are examined, and the most promising ones are chosen.
 
     Parameters
     ----------
@@ -154,7 +156,7 @@ def lattice_guesses(
 def _take_guesses(
     decomposition: Decomposition, level: SearchLevel, count: int, deadline: Deadline
 ) -> list[InitialGuess] | DeadEnd:
-    """Take guesses from up to `count` joint paths for every branch from a decomposition's lattice."""
+    """Take guesses from a decomposition's lattice, from up to `count` joint paths for every branch."""
     for finer, density in ((1, 1.0), (3, 2.0)):
         lattice = ClosedFormLattice(
             decomposition,
@@ -174,9 +176,9 @@ def _take_guesses(
 
 
 def _smooth(joint_path: PosturePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; at last linear interpolation."""
+    """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; the last is piecewise linear."""
     s = joint_path.s
-    # More finely than at the lattice's stations.
+    # Sampled more finely than at the lattice's stations.
     fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
     weights = np.ones((len(s), 1))
     weights[[0, -1]] = 1e3  # nearly exact at both ends
@@ -191,13 +193,13 @@ def _smooth(joint_path: PosturePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def _guess_on_branch(
     decomposition: Decomposition, joint_path: PosturePath, origin: str
 ) -> InitialGuess:
-    """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
+    """Smooth a joint path as far as the closed form can follow it, and estimate its time."""
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
     for s, smoothed in itertools.islice(_smooth(joint_path), 2):
         curves = np.column_stack([s, smoothed[:, joint_map.redundant]])
         q = joint_map.postures(curves)
         if np.isfinite(q).all():
-            # It keeps clear of the branch boundary, if the start posture does.
+            # The joint path has to keep clear of the branch boundary if the start posture does.
             margins = joint_map.branch_margins(q)
             least = min(0.02, margins[0].min(initial=np.inf))
             if margins.min(initial=np.inf) > 0.5 * least:
@@ -217,12 +219,12 @@ def numeric_guesses(
 ) -> list[InitialGuess]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `count` ways.
 
-    Those that hit something are left out.
+    Joint paths that collide with the scene are left out.
 
     Parameters
     ----------
     decomposition : Decomposition
-        With a given start posture; without one the list is empty.
+        A decomposition with a given start posture; without one the list is empty.
     count : int
     deadline : Deadline
 
@@ -262,7 +264,7 @@ def chart_guesses(
     ----------
     problem : Problem
     decompositions : sequence of Decomposition
-        Their closed forms give postures to begin with if neither end is given.
+        Their closed forms give the postures at the start if neither end is given.
     level : SearchLevel
     deadline : Deadline, optional
     listener : callable, optional
@@ -270,12 +272,12 @@ def chart_guesses(
     Returns
     -------
     list of InitialGuess or DeadEnd
-        Those with the least estimated times first.
+        The guesses with the least estimated times come first.
 
     Raises
     ------
     PlanningError
-        No motion along any joint path can hold a speed, or a mean of a load.
+        No motion along any joint path can reach a given speed, or meet a limit on the mean of a load.
     """
     for finer in (1, 2):
         lattice = PostureLattice(
@@ -303,7 +305,7 @@ def chart_guesses(
         )
         for number, joint_path in enumerate(joint_paths, 1)
     ]
-    # Backwards from a given end the lattice of one redundant joint has a single joint path.
+    # If it runs backwards from a given end, the lattice of one redundant joint has a single joint path.
     is_backwards = problem.start is None and problem.end is not None
     is_sampled = problem.r > 1 or is_backwards
     if is_late or (is_sampled and level.in_charts > 1):
@@ -324,7 +326,7 @@ def chart_guesses(
         return DeadEnd(0.0, NO_TIME if deadline.passed else NO_CHART)
     guesses.sort(key=lambda guess: guess.estimate)
     refuse_hopeless(guesses)
-    # Joint paths whose estimated time is three times the least one are hopeless.
+    # Joint paths whose estimated time is more than three times the least one are hopeless.
     longest = 3.0 * guesses[0].estimate
     hopeful = [guess for guess in guesses if guess.estimate <= longest]
     return screen(hopeful, level.in_charts, deadline, listener)
@@ -333,20 +335,20 @@ def chart_guesses(
 def random_joint_paths(
     problem: Problem, count: int, deadline: Deadline = NEVER
 ) -> list[PosturePath]:
-    """Carry random postures, or a given one, along the path; each drifts to a side at random.
+    """Carry random postures, or a given one, along the path, each with a random drift.
 
     Parameters
     ----------
     problem : Problem
     count : int
-        How many to find, no more.
+        Largest number of joint paths to find.
     deadline : Deadline, optional
-        After it there are none.
+        If it passes, the list is empty.
 
     Returns
     -------
     list of PosturePath
-        From and to the given ends, within the ranges; limits at rest may be exceeded by 20 %.
+        Joint paths from and to the given ends, within the joint ranges. Limits at rest may be exceeded by 20 %.
     """
     rng = np.random.default_rng(problem.task.search.seed)
     newton = Newton(problem.task_map)
@@ -410,12 +412,12 @@ def guess_in_chart(
 def bring_onto_path(
     problem: Problem, newton: Newton | None, s: np.ndarray, q: np.ndarray
 ) -> np.ndarray:
-    """Find the postures (S, n) on the path nearest to given ones, with the ends that the task gives.
+    """Find the postures (S, n) on the path closest to given ones; at the ends, take those that the task gives.
 
     Raises
     ------
     UnreachableError
-        Such postures do not exist, or they jump.
+        Such postures do not exist, or they jump along the path.
     """
     if newton is not None:
         q = newton.nearest(problem.path.sample(s).target, q)
@@ -429,12 +431,12 @@ def bring_onto_path(
 
 
 def joint_space_guess(problem: Problem) -> InitialGuess:
-    """Make the guess for a path of joints, timed in the phase plane.
+    """Return the guess for a path of joints, timed in the phase plane.
 
     Parameters
     ----------
     problem : Problem
-        In a space of joints.
+        A problem with a path of joints.
 
     Returns
     -------
@@ -474,7 +476,7 @@ def joint_space_guess(problem: Problem) -> InitialGuess:
 def first_guess(
     problem: Problem, decompositions: Sequence[Decomposition]
 ) -> InitialGuess:
-    """Return the guess of the first joint path that a lattice has, in a closed form if there is one.
+    """Return a guess for the first joint path found on a lattice, in a closed form if there is one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Loads of the arm at rest along the joint paths that are known, beside limits on postures and on means."""
+"""Loads of the arm at rest along known joint paths, compared with limits on postures and on means."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from brachis.search.phase_plane import postures_along
 from brachis.search.stages import InitialGuess
 
 _HEAVY = 0.95
-"""Ratio of a load at rest to a limit on its mean above which that is the most likely reason of a failure."""
+"""Ratio of a load at rest to the limit on its mean above which the load is the most likely reason for a failure."""
 _TOO_HEAVY = 1.05
-"""Such a ratio, in every posture of the path, that is out of the question."""
+"""The same ratio, in every posture of the path, above which a motion is out of the question."""
 _FAR_TOO_HEAVY = 1.5
-"""The same for the joint paths that were found, where a redundant robot has others."""
+"""The same ratio for a redundant robot, which has other joint paths than those that were found."""
 _S = np.linspace(0.0, 1.0, 101)
 """Path coordinates at which the arm is held at rest."""
 
@@ -29,7 +29,7 @@ _S = np.linspace(0.0, 1.0, 101)
 def explain_beyond(
     problem: Problem, limit: Limit, s: np.ndarray, q: np.ndarray
 ) -> tuple[float, PathError] | None:
-    """Tell by how much, and where, the arm at rest is beyond a limit along a joint path; None: nowhere.
+    """Tell where, and by how much, the arm at rest exceeds a limit along a joint path; None if it does so nowhere.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def explain_beyond(
 
 
 def explain_postures(guesses: Sequence[InitialGuess]) -> PathError | None:
-    """Tell which limit on postures stands in the way, if all joint paths exceed one: along the nearest of them."""
+    """Explain, if all joint paths exceed a limit on postures, which one it is on the path with the least excess."""
     nearest = []
     for guess in guesses:
         q = postures_along(guess, _S)
@@ -79,7 +79,7 @@ def explain_postures(guesses: Sequence[InitialGuess]) -> PathError | None:
 
 
 class _Load(NamedTuple):
-    """What holding the arm takes of a limit of a mean: least, largest and mean ratio to the limit."""
+    """A load for holding the arm: its least, largest and mean ratio to the limit on its mean."""
 
     limit: Limit
     column: int
@@ -92,13 +92,13 @@ class _Load(NamedTuple):
 def explain_holding(
     guesses: Sequence[InitialGuess], *, everywhere: bool = False
 ) -> PlanningError | None:
-    """Tell which limits of a mean leave too little for holding the arm along all joint paths; None: none does.
+    """Tell which limits on means are too low for holding the arm along all joint paths; None if none is.
 
     Parameters
     ----------
     guesses : sequence of InitialGuess
     everywhere : bool, optional
-        Whether each posture has to exceed a limit by itself, not their mean alone.
+        Whether every single posture has to exceed a limit, and not only their mean.
     """
 
     def measure(load: _Load) -> float:
@@ -111,7 +111,7 @@ def explain_holding(
     loads = min(known, key=lambda loads: max(map(measure, loads)))
     worst = max(loads, key=measure)
     is_redundant = guesses[0].joint_map.r > 0
-    # Before a plan is tried it has to be out of the question; afterwards it is the most likely reason.
+    # Before a plan is tried, a motion has to be out of the question; afterwards, the load is the most likely reason.
     hopeless = _FAR_TOO_HEAVY if is_redundant else _TOO_HEAVY
     needed = hopeless if everywhere else _HEAVY
     if measure(worst) < needed:
@@ -128,7 +128,7 @@ def explain_holding(
 def _explain_loads(
     robot: Robot, worst: _Load, further_loads: Sequence[_Load], where: str
 ) -> PlanningError:
-    """Say what holding the arm takes of the limit that leaves least, and which others leave too little."""
+    """Return the error for the limit with the largest load, which also names further limits that are too low."""
     label = worst.label
     bounds = worst.limit.bounds
     figure = next(bound.figure for bound in bounds if bound.column == worst.column)
@@ -151,13 +151,13 @@ def _explain_loads(
         where=label.key or worst.limit.name,
         found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
         allowed=f"{figure:.4g} {label.unit}",
-        hint="Move the path so that its postures need less, or change the mounting of the robot",
+        hint="Move the path to postures that are easier to hold, or change the mounting of the robot",
     )
     return error.with_remedies(*remedies.values())
 
 
 def _loads_along(guess: InitialGuess) -> list[_Load] | None:
-    """List what holding the arm along a guess takes of all limits of means; None where it has no postures."""
+    """List the loads for holding the arm along a guess, for all limits on means; None if it has no postures."""
     q = postures_along(guess, _S)
     if q is None:
         return None

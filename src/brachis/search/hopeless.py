@@ -1,13 +1,13 @@
-"""Refuse what no motion along the known joint paths can hold: limits on postures, means of loads, and speeds.
+"""Refuse loads and speeds that are out of reach for every motion along the known joint paths.
 
-Speeds are given for parts of the path and for its ends. Without friction, where the limits allow a motion and the arm
-can hold its postures, they allow the same motion at a lower speed: (u, x) lies between it and rest (see
-`brachis.search.phase_plane`). So a speed is too high either by itself, along its part or at its end, or because a leg
-beside is too short to reach it or to brake from it. A redundant robot may have better joint paths than those that are
-known: only what is far from possible is refused before a plan is tried.
+Speeds are given for parts of the path and for its ends. Without friction, if the limits allow a motion and the arm can
+hold its postures, the limits also allow the same motion at a lower speed: its (u, x) lies between that of the motion
+and rest (see `brachis.search.phase_plane`). So a speed can be too high for two reasons. It is too high by itself, along
+its part of the path or at its end, or an adjacent leg is too short to reach it or to brake from it. A redundant robot
+may have better joint paths than the known ones, so only what is far from possible is refused before a plan is tried.
 
-Limits on the jerk are unknown to the phase plane. Friction is unknown to it too: it helps to brake, so that with
-friction a part near the path's end may be passed faster.
+The phase plane accounts neither for limits on the jerk nor for friction. Friction helps to brake, so that with friction
+a part close to the path's end may be travelled faster.
 """
 
 from __future__ import annotations
@@ -33,24 +33,25 @@ from brachis.search.stations import spread_stations
 from brachis.timing import Timing
 
 _EXACT = 0.97
-"""Share of a speed below which it is impossible according to the phase plane, where that is exact."""
+"""If only a smaller fraction of a speed is possible in the phase plane, and this is exact, the speed is impossible."""
 _UNLIKELY = 0.4
-"""Share of a speed below which no other joint path of a redundant robot makes up for what is missing."""
+"""The same fraction for a redundant robot: below it, no other joint path makes up for what is missing."""
 _REACHED = 0.92
-"""Part of the largest speed to which a leg leads in the phase plane: splines over the first mesh fall short of it."""
+"""Fraction of the largest speed in the phase plane that is advised: splines over the first mesh do not reach all of
+it."""
 _LEAST = 1e-4
-"""Share of a speed that is possible wherever the arm can hold its postures."""
+"""Fraction of a speed that is possible wherever the arm can hold its postures."""
 
 
 def refuse_hopeless(guesses: Sequence[InitialGuess]) -> None:
-    """Refuse loads and speeds that are far out of reach along the joint paths of all guesses, before plans are tried.
+    """Refuse loads and speeds far out of reach along the joint paths of all guesses, before any plan is tried.
 
     Raises
     ------
     PlanningError
     """
     problem = guesses[0].problem
-    # Friction may help to hold the arm, and a motion between different speeds may be a fall: these are tried.
+    # Friction may help to hold the arm, and a motion between different speeds may be a fall: such plans are tried.
     if not _has_friction(problem).any() and not any(problem.end_rates):
         failure = explain_holding(guesses, everywhere=True)
         if failure is not None:
@@ -73,14 +74,14 @@ class _Speed:
     Attributes
     ----------
     key, name : str
-        In the task, and in words.
+        Key in the task, and name in words.
     figure : float
-        In its unit.
+        Value, in `unit`.
     unit : str
     leg : int
-        Whose speed it is, or at whose end.
+        Number of the leg whose speed it is, or at whose end it is given.
     side : int or None
-        At which end of the leg: 0 or -1; None: all along it.
+        End of the leg at which the speed is given, 0 or -1; None if it is given all along the leg.
     """
 
     key: str
@@ -95,12 +96,12 @@ class _Speed:
         return f"{self.figure:g} {self.unit}"
 
     def lower_to(self, figure: float, *, is_known: bool = False) -> Remedy:
-        """Return what may help: a lower speed."""
+        """Return the remedy that lowers this speed."""
         return Remedy(self.key, self.figure, figure, self.unit, is_known)
 
 
 def speeds_of(problem: Problem) -> list[_Speed]:
-    """List the process speeds of a task, and its speeds at ends that are not at a process speed."""
+    """List the process speeds of a task, and the speeds at its ends unless these are at a process speed."""
     speeds = []
     speed_legs = [i for i, leg in enumerate(problem.legs) if leg.speed is not None]
     process_speeds = problem.task.tool_limits.process_speed
@@ -120,7 +121,7 @@ def speeds_of(problem: Problem) -> list[_Speed]:
 
 
 class _SpeedCheck:
-    """Which shares of the speeds of a task a joint path allows.
+    """Tells which fractions of a task's speeds a joint path allows.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ class _SpeedCheck:
     speeds : sequence of _Speed
         At least one.
     s : (S,) ndarray
-        Path coordinates, the ends of the legs among them.
+        Path coordinates, including the ends of the legs.
     q : (S, n) ndarray
         Postures there.
     """
@@ -150,7 +151,7 @@ class _SpeedCheck:
         self._solve = [cache(plane.solve) for plane in self.planes]
 
     def _find_cap(self, speed: _Speed) -> tuple[float, float, str]:
-        """Largest share of a speed by itself; the path coordinate and the label of the limit that allow no more."""
+        """Return the largest fraction of a speed by itself, and the path coordinate and limit that allow no more."""
         plane = self.planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
@@ -170,7 +171,7 @@ class _SpeedCheck:
         return None
 
     def is_possible(self, shares: np.ndarray) -> bool:
-        """Tell whether these shares of the speeds, (k,), are possible at once."""
+        """Tell whether these fractions of the speeds, (k,), are possible together."""
         pairs = zip(self.caps, shares, strict=True)
         if any(cap[0] < share for cap, share in pairs):
             return False
@@ -178,14 +179,14 @@ class _SpeedCheck:
 
     @cached_property
     def free_legs(self) -> list[int]:
-        """Numbers of the legs whose speed is free, without the ends of a periodic motion, at which it is unknown."""
+        """Numbers of the legs whose speed is free, except at the ends of a periodic motion, where it is unknown."""
         free = [leg for leg, law in enumerate(self.problem.time_laws) if law is None]
         if self.problem.task.boundary.periodic and not any(self.problem.end_rates):
             return [leg for leg in free if leg not in (0, len(self.problem.legs) - 1)]
         return free
 
     def pass_leg(self, leg: int, shares: np.ndarray) -> Timing | None:
-        """Pass a leg whose speed is free with shares of the speeds, (k,); None: it is too short."""
+        """Time a leg whose speed is free, between fractions of the speeds, (k,); None if it is too short for them."""
         rates = []
         for side in (0, -1):
             number = self.speed_at(leg, side)
@@ -194,14 +195,14 @@ class _SpeedCheck:
         return self._solve[leg](tuple(rates))
 
     def lower_one(self, number: int, least: float) -> float | None:
-        """Find the largest share of a speed, above `least`, that is possible beside the others; None without any."""
+        """Find the largest fraction of a speed, above `least`, that is possible with the other speeds, or None."""
         shares = np.ones(len(self.speeds))
 
         def is_possible(share: float) -> bool:
             shares[number] = share
             return self.is_possible(shares)
 
-        # Too low a speed may be as impossible beside the others as too high a one.
+        # With the other speeds, one that is too low may be as impossible as one that is too high.
         tried = np.geomspace(1.0, least, 20).tolist()
         for above, share in itertools.pairwise(tried):
             if is_possible(share):
@@ -209,14 +210,14 @@ class _SpeedCheck:
         return None
 
     def allows(self, share: float) -> bool:
-        """Tell whether this share of all speeds at once is possible."""
+        """Tell whether this fraction of all speeds together is possible."""
         return self.is_possible(np.full(len(self.speeds), share))
 
 
 def _largest_share(
     is_possible: Callable[[float], bool], low: float, high: float
 ) -> float:
-    """Find the largest share between one that is possible and one that is not."""
+    """Find the largest possible fraction between one that is possible and one that is not."""
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_possible(middle) else (low, middle)
@@ -226,14 +227,14 @@ def _largest_share(
 def explain_speeds(
     guesses: Sequence[InitialGuess], *, are_tried: bool = False
 ) -> PlanningError | None:
-    """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if they may not be.
+    """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if all may be reached.
 
     Parameters
     ----------
     guesses : sequence of InitialGuess
     are_tried : bool, optional
-        Whether plans from these failed, so that too high a speed is the most likely reason; otherwise it has to be far
-        out of reach.
+        Whether plans from these guesses failed. Then a speed that is too high is the most likely reason; otherwise it
+        has to be far out of reach.
     """
     if not guesses:
         return None
@@ -251,7 +252,7 @@ def explain_speeds(
         if q is None:
             return None
         check = _SpeedCheck(guess, speeds, s, q)
-        # The phase plane is exact without other joint paths, and without friction that helps to brake.
+        # The phase plane is exact if there are no other joint paths, and no friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
         if not check.allows(_LEAST) or check.allows(enough):
@@ -264,7 +265,7 @@ def explain_speeds(
 
 
 def _explain(check: _SpeedCheck, share: float) -> PlanningError:
-    """Tell which speeds are too high, if this share of all at once is possible."""
+    """Tell which speeds are too high, if only this fraction of all speeds together is possible."""
     every = np.ones(len(check.speeds))
     shares = {number: cap[0] for number, cap in enumerate(check.caps)}
     number = min(shares, key=lambda number: shares[number])
@@ -285,7 +286,7 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         shares = lower or dict.fromkeys(shares, _REACHED * share)
 
         def reach(leg: int) -> float:
-            """Return the share of the speeds between which a leg leads."""
+            """Return the largest fraction of the speeds between which a leg can lead."""
             return _largest_share(
                 lambda trial: check.pass_leg(leg, trial * every) is not None, share, 1.0
             )
@@ -306,23 +307,23 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         for speed_number, figure in possible.items()
     ]
     speed = check.speeds[number]
-    largest_speed = f"{possible[number]:g} {speed.unit}"
+    found = str(speed)
+    if speed.unit == "m/s" and speed.figure > 10.0:
+        found += f" ({speed.figure / 1e3:g} m/s, if mm/s were meant)"
     error = PlanningError(
         f"the {speed.name} is too high {why}",
         where=speed.key,
-        found=str(speed),
-        allowed=f"about {largest_speed} along the best joint path that was found (estimate)"
-        if check.is_redundant
-        else f"no more than {largest_speed} (estimate)",
+        found=found,
+        allowed=f"about {possible[number]:g} {speed.unit}",
         hint="Raise the limits that hold the motion back",
     )
     return error.with_remedies(*remedies)
 
 
 def _explain_short_leg(check: _SpeedCheck, leg: int, share: float) -> str:
-    """Say between which speeds a leg is too short, for which limit, and how long it has to be.
+    """Say between which speeds a leg is too short, because of which limit, and how long it would have to be.
 
-    It leads between this share of the speeds: under a constant acceleration the length grows with their square.
+    The leg allows this fraction of the speeds. Under a constant acceleration the length grows with the square of speed.
     """
     ends = [check.speed_at(leg, side) for side in (0, -1)]
     first, last = ("rest" if end is None else str(check.speeds[end]) for end in ends)
@@ -341,7 +342,7 @@ def _explain_short_leg(check: _SpeedCheck, leg: int, share: float) -> str:
 
 
 def round_to_three_digits(value: float, *, down: bool) -> float:
-    """Round a number down, or up; zero and negative ones stay."""
+    """Round a number down, or up; zero and negative numbers are returned unchanged."""
     if value <= 0.0:
         return value
     digits = 2 - math.floor(math.log10(value))

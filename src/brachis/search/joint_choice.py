@@ -1,8 +1,8 @@
-"""Which single joints take the place of a chart's rows.
+"""The choice of single joints that take the place of a chart's rows.
 
-At the optimum any rows that are transversal along the motion describe the same motions, but splines of their
-coordinates are not the same curves: over the same knots one measure of self-motion may be a few parts in a thousand
-faster than another. So several choices of single joints are tried, and the best one is kept.
+At the optimum any rows that are transversal along the motion describe the same motions. But splines of their
+coordinates are different curves: over the same knots, one measure of self-motion may give a motion that is a few parts
+in a thousand faster than another. So several choices of single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem
 
 SELECTABLE = 0.05
-"""Least transversality along the motion of joints that may take the place of the chart's rows."""
+"""Least transversality, along the motion, of joints that may take the place of the chart's rows."""
 
 
 def best_of_joints(
     problem: Problem, solved: SolvedProgram, solve: Solve
 ) -> SolvedProgram:
-    """Solve again in a chart around the answer, and with joints in place of its rows, and keep the fastest.
+    """Solve again in a chart around the solution, and with joints in place of its rows; keep the fastest motion.
 
     Parameters
     ----------
@@ -52,27 +52,27 @@ def best_of_joints(
 
 
 def _go_to(point: tuple[Program, np.ndarray]) -> Change:
-    """Change to a program and a point, whatever was kept so far."""
+    """Return the change to a program and a point, regardless of what was kept so far."""
     return lambda _fastest: point
 
 
 def move_to_chart(
     problem: Problem, solved: SolvedProgram, rows: ChartRows | None = None
 ) -> tuple[Program, np.ndarray] | None:
-    """Write a motion in a chart around itself; None if it has none.
+    """Write a motion in the coordinates of a chart around it; None if there is no such chart.
 
     Parameters
     ----------
     problem : Problem
     solved : SolvedProgram
     rows : ChartRows, optional
-        Of the chart; chosen anew if not given, as for `chart_around`.
+        Rows of the chart; if not given, they are chosen anew, as by `chart_around`.
 
     Returns
     -------
     program : Program
     x : (v,) ndarray
-        The same motion but for what splines of the new coordinates cannot say.
+        The same motion, except for what splines of the new coordinates cannot represent.
     """
     try:
         motions = solved.program.motions(solved.report.x)
@@ -99,14 +99,14 @@ def move_to_chart(
 
 
 def _select_joints(solved: SolvedProgram) -> list[ChartRows]:
-    """Rows that select joints and are transversal along the motion, the most transversal ones first."""
+    """Return rows that select joints and are transversal along the motion, the most transversal ones first."""
     chart = solved.program.phases[0].joint_map
     assert isinstance(chart, ChartMap)
     states = solved.program.states(solved.report.x)
     q = np.concatenate([state.q for state in states])
     null = Newton(chart.task_map).self_motions(q)
     n, r = null.shape[1:]
-    # Three choices of one redundant joint and one of several are tried: these solves take longest.
+    # With one redundant joint three choices are tried; with several only one, because these solves take longest.
     count = (0, 3, 1)[min(r, 2)]
     selections = []
     for joints in itertools.islice(itertools.combinations(range(n), r), 500):

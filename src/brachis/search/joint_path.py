@@ -1,4 +1,4 @@
-"""Joint paths, which of them differ, and why a lattice has none."""
+"""Joint paths, the choice of distinct ones, and the reasons why a lattice has none."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from brachis.problem.problem import Problem
 from brachis.robot import Robot
 
 ALL_POSTURES = "all postures"
-"""What the lattice is called that keeps to no choice of redundant joints."""
+"""Name of the lattice that is not bound to a choice of redundant joints."""
 NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
 NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
 NO_TIME = "the time was up"
 _TRIES = 1000
-"""Random postures from which Newton's method begins, before a place counts as out of reach."""
+"""Number of random postures from which Newton's method begins before a target counts as out of reach."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class PosturePath:
     problem : Problem
     s : (S + 1,) ndarray
     q : (S + 1, n) ndarray
-        Postures, rad or m, angles in such turns that they are continuous.
+        Postures, rad or m; angles are continuous, without jumps by whole turns.
     length : float
-        In the measure of the lattice, s^2.
+        Length in the measure of the lattice, s^2.
     branch : int
-        Index into the closed form's branches; 0 where the joint path keeps to none.
+        Index into the closed form's branches; 0 if the joint path is not bound to a branch.
     seed : str
-        Whose closed form gave the posture at which it begins, or ``random``; empty where that is given.
+        Redundant joints whose closed form gave the first posture, or ``random``; empty if the task gives this posture.
     """
 
     problem: Problem
@@ -60,7 +60,7 @@ class DeadEnd:
     s : float
         Path coordinate of the first station that no node reaches.
     cause : str
-        Why: of all edges that are impossible, the cause of those that came nearest to being possible.
+        Why the lattice ends there: the cause for those of the impossible edges that came closest to being possible.
     backwards : bool
         Whether the lattice begins at the given end posture.
     """
@@ -85,21 +85,21 @@ class DeadEnd:
 
 
 def distinct(joint_paths: Sequence[PosturePath], count: int) -> list[int]:
-    """Choose up to `count` joint paths: the shortest one, and others far from those chosen.
+    """Choose up to `count` joint paths: the shortest one, and others far from those already chosen.
 
-    The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
-    the distance is infinite.
+    The next choice is the joint path with the largest ratio of its distance from those already chosen to its length.
+    The distance to another branch is infinite.
 
     Parameters
     ----------
     joint_paths : sequence of PosturePath
-        The shortest one first, at least one.
+        At least one joint path, the shortest one first.
     count : int
 
     Returns
     -------
     list of int
-        Their indices.
+        Indices of the chosen joint paths.
     """
     branches = np.array([joint_path.branch for joint_path in joint_paths])
     q = np.array([joint_path.q for joint_path in joint_paths])
@@ -123,10 +123,10 @@ def distinct(joint_paths: Sequence[PosturePath], count: int) -> list[int]:
 
 
 def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.ndarray:
-    """Weights of the joints, (n,), with which postures near `q`, (n,), are compared.
+    """Return the weights of the joints, (n,), with which postures close to `q`, (n,), are compared.
 
-    The reciprocal of the largest acceleration that a joint's own limits allow it alone; without such limits, that of
-    the largest velocity.
+    A weight is the reciprocal of the largest acceleration that the joint's own limits allow if it moves alone. If no
+    joint has such limits, it is the reciprocal of the largest velocity.
     """
     by_acceleration, by_velocity = reciprocals_near(robot, limits, q)
     return by_acceleration if by_acceleration.any() else by_velocity
@@ -135,9 +135,9 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
 def sampling_box(
     robot: Robot, near: np.ndarray | float = 0.0, opened: Sequence[int] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Box, (n,) and (n,), from which postures are drawn: the ranges, or a turn, or 10 m around a posture `near`.
+    """Return the box, (n,) and (n,), from which postures are drawn: the ranges, or a turn, or 10 m around `near`.
 
-    `opened` joints are taken as if they had no range.
+    The posture `near` counts for prismatic joints. The joints `opened` are treated as if they had no range.
     """
     limits = robot.limits
     is_open = np.isin(np.arange(robot.n), opened)
@@ -162,9 +162,9 @@ def reaches(problem: Problem, s: float) -> bool:
 
 
 def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:
-    """Find how far a limit is exceeded at rest, at least, on ways through postures, (K, L, n).
+    """Find by how much a limit is exceeded at rest on the best of K ways through L postures, (K, L, n).
 
-    Of the best way the largest violation, its column, and in words the figure there and the allowed one.
+    Return the largest violation on this way, its column, and in words the figure there and the allowed one.
     """
     values = limit.values(Moments.at_rest(q.reshape(-1, q.shape[-1])))
     values = values.reshape(*q.shape[:2], -1)
@@ -178,6 +178,6 @@ def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:
 
 
 def leaving_range(robot: Robot, inside: np.ndarray) -> str:
-    """Name the joint that most often leaves its range in K postures; `inside` is (K, n) bool."""
+    """Name the joint that is most often out of its range in K postures; `inside` is (K, n) bool."""
     joint = robot.joint_names[np.argmin(inside.sum(axis=0))]
     return f"the range of joint {joint!r} ends"

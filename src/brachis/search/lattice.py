@@ -1,23 +1,21 @@
 """The lattice: joint paths along the path, by dynamic programming over postures.
 
-The path is cut into stations. Layer by layer from the given start, the nodes of a layer
-(postures that meet the target at its station) are joined to postures at the next station
-that are within the joint ranges, near, and allowed at rest (the torque limits hold the
-arm against gravity). Of all edges into a node the one with the least total length stays.
-If the end posture is given and the start is not, the layers run backwards from the
-end. `ClosedFormLattice` takes its nodes from the closed form of one choice of redundant
-joints, `PostureLattice` from Newton's method.
+The path is cut into stations. The nodes of a layer are postures that meet the target at its station. Layer by layer
+from the given start, they are joined to postures at the next station that are close, within the joint ranges, and
+allowed at rest (within the torque limits, the arm can be held against gravity). Of all edges into a node, the one with
+the least total length is kept. If the end posture is given and the start is not, the layers run backwards from the end.
+`ClosedFormLattice` takes its nodes from the closed form of one choice of redundant joints, `PostureLattice` from
+Newton's method.
 
-Turns of angles by 2 pi follow the joint path. From a given posture, nodes in different
-turns are different nodes. If neither end is given, all turns of a joint path are
-equivalent: a node keeps how far its joints have gone, and is within the ranges as long as
-some multiple of 2 pi brings the whole joint path there. The length of an edge,
+Angles are continuous along a joint path, also across whole turns. From a given posture, postures in different turns are
+different nodes. If neither end is given, all turns of a joint path are equivalent: a node stores the least and largest
+positions of its joints so far, and is within the ranges as long as some multiple of 2 pi brings the whole joint path
+there. The length of an edge,
 
     max |A(q) dq|  +  T max |B(q) dq|
 
-with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `HasLatticeWeights`, does not
-depend on how fast the joint path is followed: with the first term alone the time of a
-straight one is 2 sqrt(length).
+with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `HasLatticeWeights`, does not depend on how fast the joint
+path is followed. With the first term alone, the time along a straight joint path is 2 sqrt(length).
 """
 
 from __future__ import annotations
@@ -52,31 +50,31 @@ from brachis.search.stations import stations
 LARGEST_STEP = 0.8
 """Largest step of a joint between stations, rad or m."""
 _HOMEWARD = 0.6
-"""Part of the largest step that joints may need at every station before a given end."""
+"""Fraction of the largest step that joints may need per station to reach a given end."""
 _LOOKS = 9
-"""Postures on a step that are looked at, to name what is in the way."""
+"""Number of postures examined along a step to name what is in the way."""
 _OTHER_WAYS = 3
-"""Ways to a node, after the shortest one, that are tried where something is in the way."""
+"""Number of further ways to a node that are tried if something is in the way of the shortest one."""
 _SLACK = 1e-9
-"""Rounding of joint positions, rad or m, and of ratios to limits."""
+"""Allowance for the rounding of joint positions, rad or m, and of ratios to limits."""
 
 
 @dataclass(frozen=True)
 class Layer:
-    """Nodes at a station.
+    """The nodes at a station.
 
     Attributes
     ----------
     branch : (K,) int ndarray
-        What joint paths keep: index into the closed form's branches, or where they began.
+        Label that a joint path keeps: an index into the closed form's branches, or the number of its beginning.
     q : (K, n) ndarray
-        Postures, rad or m, continuous along the joint paths there.
+        Postures, rad or m, continuous along the joint paths to the nodes.
     low, high : (K, n) ndarray
         Least and largest positions along the joint path to the node.
     length : (K,) ndarray
-        Of the shortest joint path to the node.
+        Length of the shortest joint path to the node.
     parent : (K,) int ndarray
-        Its last node in the layer before.
+        The node in the layer before from which this joint path comes.
     """
 
     branch: np.ndarray
@@ -92,12 +90,12 @@ class Layer:
 
     @classmethod
     def start(cls, q: np.ndarray, branch: np.ndarray) -> Layer:
-        """Make nodes, (K, n), with which joint paths begin, and their branches, (K,)."""
+        """Create the first layer from postures, (K, n), and their branches, (K,)."""
         return cls(branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
 
 
 def farthest(points: np.ndarray, references: np.ndarray, count: int) -> list[int]:
-    """Choose points, (K, n), each the farthest from all references, (H, n), and all chosen before."""
+    """Choose `count` of the points, (K, n), each farthest from all references, (H, n), and those already chosen."""
     distance = np.abs(points[:, None] - references[None]).max(axis=2).min(axis=1)
     chosen = []
     for _ in range(count):
@@ -107,7 +105,7 @@ def farthest(points: np.ndarray, references: np.ndarray, count: int) -> list[int
 
 
 def shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:
-    """Return where each different row of `keys`, (E, k), has its least `length`, (E,)."""
+    """Return the index at which each distinct row of `keys`, (E, k), has its least `length`, (E,)."""
     order = np.lexsort((length, *keys.T[::-1]))
     rows = keys[order]
     return order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))]
@@ -122,13 +120,13 @@ class Edges:
     parent : (E,) int ndarray
         Node in the layer before.
     step : (E, n) ndarray
-        From the node to the posture, NaN for one that does not exist.
+        Step from the node to the posture; NaN if the posture does not exist.
     key : (E, k) int ndarray
-        Equal for edges to the same node.
+        Key that is equal for edges to the same node.
     elsewhere : (E,) bool ndarray, optional
         Whether there is a posture on any branch; by default there is.
     allowed : (E,) bool ndarray, optional
-        Whether the step is one that a motion may make; by default it is.
+        Whether a motion may make the step; by default it may.
     """
 
     parent: np.ndarray
@@ -139,7 +137,7 @@ class Edges:
 
 
 class Options(TypedDict, total=False):
-    """Options of a lattice, as of `Lattice`."""
+    """Options of a lattice; see `Lattice`."""
 
     cells_per_turn: int
     density: float
@@ -154,13 +152,13 @@ class Lattice(ABC):
     ----------
     problem : Problem
     turning : (n,) bool ndarray
-        Joints whose turn is open if neither end is given.
+        Joints whose number of turns is open if neither end is given.
     cells_per_turn : int, optional
-        Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
+        Number of cells in a turn of a revolute joint; a metre of a prismatic joint has a third as many.
     density : float, optional
         Factor on the number of stations.
     nodes : int, optional
-        Nodes that a layer keeps with several redundant joints.
+        Number of nodes that a layer keeps if several joints are redundant.
     deadline : Deadline, optional
         No layer is begun after it.
     """
@@ -187,8 +185,8 @@ class Lattice(ABC):
         limits = problem.robot.limits
         self._lower = limits.position_lower - _SLACK
         self._upper = limits.position_upper + _SLACK
-        # With a free start all turns are equivalent, and stay open until the joint path is known; a joint without a
-        # range needs no turn, unless a given end has to be met.
+        # With a free start all turns are equivalent, and stay open until the joint path is known. The turn of a joint
+        # without a range does not matter, unless a given end has to be met.
         self._open_turns = turning & (self._origin is None)
         self._to_end = problem.end is not None and not self._backwards
         ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | self._to_end
@@ -201,7 +199,7 @@ class Lattice(ABC):
 
     @abstractmethod
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Make nodes at a free start, whatever the joint ranges are."""
+        """Create nodes at a free start, regardless of the joint ranges."""
 
     @abstractmethod
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
@@ -209,7 +207,7 @@ class Lattice(ABC):
 
     @abstractmethod
     def _thin(self, layer: Layer) -> Layer:
-        """Keep no more nodes than a layer may have."""
+        """Reduce a layer to the number of nodes that it may have."""
 
     def _choose_start_nodes(self, layer: Layer) -> Layer:
         """Choose among the nodes of a free start."""
@@ -225,12 +223,12 @@ class Lattice(ABC):
         Parameters
         ----------
         count : int
-            How many, no more.
+            Largest number of joint paths.
 
         Returns
         -------
         list of PosturePath or DeadEnd
-            Distinct ones, the shortest first, or where the lattice ends.
+            Distinct joint paths, the shortest first, or the place where the lattice ends.
         """
         rng = np.random.default_rng(self.problem.task.search.seed)
         layers: list[Layer] = []
@@ -272,7 +270,7 @@ class Lattice(ABC):
         return self._choose(joint_paths, last, count)
 
     def _first_layer(self, rng: np.random.Generator) -> Layer | str:
-        """Make the nodes with which joint paths begin, or tell what refuses them."""
+        """Create the nodes with which joint paths begin, or tell why none is allowed."""
         if self._origin is not None:
             branch = np.array([self._given_branch])
             return Layer.start(self._origin[None].astype(float), branch)
@@ -288,7 +286,7 @@ class Lattice(ABC):
     def _next(
         self, before: Layer, station: int, rng: np.random.Generator
     ) -> Layer | str:
-        """Join the nodes of a layer to the next station, or tell why none can be."""
+        """Join the nodes of a layer to the next station, or tell why that is impossible."""
         edges = self._edges(before, station, rng)
         parent = edges.parent
         q = before.q[parent] + edges.step
@@ -300,7 +298,7 @@ class Lattice(ABC):
             near = edges.allowed & np.all(np.abs(edges.step) <= LARGEST_STEP, axis=1)
         good = exists & inside.all(axis=1) & near
         if not good.any():
-            # The cause of those that came nearest to being possible.
+            # The cause for the edges that came closest to being possible.
             if (exists & near).any():
                 return leaving_range(self._robot, inside[exists & near])
             if (edges.elsewhere & ~exists).any():
@@ -319,7 +317,7 @@ class Lattice(ABC):
         return self._keep(self._in_reach(layer[chosen], station), self._thin)
 
     def _in_reach(self, layer: Layer, station: int) -> Layer:
-        """Leave out nodes from which a given end is too far for the stations before it, unless all are."""
+        """Leave out nodes that are too far from a given end for the remaining stations, unless all are."""
         if not self._to_end:
             return layer
         stations_to_end = len(self.s) - 1 - station
@@ -331,7 +329,7 @@ class Lattice(ABC):
     def _shortest_free(
         self, before: Layer, layer: Layer, keys: np.ndarray
     ) -> np.ndarray:
-        """Choose the shortest edge to each node, by keys (E, k), of those along which nothing is in the way."""
+        """Choose the shortest unobstructed edge to each node, which its key in `keys`, (E, k), identifies."""
         chosen = shortest(layer.length, keys)
         free = self._are_free(before, layer, chosen)
         if free.all():
@@ -350,7 +348,7 @@ class Lattice(ABC):
         return np.sort(np.concatenate(free_edges))
 
     def _are_free(self, before: Layer, layer: Layer, chosen: np.ndarray) -> np.ndarray:
-        """Tell on which of the chosen steps to a layer nothing is in the way, (C,)."""
+        """Tell which of the chosen steps to a layer, (C,), are unobstructed."""
         first = before.q[layer.parent[chosen]]
         free = np.ones(len(chosen), dtype=bool)
         for limit in self.problem.limits:
@@ -358,7 +356,7 @@ class Lattice(ABC):
         return free
 
     def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
-        """Choose among the nodes in which the arm may rest, or tell what refuses them."""
+        """Choose among the nodes at which the arm may rest, or tell which limit forbids this at all of them."""
         held = np.ones(len(layer.q), dtype=bool)
         for limit in self.problem.limits:
             if limit.at_rest == "posture":
@@ -366,7 +364,7 @@ class Lattice(ABC):
         return choose(layer[held]) if held.any() else self._blame(layer.q[:, None])
 
     def _blame(self, q: np.ndarray) -> str:
-        """Say which limit is exceeded most in the best posture, or on the best way, (K, L, n), and by how much."""
+        """Say which limit is exceeded most on the best of K ways through L postures, (K, L, n), and by how much."""
         if not len(q):
             return ""
         worst = _SLACK
@@ -382,7 +380,7 @@ class Lattice(ABC):
         return cause
 
     def _choose_some(self, layer: Layer, count: int) -> np.ndarray:
-        """Choose `count` nodes: half of least length, with the step to a given end, half far apart."""
+        """Choose `count` nodes: half with the least length, including the step to a given end, and half far apart."""
         if len(layer.q) <= count:
             return np.arange(len(layer.q))
         cost = layer.length
@@ -400,18 +398,18 @@ class Lattice(ABC):
         return np.sort(np.concatenate([order[:half], order[far]]))
 
     def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Return the steps, (E, n), from postures to others, modulo 2 pi."""
+        """Return the steps, (E, n), between pairs of postures, modulo 2 pi."""
         step = q - before
         return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
 
     def _choose(
         self, joint_paths: list[PosturePath], _ends: Layer, count: int
     ) -> list[PosturePath]:
-        """Choose up to `count` of the joint paths, which end at these nodes: some that differ."""
+        """Choose up to `count` distinct joint paths; they end at the nodes `_ends`."""
         return [joint_paths[i] for i in distinct(joint_paths, count)]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
-        """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""
+        """Return multiples of 2 pi, (E, n), that bring joint paths into the ranges, to the middle of closed ones."""
         first, last = self._turns_within(nodes.low, nodes.high)
         with np.errstate(invalid="ignore"):  # inf - inf
             middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / TURN
@@ -423,10 +421,10 @@ class Lattice(ABC):
     def _turns_within(
         self, low: np.ndarray, high: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest multiples of 2 pi, (E, n), that bring joint paths within low and high into the ranges.
+        """Return the least and largest multiples of 2 pi, (E, n), that bring joint paths into the ranges.
 
-        Joints that are in a turn already have the multiple 0 or, if that is not within the range, none at all: the
-        least is then above the largest.
+        `low` and `high` are the extreme positions along the joint paths. Joints whose turn is fixed have the multiple 0
+        or, if they are out of their range, none: the least multiple is then above the largest.
         """
         lowest = np.ceil((self._lower - low) / TURN)
         highest = np.floor((self._upper - high) / TURN)
@@ -435,14 +433,14 @@ class Lattice(ABC):
         return first, last
 
     def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Which joints of joint paths, (E, n), can be brought into their ranges."""
+        """Tell which joints of joint paths, (E, n), can be brought into their ranges."""
         first, last = self._turns_within(low, high)
         return first <= last
 
     def _lengths(
         self, q: np.ndarray, step: np.ndarray, origin: np.ndarray
     ) -> np.ndarray:
-        """Lengths of steps, (E, n), from the postures q[origin], as the module defines them."""
+        """Return the lengths, (E,), of steps, (E, n), from the postures q[origin], as the module defines them."""
         lengths = np.zeros((2, len(step)))
         for limit in self.problem.limits:
             if not isinstance(limit, HasLatticeWeights):

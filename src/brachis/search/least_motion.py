@@ -1,13 +1,13 @@
-"""The calmest motion among those that are as fast as the fastest one.
+"""The smoothest motion among those that are as fast as the fastest one.
 
-Where the end time leaves freedom (a tool that may roll, joints far from their limits), a time-optimal motion is one of
-many, and the solver may return one that swings light joints to and fro. A second solve from it, over the same knots and
-within the same limits,
+Where the end time leaves freedom (a tool that may roll, joints far from their limits), many motions are time-optimal,
+and the solver may return one that swings light joints to and fro. A second solve from this motion, over the same knots
+and within the same limits,
 
     minimises   the mean of sum_i (weights_i qddot_i)^2    subject to    t_E <= (1 + slower) t_E of the fastest
 
-is refined and verified as the first one was. It counts if it is verified and calmer; otherwise the fastest motion
-stays. The multipliers that bottlenecks are found by are those of the fastest one in any case.
+The new motion is refined and verified like the first one. It is used if it is verified and smoother; otherwise the
+fastest motion is kept. In both cases, bottlenecks are found from the multipliers of the fastest motion.
 """
 
 from __future__ import annotations
@@ -46,37 +46,37 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
 _MANY = 200
-"""Number of variables above which active sets take tenths of a second an iteration, or seconds. No smoother motion that
-is as fast is then looked for."""
+"""Number of variables above which an iteration of an active-set method takes tenths of a second, or seconds. No
+smoother motion that is as fast is then sought."""
 _OPTIONS = SolverOptions(
     tolerance=1e-6,
     max_iterations=60,
     time_limit=np.inf,
-    progress=1e-2,  # near enough will do
+    progress=1e-2,  # an approximate optimum is enough
     patience=5,
     anywhere=True,
 )
-"""Bounds on a solve."""
+"""Options that bound the effort of a solve."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LeastMotion(Summary):
-    """What came of the search for the calmest motion.
+    """Outcome of the search for the smoothest motion.
 
     Attributes
     ----------
     trajectory : Trajectory
-        The calmest motion, or the fastest one where that stays.
+        The smoothest motion, or the fastest one if that is kept.
     verification : Verification
-        Of the trajectory.
+        Verification of the trajectory.
     reduction : float
-        Fraction by which the joint accelerations, as root mean square, are lower; 0 where the fastest motion stays.
+        Fraction by which the root mean square of the joint accelerations is lower; 0 if the fastest motion is kept.
     later : float
         Fraction by which the end time is longer.
     status : str
-        In plain words.
+        Outcome in plain words.
     reports : tuple of SolverReport
-        Of all solves.
+        Reports of all solves.
     """
 
     trajectory: Trajectory
@@ -99,7 +99,7 @@ class LeastMotion(Summary):
 def find_least_motion(
     fastest: FinishedCandidate, deadline: Deadline, listener: Listener
 ) -> LeastMotion:
-    """Find the calmest motion that is as fast as a candidate, or as little slower as the task allows.
+    """Find the smoothest motion that is as fast as a candidate, or slower by no more than the task allows.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def find_least_motion(
 def _solve(
     fastest: FinishedCandidate, deadline: Deadline, listener: Listener
 ) -> LeastMotion:
-    """Solve, refine and verify, and take the new motion if it is verified and calmer by a fraction that is worth it."""
+    """Solve, refine and verify; use the new motion if it is verified and smoother by a worthwhile fraction."""
     before = fastest.refined
     task = fastest.problem.task
     count = len(before.x)
@@ -140,7 +140,7 @@ def _solve(
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
-    # Beyond `_MANY` variables only where the motion may be slower.
+    # With more than `_MANY` variables, this point is reached only if the motion may be slower.
     for_large = solver_for_large("auto") if count > _MANY else None
     backend = for_large or solvers_for(task.solver.name)[0]
     solve = _session(backend, soon, listener)
@@ -156,7 +156,7 @@ def _solve(
         return _keep(fastest, too_similar, (first,))
     latest = before.t_end * (1.0 + slower)
     options = RefinementOptions.of(task.refinement, soon, latest)
-    # Rounds of refinement begin near enough, and end sooner.
+    # Refinement rounds begin close to their solution, so they may end sooner.
     solve = replace(solve, options=replace(_OPTIONS, patience=2))
     calmer = refine_and_verify(fastest, program, (first,), solve, options)
     if not (isinstance(calmer, FinishedCandidate) and calmer.verified):
@@ -173,7 +173,7 @@ def _solve(
 
 
 def _reason(report: SolverReport) -> str:
-    """Say why a solve found no smoother motion; the advice of its status is for other solves."""
+    """Say why a solve found no smoother motion; the advice in its status is meant for other solves."""
     if report.status is SolveStatus.TIME_LIMIT:
         return "time ran out before a smoother one was found"
     if report.status in (SolveStatus.EVALUATION_ERROR, SolveStatus.FAILED):
@@ -193,10 +193,11 @@ def _keep(
 def least_acceleration(
     program: Program, x: np.ndarray, slower: float
 ) -> LeastAcceleration:
-    """Make the objective that is 1 at x, (v,), and with which phases last longer by a fraction of up to `slower`.
+    """Return the objective that is 1 at x, (v,), and lets phases last longer by a fraction of up to `slower`.
 
-    Every joint's acceleration counts in proportion to its largest velocity: that of its limit; without one the largest
-    that any such joint of its unit has at x. Joints that nothing limits, the virtual roll of a tool, do not count.
+    Every joint's acceleration is measured relative to the joint's largest velocity. This is the velocity limit or,
+    without one, the largest velocity at x of all joints with the same unit and without such a limit. Joints without any
+    limit, such as the virtual roll of a tool, do not count.
     """
     robot = program.phases[0].joint_map.robot
     states = program.states(x)
@@ -217,7 +218,7 @@ def least_acceleration(
 
 
 def _session(backend: Solver, deadline: Deadline, listener: Listener) -> SolverSession:
-    """Make a session of a backend; any feasible motion will do, however the solve ended."""
+    """Open a session of a solver; any feasible motion is accepted, however the solve ended."""
 
     def progress(iteration: int, objective: float) -> None:
         rms = 100.0 * objective**0.5

@@ -1,9 +1,9 @@
-"""Guesses improved over the path: each one's joint path is optimised with its timing, in a chart around itself.
+"""Improve guesses over the path: optimise each joint path together with its timing, in a chart around it.
 
-That takes tenths of a second. It ranks guesses, and where the phase plane knows all limits it is the plan but for the
-splines. The lattice's joint path may be far from the best one next to it. A chart holds around its own joint path: if
-its rows lose transversality along the better one, or its margin holds the motion back, a new chart is laid around the
-better one, and the search goes on in it.
+This takes tenths of a second. The result ranks guesses. If the phase plane knows all limits, it is the plan except for
+the splines. The lattice's joint path may be far from the closest local optimum. A chart is valid around its own joint
+path. If its rows lose transversality along the better joint path, or if its margin holds the motion back, a new chart
+is laid around the better joint path, and the search continues in it.
 """
 
 from __future__ import annotations
@@ -41,31 +41,31 @@ from brachis.search.stages import (
 from brachis.search.verified import verify
 
 CHARTS = 4
-"""Charts in which a guess is improved, no more, unless stated."""
+"""Largest number of charts in which a guess is improved, by default."""
 _TRANSVERSAL = 0.5
-"""Least transversality of rows along a motion, below which its chart is left for another."""
+"""Transversality of rows along a motion below which its chart is replaced by another."""
 
 
 _EXCESS_FACTOR = 1.2
-"""Part of its time by which a motion is made longer, over its violation."""
+"""Ratio of the fraction of time by which a motion is lengthened to its violation."""
 _LARGEST_EXCESS = 0.1
-"""Violation from which on a motion is not made longer."""
+"""Violation from which on a motion is not lengthened."""
 _LENGTHENINGS = 4
-"""Times that a motion is verified, no more."""
+"""Largest number of times that a motion is verified."""
 
 
 @dataclass(frozen=True)
 class BetterGuess:
-    """What came of a guess.
+    """An improved guess.
 
     Attributes
     ----------
     guess : InitialGuess
-        With the better joint path, its chart, and its least time as the estimate.
+        Guess with the better joint path, its chart, and its least time as the estimate.
     program : Program
-        In that chart, over the knots of the given program.
+        Program in that chart, over the knots of the given program.
     paths : BetterPaths
-        With the reports of all solves.
+        Better joint paths, with the reports of all solves.
     """
 
     guess: InitialGuess
@@ -80,32 +80,32 @@ def improve_guess(
     effort: PathEffort,
     charts: int = CHARTS,
 ) -> BetterGuess:
-    """Find a better joint path next to that of a guess.
+    """Find a better joint path close to that of a guess.
 
     Parameters
     ----------
     guess : InitialGuess
     program : Program
-        Of its joint maps, over any knots; see `improve_joint_paths`.
+        Program of the guess's joint maps, over any knots; see `improve_joint_paths`.
     solve : SolverSession
     effort : PathEffort
     charts : int, optional
-        Charts in which it is looked for, no more.
+        Largest number of charts in which it is sought.
 
     Returns
     -------
     BetterGuess
-        The given joint path where the limits allow no timing of it.
+        It has the given joint path if the limits allow no timing of it.
 
     Raises
     ------
     UnreachableError
-        It leaves its joint map.
+        The given joint path leaves its joint map.
     """
     tolerance = guess.problem.task.spline.tolerance
     paths = improve_joint_paths(program, guess.legs, solve, tolerance, effort)
     better = BetterGuess(_replace_paths(guess, paths), program, paths)
-    # A chart around a motion that is given is kept.
+    # A chart around a given motion is kept.
     if not guess.in_chart or guess.durations or not better.guess.is_improved:
         return better
     with contextlib.suppress(UnreachableError):
@@ -131,15 +131,16 @@ def improve_guess(
 
 
 def _program_like(program: Program, guess: InitialGuess) -> Program:
-    """Write the program of a guess down over the knots of another."""
+    """Return the program of a guess over the knots of another program."""
     grids = [phase.grid for phase in program.phases]
     return program_over(guess.problem, guess.maps_by_leg(), grids)
 
 
 def _centre(better: BetterGuess) -> BetterGuess:
-    """Lay the same chart around the better joint path: the search for a posture then begins beside it.
+    """Lay the same chart around the better joint path, so that the search for a posture begins close to it.
 
-    Its coordinates stay, and so do the timings that were found. Raises UnreachableError where no chart can be laid.
+    The coordinates stay the same, and so do the timings that were found. Raises UnreachableError if no chart can be
+    laid.
     """
     chart, s, q = _chart_of(better.guess)
     centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
@@ -149,7 +150,7 @@ def _centre(better: BetterGuess) -> BetterGuess:
 
 
 def _chart_of(guess: InitialGuess) -> tuple[ChartMap, np.ndarray, np.ndarray]:
-    """Return the chart of a guess, its path coordinates, (S,), and postures, (S, n); raise UnreachableError without."""
+    """Return the chart of a guess, its path coordinates, (S,), and postures, (S, n); or raise UnreachableError."""
     chart = guess.joint_map
     assert isinstance(chart, ChartMap)
     q = chart.postures(guess.joint_path)
@@ -174,9 +175,9 @@ def _replace_paths(guess: InitialGuess, paths: BetterPaths) -> InitialGuess:
 
 
 def _lay_chart(better: BetterGuess) -> InitialGuess | None:
-    """Lay a chart around a better joint path; None where its present chart is good.
+    """Lay a chart around a better joint path; None if its present chart is good enough.
 
-    Raises UnreachableError where no chart can be laid.
+    Raises UnreachableError if no chart can be laid.
     """
     chart, s, q = _chart_of(better.guess)
     newton = Newton(chart.task_map)
@@ -189,9 +190,9 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
 
 
 def follows_timing(guess: InitialGuess, program: Program) -> bool:
-    """Tell whether splines along the timing may be the answer: the phase plane knows all limits, ``intervals`` is auto.
+    """Tell whether splines along the timing may be the plan: the phase plane knows all limits, ``intervals`` is auto.
 
-    As a fallback other solvers solve over time.
+    Other solvers, which are fallbacks, always solve over time.
     """
     task = guess.problem.task
     is_first = guess.solver == solvers_for(task.solver.name)[0].name
@@ -202,13 +203,13 @@ def follows_timing(guess: InitialGuess, program: Program) -> bool:
 def improve_over_path(
     guess: InitialGuess, program: Program, session: SolverSession
 ) -> RankedCandidate:
-    """Improve a guess so far that its time ranks it.
+    """Improve a guess far enough that its time ranks it.
 
     Parameters
     ----------
     guess : InitialGuess
     program : Program
-        Of its joint maps, over any knots.
+        Program of the guess's joint maps, over any knots.
     session : SolverSession
 
     Raises
@@ -229,22 +230,23 @@ def lay_along_timing(
 ) -> Candidate | None:
     """Lay splines along the timings of all phases, and verify them.
 
-    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer, a few times.
+    If a limit is exceeded slightly between the points that were checked, the motion is lengthened slightly, and again
+    if necessary.
 
     Parameters
     ----------
     candidate : RankedCandidate
     program : Program
-        Over any knots.
+        A program over any knots.
     timings : sequence of PhaseTiming or None
     reports : tuple of SolverReport
-        Of earlier solves.
+        Reports of earlier solves.
     options : RefinementOptions
 
     Returns
     -------
     Candidate or None
-        None where a phase has no timing.
+        None if a phase has no timing.
     """
     spline = candidate.problem.task.spline
     laid = lay_splines(

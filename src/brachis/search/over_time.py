@@ -1,6 +1,7 @@
-"""The program over time from a guess, or from the timings of joint paths.
+"""The program over time, solved from a guess or from the timings of joint paths.
 
-Its first point are splines along the timing of a joint path, slowed down until limits hold at the collocation points.
+Its first point consists of splines along the timing of a joint path, slowed down until the limits are met at the
+collocation points.
 """
 
 from __future__ import annotations
@@ -35,33 +36,35 @@ from brachis.task import SplineSettings
 from brachis.timing import is_left_out
 
 _ENTRIES = 500_000
-"""Variables times rows of a program over time that improves a joint path: with more an iteration takes tenths of a
-second."""
+"""Largest number of variables times rows of a program over time that improves a joint path. With more, an iteration
+takes tenths of a second."""
 _ITERATIONS = 80
-"""Iterations of a solve that does so: from the timing most solves take 5 to 25, one beside a singular posture 74."""
+"""Largest number of iterations of such a solve. From the timing, most solves take 5 to 25; one close to a singular
+posture took 74."""
 _WIDENING = 1e-6
-"""See `SolverOptions`: along a timing hundreds of rows are at their bounds, and a solve of 0.1 s took 4 s without."""
+"""See `SolverOptions`. Along a timing, hundreds of rows are at their bounds: a solve of 0.1 s took 4 s without
+widening."""
 _NEARLY = 0.01
-"""Violation that refinement mends, where the iterations end a solve."""
+"""Largest violation that refinement can remove, accepted if the iteration limit ends a solve."""
 _FIRST_LOSS = 0.05
-"""Part of the time that first knots may lose, where a mesh is refined from them."""
+"""Fraction of the motion time that the first knots may cost, if a mesh is refined from them."""
 _FIRST_INTERVALS = 16
-"""Intervals of such a first mesh, about."""
+"""Approximate number of intervals of such a first mesh."""
 _FIRST_MARGIN = 0.1
-"""Branch margin of a first solve: without it a rail at 0.1 m/s took three times as long, after four motions that left
-their charts."""
+"""Branch margin of a first solve. Without it, a plan on a rail at 0.1 m/s took three times as long, because four
+motions left their charts."""
 
 
 def solve_over_time(
     guess: InitialGuess, program: Program, session: SolverSession
 ) -> SolvedProgram:
-    """Solve over time, with knots that the fastest timing needs, or those that are given: few of them at first.
+    """Solve over time, first over few knots: those that the fastest timing needs, or some of the given ones.
 
     Parameters
     ----------
     guess : InitialGuess
     program : Program
-        Of its joint maps, over all knots that are given.
+        Program of the guess's joint maps, over all given knots.
     session : SolverSession
 
     Returns
@@ -78,7 +81,7 @@ def solve_over_time(
 
 
 def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.ndarray]:
-    """Return a program over few knots, and splines to begin with, (v,); raise UnreachableError where these leave it."""
+    """Return a program over few knots and its first splines, (v,); raise UnreachableError if these are out of reach."""
     task = guess.problem.task
     has_laws = any(guess.problem.time_laws)
     is_open = task.spline.intervals == "auto" and not task.boundary.periodic
@@ -86,7 +89,7 @@ def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.n
     if has_laws and is_open and not any(map(is_left_out, program.limits)):
         x = initial_guess(program, guess)
     if is_open and (not has_laws or x is not None):
-        # Close together where the fastest timing of the joint path needs them.
+        # Knots are close together where the fastest timing of the joint path needs them.
         points = task.spline.points_per_interval
         with contextlib.suppress(UnreachableError):
             pairs = zip(program.phases, guess.legs, strict=True)
@@ -97,7 +100,7 @@ def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.n
             if first is not None:
                 return first
     is_near = guess.joint_map.r <= 1 and is_timing_all(program)
-    # At a given speed motions leave their charts between few points.
+    # At a given speed, motions leave their charts between the points of a coarse mesh.
     even = program if is_near or has_laws else coarsest(program)
     x = initial_guess(even, guess)
     if x is None:
@@ -110,10 +113,10 @@ def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.n
 def _solve_clear_first(
     program: Program, x: np.ndarray, session: SolverSession
 ) -> SolvedProgram:
-    """Solve from x, (v,), clear of branch boundaries; near them too if that is how the motion is held back.
+    """Solve from x, (v,), clear of branch boundaries; if this holds the motion back, solve close to them as well.
 
-    Where many motions are equally fast, as at a given speed, they drift to the boundary, and leave the branch between
-    the collocation points.
+    Where many motions are equally fast, as at a given speed, the solver drifts to the boundary, and the motion leaves
+    the branch between the collocation points.
     """
     clear = attempt_once(session, program.with_margin(_FIRST_MARGIN), x)
     if clear.report.status is SolveStatus.TIME_LIMIT:
@@ -128,16 +131,16 @@ def _solve_clear_first(
 
 @dataclass(frozen=True)
 class BetterTimings:
-    """What the program over time made of joint paths.
+    """The timings of joint paths that the program over time has improved.
 
     Attributes
     ----------
     program : Program
-        With all limits; over any knots.
+        Program with all limits, over any knots.
     timings : sequence of PhaseTiming or None
-        The fastest ones known, one for each phase of the program.
+        The fastest known timings, one for each phase of the program.
     solved : SolvedProgram or None
-        The motion over time; None where the solve gave none.
+        The motion over time; None if the solve gave none.
     """
 
     program: Program
@@ -146,7 +149,7 @@ class BetterTimings:
 
     @property
     def t_end(self) -> float:
-        """Time of all phases, s; infinite where one has no timing."""
+        """Time of all phases, s; infinite if one has no timing."""
         return least_time(self.timings)
 
     @property
@@ -156,7 +159,7 @@ class BetterTimings:
 
 
 def shorten_solves(session: SolverSession) -> SolverSession:
-    """Bound the effort of solves that begin with the fastest timing."""
+    """Return a session with bounded effort, for solves that begin with the fastest timing."""
     iterations = min(_ITERATIONS, session.options.max_iterations)
     options = replace(session.options, max_iterations=iterations, widening=_WIDENING)
     return replace(session, options=options)
@@ -165,13 +168,13 @@ def shorten_solves(session: SolverSession) -> SolverSession:
 def improve_timings(
     guess: InitialGuess, program: Program, paths: BetterPaths, session: SolverSession
 ) -> BetterTimings:
-    """Solve over time from splines along timings, and time the joint path of the answer.
+    """Solve over time from splines along timings, and time the joint path of the solution.
 
     Parameters
     ----------
     guess : InitialGuess
     program : Program
-        Over any knots.
+        A program over any knots.
     paths : BetterPaths
         Joint paths of the program's phases.
     session : SolverSession
@@ -179,7 +182,7 @@ def improve_timings(
     Returns
     -------
     BetterTimings
-        Those given, where no joint is redundant, no time is left, or no motion comes out.
+        The given timings if no joint is redundant, no time is left, or the solve gives no motion.
     """
     unimproved = BetterTimings(program, paths.timings)
     if not guess.joint_map.r or session.deadline.passed:
@@ -208,9 +211,9 @@ def _solve_from_timings(
     session: SolverSession,
     spline: SplineSettings,
 ) -> SolvedProgram | None:
-    """Solve over time from splines along the timings of all phases; None where that gives no motion."""
+    """Solve over time from splines along the timings of all phases; None if that gives no motion."""
     r = program.phases[0].joint_map.r
-    # Variables times rows grow with the square of the intervals.
+    # Variables times rows grow with the square of the number of intervals.
     rows = (1 + r) * len(program.lower) / program.intervals
     intervals = int(np.sqrt(_ENTRIES / rows))
     begun = begin_with_timing(

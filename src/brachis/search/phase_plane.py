@@ -1,12 +1,12 @@
-"""Least times along the joint paths of guesses, leg by leg, and first guesses from them.
+"""Least times along the joint paths of guesses, leg by leg, and the first splines that follow from them.
 
 A joint path has kinks where the tool stops, so every leg of the path is timed by itself (`timing`). A leg with a given
-speed has no fastest motion, but one motion, which the limits allow or do not allow.
+speed has only one motion, which the limits either allow or do not allow.
 
-The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until nothing is
-too fast: the limits that hold the fastest motion are near then, and a solver sees where to go. Where a smooth motion
-from rest to rest is faster, or splines cannot follow the timing within the limits, it is that one. Where
-splines over few knots leave the branch, it goes straight from end to end.
+The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until no limit is
+exceeded. It is then close to the limits that hold the fastest motion back, so that a solver finds its way. If a smooth
+motion from rest to rest is faster, or if splines cannot follow the timing within the limits, this motion is the first
+guess. If splines over few knots leave the branch, the first guess goes straight from end to end.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from brachis.search.stages import InitialGuess
 from brachis.timing import JointPath, PhasePlane
 
 _STATIONS = 401
-"""Stations along a joint path of a guess."""
+"""Number of stations along the joint path of a guess."""
 _NEAR = 1e-4
-"""Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
+"""Stations closer than this to an end of a leg, in s, are left out: differences would be inaccurate."""
 _ROUGH = 0.99
-"""Part of a given speed that the limits have to allow: derivatives of a joint path are differences."""
+"""Fraction of a given speed that the limits have to allow: derivatives of a joint path are inaccurate differences."""
 
 
 def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
-    """Estimate the least time along a joint path, with its stops and given speeds.
+    """Estimate the least time along a joint path, including its stops and given speeds.
 
     Parameters
     ----------
     problem, s, q
-        As of `fastest_times`.
+        See `fastest_times`.
 
     Returns
     -------
     float
-        s; infinite for a joint path that cannot be followed at any speed, or not at the given one.
+        Time, s; infinite if the joint path cannot be followed at any speed, or not at the given one.
     """
     total = problem.dwell_time
     for timed_leg in fastest_times(problem, s, q):
@@ -57,7 +57,7 @@ def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
 def fastest_times(
     problem: Problem, s: np.ndarray, q: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray] | None]:
-    """Estimate when a joint path is passed on each leg.
+    """Estimate the fastest timing of a joint path, leg by leg.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ def fastest_times(
     Returns
     -------
     list of (stations, times) or None
-        For each leg path coordinates (P,) from its beginning to its end, and times (P,) from 0 on, s. None for a leg
-        that cannot be passed.
+        For each leg, path coordinates (P,) from its beginning to its end, and the times (P,), s, which begin at 0. None
+        for a leg that cannot be travelled.
     """
     timed_legs = []
     legs = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
@@ -92,7 +92,7 @@ def fastest_times(
 def phase_plane_on(
     problem: Problem, leg: Leg, s: np.ndarray, q: np.ndarray
 ) -> PhasePlane:
-    """Make the phase plane of the part of a joint path, (S,) and (S, n), on a leg."""
+    """Return the phase plane for the part of a joint path, (S,) and (S, n), that is on a leg."""
     inner = s[(s > leg.begin + _NEAR) & (s < leg.end - _NEAR)]
     if len(inner) < 3:
         inner = np.linspace(leg.begin, leg.end, 5)[1:-1]
@@ -107,7 +107,7 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
     Parameters
     ----------
     program : Program
-        With a phase for each leg of the path.
+        Program with one phase for each leg of the path.
     guess : InitialGuess
 
     Returns
@@ -117,7 +117,7 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
     durations = guess.durations or (None,) * len(guess.legs)
     curves_and_durations = [(guess.legs, durations)]
     if guess.durations is None:
-        # The timing of a joint path that was not improved leads to other optima.
+        # The timing of a joint path that was not improved leads to different optima.
         timed = [
             _time_guess(phase, curves)
             if guess.is_improved or any(phase.boundary.rates)
@@ -134,17 +134,17 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
             beyond = max(worst_time_scaling_ratio(program, x), 1.0)
             points.append((beyond, program.end_time(x), x))
     if points:
-        # The fastest one within the limits.
+        # The fastest splines within the limits.
         return min(points, key=itemgetter(0, 1))[-1]
-    # Over few knots splines may leave the branch where the joint path bends.
+    # Splines over few knots may leave the branch where the joint path bends.
     straight = [np.linspace(curves[0], curves[-1], _STATIONS) for curves in guess.legs]
     return starting_point(program, straight, (None,) * len(straight))
 
 
 def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:
-    """Time the joint path of a leg: curves at even times, and duration, s.
+    """Time the joint path of a leg; return its curves at even times, and its duration, s.
 
-    Where the speed is given, and where no timing exists, it is returned without a duration.
+    If the speed is given, or if no timing exists, the joint path is returned unchanged and without a duration.
     """
     if phase.time_law is not None or phase.joint_map.path is None:
         return curves, None
@@ -159,6 +159,6 @@ def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | N
 
 
 def postures_along(guess: InitialGuess, s: np.ndarray) -> np.ndarray | None:
-    """Postures of a guess, (S, n), at path coordinates, (S,); None if some do not exist."""
+    """Return the postures of a guess, (S, n), at path coordinates, (S,); None if some do not exist."""
     q = guess.postures_at(s)
     return q if np.isfinite(q).all() else None

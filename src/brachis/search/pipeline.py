@@ -1,6 +1,6 @@
-"""From an initial guess to a verified motion, in the order in which it happens.
+"""From an initial guess to a verified motion: the steps in their order.
 
-    joint path      from a lattice, at random, of a given motion, or of the task
+    joint path      from a lattice, at random, from a given motion, or from the task
     over the path   joint path and speed together                                       a better InitialGuess
     timing          the fastest one along that joint path, by the phase plane           RankedCandidate
     over time       the program with all limits, from splines along that timing         SolvedProgram
@@ -8,18 +8,19 @@
     refinement      collocation points where limits are exceeded between others         SolvedProgram
     verification    from URDF, path and limits alone                                    FinishedCandidate
 
-`rank_candidate` goes as far as the timing: its time, `Candidate.estimate`, ranks candidates. Limits that the phase
-plane does not know (jerk, torque rate, means) are not in it. `finish_candidate` goes on with those that may be the
-fastest, in one of two ways:
+`rank_candidate` goes as far as the timing, whose duration, `Candidate.estimate`, ranks the candidates. Limits that the
+phase plane does not know (jerk, torque rate, means) do not affect it. `finish_candidate` continues with the candidates
+that may be the fastest, in one of two ways:
 
-- `_finish_over_time`, where knots are given (``intervals: 20``, or ``knots: free``), or the phase plane does not know a
-  limit. The answer of the program over time is refined.
-- `_finish_over_path`, for ``intervals: auto`` and limits that it knows. The program over time improves the joint path.
-  Its answer is refined if it is about as fast as the timing of its own joint path; otherwise splines are laid along
-  this timing.
+- `_finish_over_time`, if knots are given (``intervals: 20``, or ``knots: free``), or if the phase plane does not know
+  one of the limits. The solution of the program over time is refined.
+- `_finish_over_path`, for ``intervals: auto`` and limits that the phase plane knows. The program over time improves the
+  joint path. Its solution is refined if it is about as fast as the timing of its own joint path; otherwise splines are
+  laid along this timing.
 
-Coordinates are those of a closed form where the task names its redundant joints, and else of a chart, which measures
-self-motion around a joint path. A path of joints leaves nothing to improve: it is timed, and splines are laid along it.
+The coordinates are those of a closed form if the task names its redundant joints. Otherwise they are those of a chart,
+which measures self-motion around a joint path. A path of joints leaves nothing to improve: it is timed, and splines are
+laid along the timing.
 """
 
 from __future__ import annotations
@@ -61,15 +62,16 @@ from brachis.search.stages import (
 from brachis.search.verified import refine_and_verify
 
 _BEFORE_REFINEMENT = 0.5
-"""Part of the time left for all that comes before refinement."""
+"""Fraction of the remaining time for everything before refinement."""
 _IF_SHORT = 0.2
-"""The same where splines are laid in little time, which takes half a second. With 0.5 they were laid too late."""
+"""The same fraction if there is little time and splines are laid, which takes half a second. With 0.5 they were laid
+too late."""
 
 
 def rank_candidate(
     guess: InitialGuess, deadline: Deadline, _listener: Listener
 ) -> Candidate:
-    """Improve the joint path of a guess over the path, so that candidates can be ranked, unless the time is up.
+    """Improve the joint path of a guess over the path, so that candidates can be ranked; skip it if the time is up.
 
     Parameters
     ----------
@@ -80,11 +82,11 @@ def rank_candidate(
     Returns
     -------
     Candidate
-        A ranked one, unless the joint path leaves its joint map, or the time is up.
+        A ranked candidate, unless the joint path leaves its joint map, or the time is up.
     """
     if deadline.passed:
         return begin_candidate(guess, NOT_TRIED)
-    # A motion that is given is where the program over time begins, if that gives the answer.
+    # A given motion is the first point of the program over time, if this program gives the solution.
     is_motion = guess.durations is not None
     has_given_knots = guess.problem.task.spline.intervals != "auto"
     try:
@@ -106,14 +108,14 @@ def finish_candidate(
     ----------
     candidate : RankedCandidate
     to_beat : Marks
-        Of the fastest motion so far.
+        End times of the fastest motion so far.
     deadline : Deadline
     listener : callable
 
     Returns
     -------
     Candidate
-        A finished one where there is a motion.
+        A finished candidate if there is a motion.
     """
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
@@ -146,7 +148,7 @@ def _finish_over_time(
     if not solved.usable:
         words = solved.report.status.name.lower().replace("_", " ")
         return fail(candidate, words, solved.reports)
-    # Many knots are reached from few.
+    # A program over many knots is reached from one over few.
     target = solved.program if spline.intervals == "auto" else program
     has_given_knots = spline.intervals != "auto" and spline.knots != "free"
     has_all_knots = solved.program.intervals == target.intervals
@@ -178,10 +180,10 @@ def _finish_over_path(
     options: RefinementOptions,
     to_beat: Marks,
 ) -> Candidate:
-    """Improve joint paths further over the path, then over time, and follow the faster one's timing.
+    """Improve joint paths further over the path, then over time, and follow the timing of the faster one.
 
-    What the program over time gains in the joint path stays; what its knots lose in the timing is regained by splines
-    that are laid along it.
+    The joint path that the program over time improves is kept. The time that its knots cost is regained by splines that
+    are laid along the timing.
     """
     guess = candidate.guess
     program = candidate.program
@@ -226,8 +228,8 @@ def _refine(
 ) -> Candidate:
     """Refine and verify a motion over all its knots.
 
-    Rounds begin near their answer, which helps an active-set method, and an interior point not at all. So the task's
-    first solver refines, and the one that found the motion if that fails.
+    Refinement rounds begin close to their solution, which helps an active-set method, but not an interior-point method.
+    So the task's first solver refines; if it fails, the solver that found the motion does.
     """
     first = solvers_for(candidate.problem.task.solver.name)[0]
     outcomes: list[Candidate] = []

@@ -1,4 +1,4 @@
-"""What a plan gives: trajectory, verification, and how they came about; what is done with it is in `result`."""
+"""The data of a plan's result: the trajectory, its verification, and how they were found; methods are in `result`."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def describe_motion(
 
 @dataclass(frozen=True, repr=False)
 class PlannedMotion(Summary):
-    """What a plan gives, without what is done with it: see `brachis.Result`."""
+    """The data of a plan's result, without the methods that plot or view it; see `brachis.Result`."""
 
     task: Task
     trajectory: Trajectory
@@ -64,17 +64,17 @@ class PlannedMotion(Summary):
         return self.trajectory.sample(dt, last=last)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write trajectory and sensitivities to an npz file, which `Trajectory.load` reads."""
+        """Write the trajectory and its sensitivities to an npz file, which `Trajectory.load` reads."""
         self.explained_trajectory.save(path)
 
     @property
     def explained_trajectory(self) -> Trajectory:
-        """The trajectory with what holds it back."""
+        """The trajectory, with the sensitivities that tell what holds it back."""
         return replace(self.trajectory, sensitivities=self.sensitivities)
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """What limits and other demands of the task cost, from the multipliers of the plan."""
+        """The time that limits and other demands of the task cost, from the multipliers of the plan."""
         candidate = self.candidate
         with use_one_thread():
             return explain_motion(
@@ -82,11 +82,11 @@ class PlannedMotion(Summary):
             )
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
-        """Return a pandas table, a row every `dt` seconds."""
+        """Return a pandas table with a row every `dt` seconds."""
         return self.trajectory.to_dataframe(dt)
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
+        """Return the figures shown to the user, by name."""
         report = self.solver_report
         verified = sum(candidate.verified for candidate in self.candidates)
         shown = {
@@ -110,22 +110,22 @@ class PlannedMotion(Summary):
 
     @property
     def duration(self) -> float:
-        """End time, s, as other planners name it."""
+        """End time, s, under the name that other planners use."""
         return self.t_end
 
     @property
     def verified(self) -> bool:
-        """True where every check of the verification passed."""
+        """Whether every check of the verification passed."""
         return self.verification.passed
 
     @property
     def fits(self) -> tuple[FitReport, ...]:
-        """How near the path is to the points that it was fitted to, one for each file or array."""
+        """How close the path is to the points that it was fitted to, with one report for each file or array."""
         return self.task.fits
 
     @property
     def solver_report(self) -> SolverReport:
-        """Report of the solve that gave the trajectory."""
+        """The report of the solve that gave the trajectory."""
         return self.candidate.reports[-1]
 
     def to_dict(self) -> dict[str, Any]:

@@ -1,15 +1,15 @@
-"""The search: initial guesses from lattices, ranked by the timing of their joint paths, the best refined and verified.
+"""The search: guesses from lattices are ranked by the timing of their joint paths; the best are refined and verified.
 
 1. Lattices give initial guesses, batch by batch (see `schedule`).
-2. Their joint paths are improved, and the least times along these rank them (see `pipeline`).
-3. In the order of these times candidates are solved over time, refined and verified, as long as they may beat the best
-   verified one. Refinement slows all motions by about as much. So a motion that does not beat the best one before its
-   refinement is not refined.
-4. A motion near a joint path is found before all else where there is little time, and at the end of the time where
-   nothing is verified by then (see `first_motion`).
-5. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
+2. The joint paths of the guesses are improved, and the least times along them rank the candidates (see `pipeline`).
+3. In the order of these times, candidates are solved over time, refined and verified, as long as they may beat the best
+   verified one. Refinement slows all motions by about the same amount. So a motion that does not beat the best one
+   before refinement is not refined.
+4. If there is little time, a motion close to a joint path is found before anything else. If nothing is verified towards
+   the end of the time, such a motion is found then (see `first_motion`).
+5. Other solvers, closed forms of single choices and numeric guesses are tried only while nothing is verified.
 
-The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
+The outcome does not depend on the number of processes: work that one process would not have done is discarded.
 """
 
 from __future__ import annotations
@@ -56,20 +56,20 @@ from brachis.search.stages import (
 from brachis.trajectory import Trajectory
 
 _LEAST_COST = 0.5
-"""Knots, and limits that the phase plane does not know, lengthen every motion. They cost a candidate at least this part
-of the smallest cost so far. With 10 intervals they cost joint paths of a planar arm 17 to 20 % of the time."""
+"""Knots, and limits that the phase plane does not know, lengthen every motion. They cost a candidate at least this
+fraction of the smallest cost so far. With 10 intervals, joint paths of a planar arm lost 17 to 20 % of the time."""
 _RANKING_SHARE = 0.6
-"""Part of the time left after which no joint path is improved while nothing is verified."""
+"""Fraction of the remaining time after which no joint path is improved while nothing is verified."""
 _RESERVE = 0.3
-"""Part of the time that is kept for a first motion while nothing is verified,"""
+"""Fraction of the time that is reserved for a first motion while nothing is verified."""
 _LONGEST_RESERVE = 10.0
-"""but no more, s: for a weld one takes 3 s, and three times as long on a busy machine."""
+"""Longest such reserve, s: for a weld, a first motion takes 3 s, and three times as long on a busy machine."""
 _FIRST_SHARE = 0.6
-"""Part of the time left in which a first motion is looked for before all else."""
+"""Fraction of the remaining time in which a first motion is sought before anything else."""
 _LATER = 0.2
-"""Seconds after its end that the search goes on if there was no first motion."""
+"""Time, s, for which the search continues after its deadline if no first motion was found."""
 _REFINED = 5e-3
-"""Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
+"""Fraction of the end time that refinement usually adds at most; if it adds more, another motion may be faster."""
 
 
 class Search:
@@ -79,19 +79,19 @@ class Search:
     ----------
     problem : Problem
     decompositions : sequence of Decomposition
-        The most promising first.
+        The most promising ones first.
     deadline : Deadline
-        When to end with the best motion so far; one that is not verified where none is.
+        When to end the search with the best motion so far, even if this is not verified.
     listener : callable
 
     Attributes
     ----------
     candidates : list of Candidate
-        All that was looked at.
+        All candidates of the search.
     guesses : list of InitialGuess
-        All that candidates were begun with.
+        All guesses from which candidates were begun.
     best : FinishedCandidate or None
-        The fastest verified one, or the one nearest to the limits.
+        The fastest verified candidate; without one, the candidate closest to the limits.
     interrupted : bool
         Whether Ctrl-C or the time limit ended the search.
     """
@@ -124,17 +124,17 @@ class Search:
 
     @property
     def is_satisfied(self) -> bool:
-        """Whether a verified motion is known; without refinement any motion will do."""
+        """Whether a verified motion is known; if the task wants no refinement, any motion is enough."""
         return self.best is not None and self._merit(self.best)[0] == -np.inf
 
     def _merit(self, candidate: FinishedCandidate) -> tuple[float, float]:
-        """By what motions are compared: violation of a limit, -inf for a motion that will do, and end time, s."""
+        """Return the figures that rank motions: violation of a limit, -inf if acceptable, and end time, s."""
         if candidate.is_settled or not self._problem.task.refinement.max_rounds:
             return -np.inf, candidate.t_end
         return candidate.verification.worst_ratio - 1.0, candidate.t_end
 
     def _report(self, listener: Listener, text: str) -> None:
-        """Tell a listener what is being done, with every iteration the best motion so far and the time left."""
+        """Tell a listener what is being done; every iteration also states the best motion so far and the time left."""
         if isinstance(text, Iteration) and self.best is not None and self.is_satisfied:
             best = f"best so far: t_E = {self.best.t_end:.4f} s"
             text = Iteration(f"{best}, {self._deadline.left:.0f} s left; {text}")
@@ -151,19 +151,19 @@ class Search:
         Parameters
         ----------
         motion : Trajectory, optional
-            A motion that is tried alone at first; nothing else is if it leads to a verified motion.
+            A motion that is tried first. If it leads to a verified motion, nothing else is tried.
         exact : FinishedCandidate, optional
-            A verified plan of the same task without tolerances. It is the plan unless a faster one is found: first near
-            it, then, if the search found none there or is exhaustive, elsewhere.
+            A verified plan of the same task without tolerances. It is the plan unless a faster one is found. The search
+            looks close to it first, and elsewhere only if it found nothing there or is exhaustive.
         max_batches : int, optional
-            Number of batches after which the search ends.
+            Largest number of batches.
 
         Raises
         ------
         PathError
-            The path is out of reach, or no posture along it is allowed at rest.
+            The path is out of reach, or at some point of it no posture is allowed at rest.
         PlanningError
-            A speed, or a mean of a load, is far out of reach.
+            A given speed, or a limit on the mean of a load, is far out of reach.
         """
         guess_batches = self._find_guesses(motion, exact)
         for batch in itertools.islice(guess_batches, max_batches):
@@ -172,14 +172,14 @@ class Search:
                 self._find_first_motion(batch.guesses, soon)
             self._rank(batch)
             self._refine_and_verify(batch)
-        self.interrupted |= self._latest.passed  # the last solves may be cut short
+        self.interrupted |= self._latest.passed  # solves may have been cut short
         if self.interrupted and self._reserve > 0.0:
             self._find_first_motion(self.guesses, self._deadline)
 
     def _find_first_motion(
         self, guesses: Sequence[InitialGuess], deadline: Deadline
     ) -> None:
-        """Find a motion near the joint path of a guess, unless one is known."""
+        """Find a motion close to the joint path of a guess, unless a motion is known."""
         if not self._has_motion:
             self._reserve = -_LATER
             self._first_motion = find_first_motion_of(guesses, deadline, self._listener)
@@ -251,7 +251,7 @@ class Search:
     def _refine_and_verify(self, batch: Batch) -> None:
         """Refine and verify the candidates of a batch in the order of their ranks while they may be the fastest."""
         jobs = self._problem.task.search.jobs
-        # With auto they are finished one by one, for the next one may not be needed.
+        # With auto, candidates are finished one by one, because the next one may not be needed.
         jobs = 1 if jobs == "auto" else process_count(jobs)
         budget = batch.refined
         while self._waiting and self._goes_on(budget):
@@ -284,7 +284,7 @@ class Search:
         Raises
         ------
         KeyboardInterrupt
-            Ctrl-C before any motion was verified; its text says what the best one is.
+            Ctrl-C was pressed before any motion was verified; the text describes the best motion so far.
         """
         is_pressed = False
         try:
@@ -316,7 +316,7 @@ class Search:
             raise KeyboardInterrupt(self._describe_best())
 
     def outcome(self) -> SearchOutcome:
-        """Return what came of the search; raise what explains that no motion was found."""
+        """Return the outcome of the search; raise the error that explains why no motion was found."""
         if self.best is None:
             raise self.explain()
         return SearchOutcome(
@@ -330,7 +330,7 @@ class Search:
             failure = failure or explain_speeds(self.guesses, are_tried=True)
         if failure is not None:
             return failure
-        # The time for the search may have ended every solve, of which each has a time limit of its own.
+        # The time limit of the search may have ended every solve before its own time limit.
         last = [
             candidate.reports[-1] for candidate in self.candidates if candidate.reports
         ]
@@ -354,7 +354,7 @@ class Search:
         best = self.best
         if best is not None and self._given_motion and best.origin != GIVEN:
             notes.append(
-                f"the plan does not start from the given motion: {self._given_motion}; it was searched for as usual"
+                f"the plan does not start from the given motion: {self._given_motion}; the usual search was made"
             )
         if best is not None and best.not_completed:
             notes.append(best.not_completed)
@@ -365,14 +365,14 @@ class Search:
             notes.append(f"the lattice of {names} was not searched completely")
         untried = sum(candidate.status == NOT_TRIED for candidate in self.candidates)
         counts = {"tried": untried, "finished": len(self._waiting)}
-        unfinished = [f"{n} not {what}" for what, n in counts.items() if n]
+        unfinished = [f"{n} remained un{what}" for what, n in counts.items() if n]
         if unfinished:
             total = write_count(len(self.candidates), "candidate")
-            notes.append(f"of {total} {', '.join(unfinished)}")
+            notes.append(f"of {total}, {', '.join(unfinished)}")
         return (*notes, "the search that search.effort requires was not completed")
 
     def in_order(self) -> tuple[Candidate, ...]:
-        """All candidates, the fastest verified one first, without their programs."""
+        """Return all candidates, the fastest verified one first, without their programs."""
 
         def rank(candidate: Candidate) -> tuple[float, ...]:
             times = candidate.t_end, candidate.estimate
@@ -383,7 +383,7 @@ class Search:
 
     @property
     def _latest(self) -> Deadline:
-        """When the last work ends: earlier while nothing is verified, and later if there is no first motion."""
+        """Deadline of the search: earlier while nothing is verified, and later if no first motion was found."""
         if self._has_motion:
             return self._deadline
         return self._deadline.extend(-self._reserve)
@@ -394,14 +394,14 @@ class Search:
         return self.is_satisfied or self._first_motion is not None
 
     def _by_time(self, first: int = 0) -> list[int]:
-        """Numbers, from `first` on, of the ranked candidates, that with the least time along its joint path first."""
+        """Return the numbers, from `first` on, of the ranked candidates, by the times along their joint paths."""
         return sorted(
             (number for number in self._ranked if number >= first),
             key=lambda number: (round_end_time(self._ranked[number].estimate), number),
         )
 
     def _add_guesses(self, batch: Batch) -> int:
-        """Add guesses as candidates that were not tried yet; return the number of the first one."""
+        """Add guesses as untried candidates; return the number of the first one."""
         first = len(self.candidates)
         self.guesses += batch.guesses
         self.candidates += [
@@ -412,7 +412,7 @@ class Search:
     def _add_lattice(
         self, decomposition: Decomposition | None, dead_end: DeadEnd
     ) -> None:
-        """Put down that a lattice has no joint path, or that there was no time for it."""
+        """Record that a lattice has no joint path, or that there was no time for it."""
         name = ALL_POSTURES if decomposition is None else decomposition.name
         if dead_end.cause == NO_TIME:
             self._unfinished_lattices[name] = None
@@ -432,7 +432,7 @@ class Search:
         )
 
     def _refuse_what_is_out_of_reach(self) -> None:
-        """Refuse paths out of reach before fallbacks are tried."""
+        """Refuse a path that is out of reach before fallbacks are tried."""
         failure = explain_first_failures(
             self._decompositions, self.candidates, self._deadline
         )
@@ -440,7 +440,7 @@ class Search:
             raise failure
 
     def _goes_on(self, budget: int) -> bool:
-        """Tell whether the first one of the waiting candidates is worth finishing."""
+        """Tell whether the first of the waiting candidates is worth finishing."""
         first = self._ranked[self._waiting[0]]
         if not self._may_win(first) or (self.is_satisfied and budget <= 0):
             self._waiting = []
@@ -458,7 +458,7 @@ class Search:
         return is_fast and not self._is_known(candidate)
 
     def _keep(self, candidate: FinishedCandidate) -> None:
-        """Take a candidate as the best one, which others have to beat over all knots once it is verified."""
+        """Make a candidate the best one; once it is verified, others have to beat it over the same knots."""
         self.best = candidate
         if self.is_satisfied:
             is_patient = self._problem.task.search.effort == "exhaustive"
@@ -469,7 +469,7 @@ class Search:
             self._to_beat = Marks(begun, least)
 
     def _is_known(self, candidate: RankedCandidate) -> bool:
-        """Tell whether a motion along the same joint path is known, in the same coordinates."""
+        """Tell whether a motion along the same joint path, in the same coordinates, is already known."""
         return any(
             candidate.redundant_joints == finished.redundant_joints
             and candidate.branch == finished.branch
@@ -478,7 +478,7 @@ class Search:
         )
 
     def _finish(self, number: int, candidate: Candidate) -> None:
-        """Put down what became of a candidate, and keep the best one."""
+        """Record the outcome of a candidate, and keep the best one."""
         if number in self._waiting:
             self._waiting.remove(number)
         self.candidates[number] = candidate
@@ -493,7 +493,7 @@ class Search:
             self._keep(candidate)
 
     def _describe_best(self) -> str:
-        """Say how far the best motion is from a plan; empty without one."""
+        """Say by how much the best motion exceeds the limits; empty if there is no motion."""
         if self.best is None:
             return ""
         over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)

@@ -1,14 +1,13 @@
-"""The lattice of all postures of the arm, whatever branch or choice of joints they are of.
+"""The lattice of all postures of the arm, regardless of branches and of choices of redundant joints.
 
-At every node the r joints that move most in the arm's self-motion there are cut into
-cells; the postures at the cells around, at the next station, follow by Newton's method.
-So every posture that a continuous motion reaches from the nodes before is found, at the
-spacing of the cells, and no closed form ends it. If neither end is given, the first
-layer comes from all closed forms there are, which see the whole self-motion manifold, or,
-for arms without one, from random postures. Two postures are joined if no joint moves far
-and the step is along the self-motion: what the next target asks of the joints apart, most
-of it lies in the null space of the Jacobian. Of several redundant joints, cells are
-sampled, and a layer keeps a bounded number of nodes.
+At every node, the ranges of the r joints that move most in the arm's self-motion there are cut into cells. Newton's
+method finds the postures in the surrounding cells at the next station. So every posture that a continuous motion
+reaches from the nodes before is found, at the spacing of the cells, and no boundary of a closed form's branch ends the
+search. If neither end is given, the first layer comes from all available closed forms, which cover the whole
+self-motion manifold. For arms without a closed form, it comes from random postures. Two postures are joined if no joint
+moves far and the step is along the self-motion: apart from what the next target requires of the joints, most of the
+step lies in the null space of the Jacobian. With several redundant joints, cells are sampled, and a layer keeps a
+bounded number of nodes.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ from brachis.search.lattice import (
 )
 
 _SAME = 1e-3
-"""Spacing, rad or m, below which postures are the same node."""
+"""Spacing, rad or m, below which postures count as the same node."""
 _LONGER = 1.5
-"""Factor on the least length to a posture above which a joint path to it comes a long way round."""
+"""Factor on the least length to a posture above which a joint path to it counts as a detour."""
 _ALWAYS = 1e-3
-"""Length, s^2, up to which no way counts as long."""
+"""Length, s^2, up to which no joint path counts as a detour."""
 
 
 class PostureLattice(Lattice):
@@ -52,9 +51,9 @@ class PostureLattice(Lattice):
     decompositions : sequence of Decomposition
         Their closed forms give the first layer if neither end is given.
     only_minima : bool, optional
-        Whether of one redundant joint only joint paths of locally least length are taken.
+        Whether only joint paths of locally least length are taken if one joint is redundant.
     **options
-        As of `Lattice`.
+        See `Lattice`.
     """
 
     def __init__(
@@ -75,19 +74,19 @@ class PostureLattice(Lattice):
         self._around = 3.0 * self._size.max()
         self._newton = Newton(problem.task_map)
         self._modulo = revolute & ~self._counts_turns
-        # Postures at a free start, (K, n), that each of the decompositions gave; or random ones.
+        # Postures at a free start, (K, n), from each of the decompositions, or random ones.
         self._seeds: list[np.ndarray] = []
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are the given end posture."""
+        """Tell which nodes, (K,) bool, are at the given end posture."""
         return np.abs(last.q - self.problem.end).max(axis=1) < _SAME
 
     def _choose(
         self, joint_paths: list[PosturePath], ends: Layer, count: int
     ) -> list[PosturePath]:
-        """Choose joint paths no longer than those to nodes around, then some that differ, and name their seeds.
+        """Choose joint paths no longer than those to neighbouring nodes, then some that differ; name their seeds.
 
-        Of several redundant joints the nodes are samples, which have no such minima.
+        With several redundant joints, the nodes are samples, which have no such minima.
         """
         chosen = []
         if self._r <= 1:
@@ -105,7 +104,7 @@ class PostureLattice(Lattice):
         ]
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Make nodes all over the self-motion manifold at the path's beginning, one in a cell."""
+        """Create nodes all over the self-motion manifold at the path's beginning, one in each cell."""
         target = self._targets[:1]
         count = 4 * self._nodes
         seeds = []
@@ -135,10 +134,10 @@ class PostureLattice(Lattice):
         return self._decompositions[int(np.argmin(nearest))].name
 
     def _choose_start_nodes(self, layer: Layer) -> Layer:
-        """Label the start nodes: joint paths of different labels do not displace each other.
+        """Label the start nodes; joint paths with different labels do not displace each other.
 
-        Of one redundant joint a label is a connected component of the self-motion
-        manifold; of several, a few postures far from each other have one each.
+        With one redundant joint, each connected component of the self-motion manifold has a label. With several, a few
+        postures far from each other have one label each.
         """
         q = layer.q
         if self._r > 1:
@@ -153,19 +152,19 @@ class PostureLattice(Lattice):
         return Layer.start(q, connected_components(graph, directed=False)[1])
 
     def _key(self, q: np.ndarray, size: np.ndarray | float) -> np.ndarray:
-        """Round postures to whole numbers of a spacing, (K, n), without turns that do not count."""
+        """Round postures, without turns that do not count, to integer multiples, (K, n), of a spacing."""
         return np.rint(self._without_turns(q) / size).astype(int)
 
     def _without_turns(self, q: np.ndarray) -> np.ndarray:
-        """Postures, (K, n), with angles whose turns do not count in [0, 2 pi)."""
+        """Return postures, (K, n), in which angles whose turns do not count are in [0, 2 pi)."""
         angle = q - TURN * np.floor(q / TURN)
-        # Rounding may make it a whole turn.
+        # Rounding may give a whole turn.
         return np.where(self._modulo, np.where(angle < TURN, angle, 0.0), q)
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
-        """List edges to the postures at the cells around the nodes, along self-motion."""
+        """List edges to the postures in the cells around the nodes, along self-motion."""
         values, jacobian = self._newton.task_coordinates(before.q)
-        # Of self-motion, where joints have their cells as units.
+        # Null spaces, with the cell sizes as units of the joints.
         null = null_spaces(jacobian * self._size)
         task_step = self.problem.task_map.difference(
             self._targets[station][None], values
@@ -202,7 +201,7 @@ class PostureLattice(Lattice):
     def _near(
         self, first: np.ndarray, second: np.ndarray, reach: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs, (E,) and (E,), of postures between which no joint moves farther than `reach`."""
+        """Return pairs, (E,) and (E,), of postures between which no joint moves farther than `reach`."""
         from scipy.spatial import KDTree
 
         box = np.where(self._modulo, TURN, 0.0)
@@ -222,7 +221,7 @@ class PostureLattice(Lattice):
         task_step: np.ndarray,
         station: int,
     ) -> np.ndarray:
-        """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
+        """Return postures (C, n) in the cells around nodes with postures (K, n), close to the next station's target."""
         joints = moving_most(null)
         rows = np.eye(self._robot.n)[joints]
         size = self._size[joints]
@@ -235,7 +234,7 @@ class PostureLattice(Lattice):
         right = np.concatenate([task_step[which], levels - at[which]], axis=1)
         begun = q[which] + solve_each(augmented, right)
         regular = np.flatnonzero(np.isfinite(begun).all(axis=1))
-        # One prediction for each posture: from the node whose cell is nearest.
+        # Each posture is predicted once, from the node whose cell is closest.
         keys = [joints[which], cells, self._key(np.nan_to_num(begun), 0.5)]
         far = np.tile(np.abs(offsets).sum(axis=1), len(q)).astype(float)
         keys_of_regular = np.concatenate(keys, axis=1)[regular]
@@ -257,7 +256,7 @@ class PostureLattice(Lattice):
         station: int,
         rng: np.random.Generator,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes, (E,), and postures (E, n) around them: along each direction of self-motion, and at random."""
+        """Return nodes, (E,), and postures (E, n) around them, along each self-motion and at random."""
         r = self._r
         single = np.kron(np.eye(r), [[-1.0], [1.0], [-4.0], [4.0]])
         random = rng.normal(0.0, 2.5, (6, r))
@@ -279,12 +278,12 @@ class PostureLattice(Lattice):
     def _project(
         self, q: np.ndarray, rows: np.ndarray, levels: np.ndarray, station: int
     ) -> np.ndarray:
-        """Postures (C, n) near given ones that meet a station's target, as of `Newton.solve`."""
+        """Return postures (C, n) close to given ones that meet a station's target; see `Newton.solve`."""
         targets = np.repeat(self._targets[station][None], len(q), axis=0)
         return self._newton.solve(targets, q, rows, levels)
 
     def _thin(self, layer: Layer) -> Layer:
-        """Keep a bounded number of nodes of each label; of one redundant joint, those that come no long way round."""
+        """Keep a bounded number of nodes of each label; with one redundant joint, keep those that are no detours."""
         if self._r <= 1:
             return layer[self._is_short(layer)]
         labels = np.unique(layer.branch)
@@ -297,7 +296,7 @@ class PostureLattice(Lattice):
         return layer[np.concatenate(chosen)]
 
     def _is_short(self, layer: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are not much longer than those of other labels in the same posture."""
+        """Tell which nodes, (K,) bool, are reached at little more than the least length to the same posture."""
         keys = self._key(layer.q, _SAME)
         postures = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
         least = np.full(len(keys), np.inf)

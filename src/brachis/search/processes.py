@@ -1,4 +1,4 @@
-"""Work is shared between this process and others.
+"""Work shared between this process and others.
 
 This process works while the others start, and waits only when all work is handed out.
 """
@@ -23,13 +23,13 @@ from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
 _WORTH_STARTING = 3.0
-"""Seconds of work for which other processes are started; that takes them a second or two."""
+"""Remaining work, s, for which other processes are started; starting takes a second or two."""
 _WORTH_SENDING = 0.7
-"""Seconds of work that is handed out to processes that were started before."""
+"""Remaining work, s, that is handed out to processes that were started before."""
 _IDLE_TIME = 300.0
-"""Seconds after which a process without work ends."""
+"""Time, s, after which a process without work ends."""
 _HEARTBEAT = 0.1
-"""Seconds until Ctrl-C is noticed."""
+"""Longest time, s, until Ctrl-C is noticed."""
 
 _Input = TypeVar("_Input")
 _Output = TypeVar("_Output")
@@ -44,7 +44,7 @@ def run_in_processes(
 ) -> Generator[_Output, None, None]:
     """Call a function with every argument, in up to `jobs` processes.
 
-    What was handed out is done even if nobody asks for its result any more.
+    Work that was handed out is completed even if its result is no longer wanted.
 
     Parameters
     ----------
@@ -52,15 +52,16 @@ def run_in_processes(
         ``function(argument, *shared_arguments, listener)``; a function of a module, so that it can be sent to other
         processes.
     arguments : sequence
-        One for each call.
+        One argument for each call.
     *shared_arguments : object
-        The same for all calls.
+        Further arguments, the same for all calls.
     jobs : int or "auto"
-        With 1, and within another program's workers, the work is done here, call by call as results are asked for.
-        With ``auto`` it is, until the rest is going to take longer than 3 s, or 0.7 s where an earlier plan has started
-        the processes. What cannot be sent to others is done here too.
+        With 1, and within the workers of another program, the work is done in this process, call by call as results are
+        asked for. With ``auto`` this is also the case until the remaining work is expected to take longer than 3 s, or
+        0.7 s if an earlier plan has started the processes. Work that cannot be sent to other processes is done here
+        too.
     listener : callable
-        Only heard of work that is done here.
+        Called only for work that is done in this process.
 
     Yields
     ------
@@ -111,7 +112,7 @@ def _hand_out(
     function: Callable[..., _Output],
     *shared_arguments: object,
 ) -> list[Future[_Output]]:
-    """Hand out the first arguments to `count` processes, as many as they are free for, and no more than their share."""
+    """Hand out the first arguments to `count` processes, as many as they are free for, but no more than their share."""
     workers = _start_workers(count, os.getpid())
     share = len(waiting) * count // (count + 1)
     quota = min(share, workers.count_free())
@@ -122,7 +123,7 @@ def _hand_out(
 
 
 def _refuse_lost_work(failure: Exception) -> None:
-    """Raise an error where a process ended, perhaps by its work; what could not be sent can be done here."""
+    """Raise an error if a process ended, perhaps because of its work; work that could not be sent can be done here."""
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     if isinstance(failure, BrokenExecutor):
@@ -136,9 +137,9 @@ def _refuse_lost_work(failure: Exception) -> None:
 
 
 def process_count(jobs: int | str) -> int:
-    """Return the number of processes that is used where a task asks for `jobs`, a number or ``auto``.
+    """Return the number of processes to use if a task asks for `jobs`, a number or ``auto``.
 
-    Never more than there are processors for this process.
+    It is never larger than the number of processors available to this process.
     """
     if jobs == 1:
         return 1
@@ -149,7 +150,7 @@ def process_count(jobs: int | str) -> int:
 
 
 class _Workers:
-    """Other processes, `count` of them."""
+    """A pool of `count` other processes."""
 
     def __init__(self, count: int) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
@@ -171,7 +172,7 @@ class _Workers:
         return future
 
     def _end(self, owner: int) -> None:
-        """End the processes with the one that owns them, and not with a fork of it."""
+        """End the processes when the process that owns them ends, but not when a fork of it ends."""
         if os.getpid() == owner:
             self._executor.shutdown(kill_workers=True)
 
@@ -184,12 +185,12 @@ class _Workers:
 
 @cache
 def _start_workers(count: int, _owner: int) -> _Workers:
-    """Start other processes, once for the process with the number `_owner`: a fork of it needs its own."""
+    """Start other processes, once for the process with the number `_owner`; a fork of it needs its own pool."""
     return _Workers(count)
 
 
 def _import_planner(_listener: Listener) -> None:
-    """Load what plans need."""
+    """Import the modules that plans need."""
     import_module("brachis.search.portfolio")
 
 
@@ -198,19 +199,19 @@ def _do_here(function: Callable[..., _Output], *arguments: object) -> Future[_Ou
     outcome: Future[_Output] = Future()
     try:
         outcome.set_result(function(*arguments))
-    except BrachisError as error:  # who asks for the outcome gets it
+    except BrachisError as error:  # raised when the outcome is asked for
         outcome.set_exception(error)
     return outcome
 
 
 def _run_in_worker(function: Callable[..., _Output], *arguments: object) -> _Output:
-    """Do a piece of work in a process of its own: one thread for linear algebra, nobody listening."""
+    """Do a piece of work in another process, with one thread for linear algebra and without a listener."""
     with use_one_thread():
         return function(*arguments, ignore)
 
 
 def _is_within_a_worker() -> bool:
-    """Tell whether this is somebody's worker process: processes of processes would multiply."""
+    """Tell whether this process is itself a worker: workers that start workers would multiply."""
     from joblib.parallel import get_active_backend
 
     return (

@@ -24,7 +24,7 @@ _TIME = 20.0
 _TRIALS = 10
 """Largest number of trials of one number."""
 _NEAR = 1.04
-"""The search ends where the smallest change that is enough is known up to this factor."""
+"""The search ends when the smallest change that is enough is known up to this factor."""
 
 
 def try_remedies(
@@ -35,18 +35,18 @@ def try_remedies(
     own_limits: Sequence[LimitModel],
     deadline: Deadline,
 ) -> None:
-    """Try the changes of numbers that an error names, and say in its hint what came out.
+    """Try to change the numbers that an error names, and put the outcome into its hint.
 
     Parameters
     ----------
     error : BrachisError
     robot : Robot
     task : Task
-        Could not be planned.
+        A task that could not be planned.
     families, own_limits : sequence
         As for `brachis.plan`.
     deadline : Deadline
-        After it the hint names what to change, but not how far.
+        After it, the hint names what to change, but not by how much.
     """
     if not error.remedies:
         return
@@ -62,7 +62,7 @@ def try_remedies(
             key: str = remedy.key,
             remedy_deadline: Deadline = remedy_deadline,
         ) -> bool | None:
-            """Tell whether a value of the key gives a plan; None if the time was up."""
+            """Tell whether a value of the key gives a plan; None if the time ran out first."""
             soon = remedy_deadline.part(0.4) if max_batches else remedy_deadline
             try:
                 changed = load_task(_with_number(content, robot, key, value))
@@ -85,7 +85,7 @@ def try_remedies(
             advice.append(f"{remedy.verb} {remedy.key} to {number_text}")
     # One number alone may not be enough.
     untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies)
-    text = ", or ".join(advice) or f"{untried} (how far is not known)"
+    text = ", or ".join(advice) or f"{untried} (by how much is not known)"
     error.put_advice(text[:1].upper() + text[1:])
 
 
@@ -99,8 +99,7 @@ def is_planned(
 ) -> bool | None:
     """Tell whether the first `max_batches` batches of a search, or all, lead to a verified plan.
 
-    Returns None where there may be one yet: not all batches were tried, or the robot has more joint paths than these
-    have.
+    Return None if there may still be one: not all batches were tried, or the robot has further joint paths.
     """
     if max_batches:
         task = task_with(task, effort="single")
@@ -114,16 +113,16 @@ def is_planned(
 
 
 IsEnough = Callable[[float, int | None], bool | None]
-"""Tells whether a number is enough, by so many batches of the search, None: all; None where a plan may exist."""
+"""Tells whether a number is enough, from a number of batches of the search (None: all); None if a plan may exist."""
 
 
 def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str:
-    """Look for the smallest change that is enough, and say which it is; empty where none was found."""
+    """Look for the smallest change that is enough, and say which it is; empty if none was found."""
     good, bad = _bracket(remedy, is_enough, deadline)
     if good is None:
         return ""
     verified = "(a plan with it was verified"
-    # Quick trials may miss a plan: only after a whole search the message says that it found none.
+    # Quick trials may miss a plan, so the message says that none was found only after a complete search.
     if bad != remedy.current and not deadline.passed:
         outcome = is_enough(bad, None)
         if outcome:
@@ -136,7 +135,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
 def _bracket(
     remedy: Remedy, is_enough: IsEnough, deadline: Deadline
 ) -> tuple[float | None, float]:
-    """Find the smallest change known to be enough, None without any, and the largest one that is not."""
+    """Find the smallest change known to be enough (None if there is none), and the largest one that is not."""
     # Numbers are rounded towards the larger change.
     lowers = remedy.guess < remedy.current
     away = -1.0 if lowers else 1.0
@@ -155,7 +154,7 @@ def _bracket(
             bad = value
         if good is None:
             value *= step**away
-        elif abs(math.log(good / bad)) <= math.log(_NEAR) + 0.01:  # of the rounding
+        elif abs(math.log(good / bad)) <= math.log(_NEAR) + 0.01:  # for the rounding
             break
         else:
             value = math.sqrt(good * bad)
@@ -171,7 +170,7 @@ def _bracket(
 def _with_number(
     content: Mapping[str, Any], robot: Robot, key: str, value: float
 ) -> dict[str, Any]:
-    """Return a task, not checked yet, with a number changed; one for all joints is written joint by joint."""
+    """Return an unchecked task with a number changed; a number for all joints is first written joint by joint."""
     above, _, last = key.rpartition(".")
     if last not in robot.joint_names or not above.startswith("robot.limits."):
         return with_keys(content, {key: value})

@@ -1,8 +1,8 @@
-"""What the search tries, batch after batch: initial guesses with solvers.
+"""The batches that the search tries one after the other: initial guesses with solvers.
 
 If the task leaves the choice of redundant joints open, guesses come from the lattice of all postures, and plans are
-made in charts; the closed forms of single choices are tried only while nothing is verified. A task that names its
-redundant joints or its branch gets these alone. Along a path of joints there is one guess, and no choice.
+made in charts; the closed forms of single choices are tried only while nothing is verified. If the task names its
+redundant joints or its branch, only these are tried. Along a path of joints there is only one guess.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
 _SIZE = 12
-"""Guesses of a batch."""
+"""Number of guesses in a batch."""
 _LATTICE_SHARE = 0.4
-"""Part of the time left in which the guesses of a level are looked for; those found by then are tried."""
+"""Fraction of the remaining time in which the guesses of a level are sought; those found by then are tried."""
 
 Lattices = list[tuple[Decomposition | None, DeadEnd]]
-"""Lattices that gave no guesses (None: of all postures), and where they end."""
+"""Lattices that gave no guesses (None for the lattice of all postures), and where they end."""
 GuessesAndLattices = tuple[list[InitialGuess], Lattices]
 
 
@@ -48,13 +48,13 @@ class Batch:
     Attributes
     ----------
     guesses : sequence of InitialGuess
-        With the solvers that plan from them.
+        Guesses, each with the solver that plans from it.
     refined : int
-        Largest number of them that are refined and verified once a motion is verified.
+        Largest number of candidates that are refined and verified once a motion is verified.
     fallback : bool
-        Whether it is tried only while no motion is verified.
+        Whether the batch is tried only while no motion is verified.
     lattices : list of (Decomposition or None, DeadEnd)
-        Lattices that gave no guesses (None: of all postures), and where they end.
+        Lattices that gave no guesses (None for the lattice of all postures), and where they end.
     """
 
     guesses: Sequence[InitialGuess] = ()
@@ -83,7 +83,7 @@ def batches(
     problem : Problem
     decompositions : sequence of Decomposition
     deadline : Deadline
-        Joint paths that are not found by then are left out.
+        Joint paths not found by then are left out.
     listener : callable
 
     Yields
@@ -93,7 +93,7 @@ def batches(
     Raises
     ------
     PlanningError
-        No motion along any joint path can hold a speed, or a mean of a load.
+        No motion along any joint path can reach a given speed, or meet a limit on the mean of a load.
     """
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
@@ -141,7 +141,7 @@ def _level_by_level(
     guesses = []
     for level in levels:
         if level.fallback:
-            # The search may end here, before lattices are looked at.
+            # The search may end here, before lattices are searched.
             yield Batch()
         level_guesses, lattices = find(level)
         guesses += level_guesses
@@ -197,7 +197,7 @@ def _guess_on_some_branches(
     listener: Listener,
     level: SearchLevel,
 ) -> GuessesAndLattices:
-    """Take a guess from every decomposition in turn, from each those with the least estimated times first."""
+    """Take a guess from every decomposition in turn; each gives its guesses with the least estimated times first."""
     search = decompositions[0].problem.task.search
     if search.guesses == "numeric":
         count = level.joint_paths
@@ -216,7 +216,7 @@ def _guess_on_some_branches(
         if isinstance(outcome, DeadEnd):
             lattices.append((decomposition, outcome))
             continue
-        # Those that another process found have a copy of the problem.
+        # Guesses that another process found have a copy of the problem.
         guesses = [replace(guess, problem=decomposition.problem) for guess in outcome]
         guesses.sort(key=lambda guess: guess.estimate)
         ranked += enumerate(

@@ -1,8 +1,8 @@
-"""Which of many guesses are worth a plan: each is improved over the path, and the fastest that differ are kept.
+"""The choice of the guesses that are worth a plan: each is improved over the path, and the fastest distinct ones stay.
 
-The length of a joint path, and the least time along it, tell little about the motion that an optimiser makes of it if
-several redundant joints are free to move. A rough search over the path tells more and costs little; and the plan then
-begins at the joint path where it ended.
+If several joints are redundant, the length of a joint path and the least time along it say little about the motion that
+an optimiser finds from it. A rough optimisation over the path says more and costs little. The plan then begins with the
+joint path at which it ended.
 """
 
 from __future__ import annotations
@@ -27,37 +27,37 @@ from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
 _NEAR_LEAST = 1.01
-"""Factor on the least time up to which others are as fast, about."""
+"""Factor on the least time up to which guesses count as equally fast."""
 _SAME_TIME = 0.02
-"""Part of the time by which estimates of the same joint path differ, no more."""
+"""Largest relative difference between estimates of the same joint path."""
 _SAME_POSTURE = 0.15
-"""Distance of joints along the same joint path, rad or m, no more."""
+"""Largest distance between joints along the same joint path, rad or m."""
 _FEWEST = 2
-"""Guesses that are kept, no fewer, however little of the time is free."""
+"""Minimum number of guesses that are kept, however little of the time is free."""
 _MOST = 8
-"""Guesses that are improved for each one that is kept, no more: four of a lattice, and four at random."""
+"""Largest number of guesses that are improved for each one that is kept: four from a lattice, and four at random."""
 _PLACES = np.linspace(0.0, 1.0, 49)
-"""Places at which joint paths are compared."""
+"""Path coordinates at which joint paths are compared."""
 
 
 def screen(
     guesses: Sequence[InitialGuess], count: int, deadline: Deadline, listener: Listener
 ) -> list[InitialGuess]:
-    """Choose the most promising of guesses.
+    """Choose the most promising guesses.
 
     Parameters
     ----------
     guesses : sequence of InitialGuess
         At least one.
     count : int
-        How many to keep.
+        Number of guesses to keep.
     deadline : Deadline
     listener : callable
 
     Returns
     -------
     list of InitialGuess
-        With the better joint paths, and their least times as estimates; the fastest first.
+        Guesses with the better joint paths and with their least times as estimates, the fastest first.
     """
     listener(f"improving {len(guesses)} joint paths")
     improve = partial(
@@ -71,12 +71,12 @@ def screen(
 
 
 def _count_worthwhile(count: int, guesses: Sequence[InitialGuess]) -> int:
-    """Tell how many of `count` guesses are worth keeping where a part of the least time known is given."""
+    """Tell how many of `count` guesses are worth keeping if the task fixes a part of the least known time."""
     return max(min(count, _FEWEST), round(count * _free_share(guesses)))
 
 
 def _free_share(guesses: Sequence[InitialGuess]) -> float:
-    """Part of the least time that is not given: no more can be gained."""
+    """Return the fraction of the least time that the task does not fix: no more can be gained."""
     problem = guesses[0].problem
     durations = [law.duration for law in problem.time_laws if law is not None]
     fixed_time = sum(durations) + problem.dwell_time
@@ -85,7 +85,7 @@ def _free_share(guesses: Sequence[InitialGuess]) -> float:
 
 
 def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[InitialGuess]:
-    """Choose the fastest of guesses, one of each joint path; those without a time only if none has one."""
+    """Choose the fastest guesses, one for each joint path; those without a time count only if none has one."""
     timed = [guess for guess in guesses if np.isfinite(guess.estimate)]
     chosen: list[InitialGuess] = []
     for guess in sorted(timed or guesses, key=lambda guess: guess.estimate):
@@ -95,10 +95,10 @@ def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[Initia
 
 
 def _spread_out(guesses: Sequence[InitialGuess]) -> list[InitialGuess]:
-    """Order guesses so that each differs most from all before it; of equal ones the first is kept.
+    """Order guesses so that each differs most from all before it; of equal guesses only the first is kept.
 
-    Neighbours end in the same optimum. Where some that are far apart do, others do too. Guesses without some of their
-    postures come last.
+    Guesses close to each other end in the same optimum. If guesses that are far apart do so, the others do too. Guesses
+    without some of their postures come last.
     """
     paths = np.array([guess.postures_at(_PLACES).ravel() for guess in guesses])
     (known,) = np.isfinite(paths).all(axis=1).nonzero()
@@ -120,7 +120,7 @@ def _improve_in_parallel(
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until, for each one that is kept, `spare` end near the least time: others are hardly faster."""
+    """Improve guesses until, for each one kept, `spare` end close to the least time: others are hardly faster."""
     work = run_in_processes(
         improve_quickly,
         guesses,
@@ -152,7 +152,7 @@ def improve_quickly(
     charts: int,
     _listener: Listener,
 ) -> InitialGuess:
-    """Improve a guess over the path. If that fails, its estimate stays; one never improved gets infinity."""
+    """Improve a guess over the path. If that fails, an improved guess keeps its estimate, any other gets infinity."""
     if not guess.is_improved:
         guess = replace(guess, estimate=np.inf)
     if deadline.passed:
@@ -171,7 +171,7 @@ def improve_quickly(
 
 
 def is_same(first: InitialGuess, second: InitialGuess) -> bool:
-    """Tell whether two improved guesses are the same joint path, nearly."""
+    """Tell whether two improved guesses have nearly the same joint path."""
     if not np.isfinite([first.estimate, second.estimate]).all():
         return False
     if abs(first.estimate - second.estimate) > _SAME_TIME * second.estimate:

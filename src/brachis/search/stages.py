@@ -1,8 +1,8 @@
-"""The stages of a search, a frozen type each: initial guess, candidate, ranked candidate, finished candidate.
+"""The stages of a search, with a frozen type each: initial guess, candidate, ranked candidate, finished candidate.
 
-An `InitialGuess` is a joint path. Whatever is tried from one is a `Candidate`, even if nothing comes of it. One whose
-joint path was improved is a `RankedCandidate`; one with a motion that was refined and verified, or fails at that, a
-`FinishedCandidate`.
+An `InitialGuess` is a joint path. Every attempt to plan from it is a `Candidate`, even if it fails. A candidate whose
+joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then verified, whether it
+passed or not, is a `FinishedCandidate`.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ SearchMap = ClosedFormMap | ChartMap | JointSpaceMap
 
 
 def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
-    """Name the coordinates in which a motion is planned, s apart: redundant joints, a chart's own, or none."""
+    """Name the coordinates, besides s, in which a motion is planned: redundant joints, those of a chart, or none."""
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
 def describe_coordinates(trajectory: Trajectory) -> str:
-    """Say in which coordinates a motion is planned, s apart, in words that do not need the name of a chart."""
+    """Say in which coordinates, besides s, a motion is planned; the words explain what a chart is."""
     joints = trajectory.redundant_joints
     count = len(trajectory.control_points) - 1
     if joints or trajectory.branch != CHART:
@@ -62,22 +62,22 @@ class InitialGuess(Summary):
     ----------
     problem : Problem
     joint_map : ClosedFormMap, ChartMap or JointSpaceMap
-        Robot, path and coordinates put together, for a motion that begins at, or near, its start posture.
+        Combination of robot, path and coordinates, for a motion that begins at, or close to, its start posture.
     joint_path : (S, 1 + r) ndarray
         Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
     estimate : float
-        Least time along the joint path from the phase plane, s; infinite where nobody knows.
+        Least time along the joint path from the phase plane, s; infinite if unknown.
     origin : str
-        Where it is from, in plain words, for example ``lattice 2``.
+        Where the guess comes from, in plain words, for example ``lattice 2``.
     family : str
         Family of the closed form; ``chart`` or ``path of joints`` without one.
     solver : str
         The solver that plans from it; empty while none is chosen.
     durations : tuple of float or None
-        Of every leg, s, where the joint path's values are those of a motion: for one leg after the other equally many,
-        at even times. None where they are not.
+        Duration of every leg, s, if the joint path's values are those of a motion: equally many for each leg, at even
+        times. None if they are not.
     is_improved : bool
-        Whether the joint path is the best one next to it, roughly, for the limits that the phase plane knows.
+        Whether the joint path is roughly a local optimum for the limits that the phase plane knows.
     """
 
     problem: Problem
@@ -92,7 +92,7 @@ class InitialGuess(Summary):
 
     @property
     def legs(self) -> list[np.ndarray]:
-        """The part of the joint path on every leg, (S, 1 + r) each."""
+        """The parts of the joint path on the legs, (S, 1 + r) each."""
         legs = self.problem.legs
         if self.durations is not None or len(legs) == 1:
             return np.split(self.joint_path, len(legs))
@@ -104,7 +104,7 @@ class InitialGuess(Summary):
         return curves_by_leg
 
     def maps_by_leg(self) -> list[JointMap]:
-        """Take the joint map leg by leg; raise UnreachableError where the joint path leaves it."""
+        """Return the joint map of every leg; raise UnreachableError if the joint path leaves it."""
         legs = self.legs
         if len(legs) == 1:
             return [self.joint_map]
@@ -115,40 +115,40 @@ class InitialGuess(Summary):
         return maps_by_leg(self.problem, self.joint_map, q[begins])
 
     def postures_at(self, s: np.ndarray) -> np.ndarray:
-        """Take postures, (S, n), at path coordinates, (S,); NaN where none exists."""
+        """Return postures, (S, n), at path coordinates, (S,); NaN where none exists."""
         path = self.joint_path
         return self.joint_map.postures(interpolate_columns(s, path[:, 0], path))
 
     @property
     def in_chart(self) -> bool:
-        """Whether the coordinates are a chart's."""
+        """Whether the coordinates are those of a chart."""
         return isinstance(self.joint_map, ChartMap)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Candidate(Summary):
-    """What was tried, and what came of it.
+    """An attempt to find a motion, and its outcome.
 
     Attributes
     ----------
     redundant_joints : tuple of str
-        Empty where no joint is chosen, as in most charts.
+        Redundant joints; empty if no joint is chosen, as in most charts.
     branch : str
-        Label of the branch, or ``chart``; empty where no joint path was found.
+        Label of the branch, or ``chart``; empty if no joint path was found.
     origin : str
         See `InitialGuess`.
     solver : str
-        Empty where nothing was solved.
+        Name of the solver; empty if nothing was solved.
     estimate : float
-        See `InitialGuess`. It ranks candidates.
+        See `InitialGuess`. Candidates are ranked by it.
     status : str
-        In plain words.
+        Outcome in plain words.
     begun : float
-        End time over the first knots, s; infinite where no others follow.
+        End time over the first knots, s; infinite if no others follow.
     adapted : float
-        End time over all knots, before refinement, s; infinite where there was no such program.
+        End time over all knots, before refinement, s; infinite if there was no such program.
     reports : tuple of SolverReport
-        Of all solves: over the path, over time on ever finer meshes, then of the refinement rounds.
+        Reports of all solves: over the path, over time on ever finer meshes, then of the refinement rounds.
 
     Examples
     --------
@@ -180,16 +180,16 @@ class Candidate(Summary):
 
     @property
     def is_settled(self) -> bool:
-        """Whether it is verified, or fails only at what the task wants checked and not kept."""
+        """Whether the candidate is verified, or fails only checks that the task wants reported and not enforced."""
         return False
 
     def describe(self) -> str:
-        """Say in a line what came of it, and how long its motion takes if there is one."""
+        """Say in one line what the outcome is, and how long the motion takes if there is one."""
         time = f"t_E = {self.t_end:.4f} s, " if np.isfinite(self.t_end) else ""
         return f"{self.solver}: {time}{self.status}"
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown: what was tried and what came of it."""
+        """Return the texts shown to the user, by name: what was tried, and the outcome."""
         joints = coordinates(self.redundant_joints, self.branch)
         shown = {"joints": joints, "origin": self.origin}
         if np.isfinite(self.t_end):
@@ -203,20 +203,20 @@ class Candidate(Summary):
         return {"redundant_joints": list(self.redundant_joints), **plain}
 
     def without_program(self) -> Candidate:
-        """Return what is said of it, without what only the search needs."""
+        """Return the candidate without the data that only the search needs."""
         return Candidate(**facts_of(self))
 
 
 @dataclass(frozen=True)
 class Marks:
-    """What a candidate has to beat, s; infinite while no motion is verified.
+    """End times that a candidate has to beat, s; infinite while no motion is verified.
 
     Attributes
     ----------
     begun : float
-        End time over the first knots. More knots gain about as much of every motion.
+        End time over the first knots. More knots shorten every motion by about the same amount.
     adapted : float
-        End time over all knots, from which on a motion is not refined.
+        End time over all knots. A motion that is no faster is not refined.
     """
 
     begun: float = np.inf
@@ -229,18 +229,18 @@ class Marks:
 
 
 def round_end_time(time: float) -> float:
-    """Leave out the digits in which processes differ, so that these do not choose."""
+    """Round an end time, so that digits in which processes differ do not decide."""
     return float(f"{time:.6g}")
 
 
 def facts_of(candidate: Candidate) -> dict[str, Any]:
-    """Return the fields that all candidates have, to be carried over from stage to stage."""
+    """Return the fields that all candidates have, which are carried over from stage to stage."""
     names = (field.name for field in fields(Candidate))
     return {name: getattr(candidate, name) for name in names}
 
 
 def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
-    """Begin with an initial guess."""
+    """Return a candidate for an initial guess."""
     return Candidate(
         redundant_joints=guess.joint_map.redundant_joints,
         branch=guess.joint_map.branch_label,
@@ -253,16 +253,16 @@ def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RankedCandidate(Candidate):
-    """A candidate whose joint path was improved over the path where that is possible, and may be finished.
+    """A candidate whose joint path was improved over the path, if that is possible, and which may be finished.
 
     Attributes
     ----------
     guess : InitialGuess
-        With the better joint path.
+        Guess with the better joint path.
     program : Program
-        Of its joint maps, over the knots that are given.
+        Program of the guess's joint maps, over the given knots.
     not_completed : str
-        What the time, or a solve that failed, left undone, in words; empty where nothing.
+        What was left undone for lack of time or after a failed solve, in words; empty if nothing was.
     """
 
     guess: InitialGuess
@@ -271,7 +271,7 @@ class RankedCandidate(Candidate):
 
     @property
     def problem(self) -> Problem:
-        """What is planned."""
+        """The problem that is planned."""
         return self.guess.problem
 
     @property
@@ -292,7 +292,7 @@ def rank(
 def fail(
     candidate: Candidate, status: str, reports: tuple[SolverReport, ...] = ()
 ) -> Candidate:
-    """Return a candidate that failed: why, and after which further solves."""
+    """Return a candidate that failed, with the reason and the reports of further solves."""
     known = facts_of(candidate)
     known |= {"status": status, "reports": (*candidate.reports, *reports)}
     return Candidate(**known)
@@ -300,7 +300,7 @@ def fail(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FinishedCandidate(Candidate):
-    """A candidate with a motion, which the verification looked at.
+    """A candidate with a motion that the verification has checked.
 
     Attributes
     ----------
@@ -309,13 +309,13 @@ class FinishedCandidate(Candidate):
     family : str
         Family of the closed form.
     refined : SolvedProgram
-        The last program, and its answer.
+        The last program, and its solution.
     optimum : SolvedProgram
-        The program whose multipliers say what limits cost: the last one, or the program over time that improved the
-        joint path along whose timing splines were laid.
+        The program whose multipliers tell what limits cost. This is the last one or, if splines were laid along the
+        timing of a joint path, the program over time that improved this joint path.
     trajectory : Trajectory
     verification : Verification
-        Of the trajectory.
+        Verification of the trajectory.
     not_completed : str
         See `RankedCandidate`.
 
@@ -347,14 +347,14 @@ class FinishedCandidate(Candidate):
 
     @property
     def is_settled(self) -> bool:
-        """Whether it is verified, or fails only at what the task wants checked and not kept."""
+        """Whether the candidate is verified, or fails only checks that the task wants reported and not enforced."""
         return all(
             check.passed or not check.is_kept for check in self.verification.checks
         )
 
     @property
     def refinement_rounds(self) -> int:
-        """How many of the solves were refinement rounds."""
+        """Number of solves that were refinement rounds."""
         return len(self.refined.reports) - 1
 
     @property
@@ -364,7 +364,7 @@ class FinishedCandidate(Candidate):
 
     @property
     def time_scaled(self) -> float:
-        """Factor by which the end time was lengthened at the very end."""
+        """Factor by which the end time was lengthened in the last step."""
         return self.refined.time_scaled
 
     @property
@@ -373,22 +373,22 @@ class FinishedCandidate(Candidate):
         return self.refined.program.collocation_points
 
     def without_program(self) -> FinishedCandidate:
-        """Return the candidate as it is: its program is the answer."""
+        """Return the candidate unchanged: its program is part of the result."""
         return self
 
 
 @dataclass(frozen=True)
 class SearchOutcome:
-    """What came of a search that found a motion; see `brachis.search.portfolio.Search`.
+    """Outcome of a search that found a motion; see `brachis.search.portfolio.Search`.
 
     Attributes
     ----------
     best : FinishedCandidate
     candidates : tuple of Candidate
-        All that was looked at, the fastest verified one first.
+        All candidates of the search, the fastest verified one first.
     interrupted : bool
     not_completed : tuple of str
-        In plain words.
+        What was left undone, in plain words.
     """
 
     best: FinishedCandidate

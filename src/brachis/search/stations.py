@@ -15,26 +15,26 @@ from brachis.robot import TaskMap
 from brachis.robot.plausibility import link_lengths
 
 _STATIONS = 401
-"""Stations along a joint path of a guess."""
+"""Number of stations along the joint path of a guess."""
 _LEAST_STATIONS = 41
-"""Fewest stations along a leg."""
+"""Minimum number of stations along a leg."""
 _FEWEST_STEPS = 24.0
-"""Fewest steps of a lattice."""
+"""Minimum number of steps of a lattice."""
 _MOST_STEPS = 600
-"""Most steps of a lattice."""
+"""Maximum number of steps of a lattice."""
 _LONGEST_STEP = 0.05
-"""Longest step of a lattice, m, of arms up to 3.3 m long."""
+"""Longest step of a lattice, m, for arms up to 3.3 m long."""
 _LONGEST_SHARE = 0.015
-"""Part of the length of longer arms that a step may be."""
+"""Longest step for longer arms, as a fraction of their length."""
 _LARGEST_TURN = 0.25
 """Largest turn in a step of a lattice, rad, of the direction of motion or of the tool."""
 _PLACES = 2000
-"""Places at which a path is measured, about."""
+"""Approximate number of points at which a path is measured."""
 
 
 @lru_cache(maxsize=4)
 def measure(path: Path, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
-    """Return path coordinates, (K,), and how many steps a lattice needs up to each of them, (K,)."""
+    """Return path coordinates, (K,), and the number of steps that a lattice needs up to each of them, (K,)."""
     knots = path.knots
     s = spread(knots, max(2, _PLACES // (len(knots) - 1)))
     targets = path.sample(s).target
@@ -51,28 +51,28 @@ def measure(path: Path, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
-    """Spread the stations of a lattice, as many as the path's length and its turns ask for.
+    """Spread the stations of a lattice; their number follows from the path's length and its turns.
 
     Parameters
     ----------
     path : Path
     task_map : TaskMap
     density : float, optional
-        Factor on their number.
+        Factor on the number of stations.
 
     Returns
     -------
     (S + 1,) ndarray
-        From 0 to 1.
+        Path coordinates, from 0 to 1.
     """
     s, steps = measure(path, task_map)
-    # Rounding of the sum adds no step.
+    # Rounding of the sum must not add a step.
     count = int(min(np.ceil(density * steps[-1] - 1e-6), _MOST_STEPS))
     return np.interp(np.linspace(0.0, steps[-1], count + 1), steps, s)
 
 
 def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
-    """Spread about so many path coordinates, (S,), over the legs, the ends of the legs among them."""
+    """Spread about `count` path coordinates, (S,), over the legs, including the ends of the legs."""
     s, steps = measure(problem.path, problem.task_map)
     s_by_leg = [np.zeros(1)]
     for leg in problem.legs:

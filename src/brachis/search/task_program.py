@@ -1,4 +1,4 @@
-"""The program of a task with a guess to begin with: for a solver of the user's own."""
+"""The program of a task with an initial guess, for a solver of the user's own."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class TaskProgram(Program):
     Parameters
     ----------
     guess : InitialGuess
-        Joint path through which the splines of the first point are laid, with its coordinates.
+        Joint path, with its coordinates, through which the splines of the first point are laid.
     """
 
     def __init__(self, guess: InitialGuess) -> None:
@@ -40,12 +40,12 @@ class TaskProgram(Program):
 
     @cached_property
     def guess(self) -> np.ndarray:
-        """A point x to begin with, (v,): splines through a joint path, slow enough for the limits where that helps.
+        """A first point x, (v,): splines through a joint path, slow enough for the limits that a slower motion meets.
 
         Raises
         ------
         PathError
-            Such splines leave the branch.
+            The splines leave the branch.
         """
         x = initial_guess(self, self._path_guess)
         if x is None:
@@ -61,12 +61,12 @@ class TaskProgram(Program):
         Parameters
         ----------
         x : (v,) ndarray
-            Within its bounds.
+            A point within its bounds.
 
         Raises
         ------
         InputError
-            `x` is not an array of finite numbers of this size.
+            `x` is not an array of finite numbers of this shape.
         UnreachableError
             The motion leaves the branch.
         """

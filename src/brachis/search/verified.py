@@ -23,8 +23,9 @@ from brachis.search.stages import (
 from brachis.verify import Verification, verify_trajectory
 
 _DENSER = 4
-"""Factor on the density of the grid for a second refinement. 2 is enough for the measured peaks, which are next to a
-singular posture of the UR10 on its rail. 4 leaves a reserve: only motions that would fail are refined again."""
+"""Factor on the density of the grid for a second refinement. A factor of 2 is enough for the measured peaks, which are
+close to a singular posture of the UR10 on its rail. The factor 4 leaves a reserve, and only motions that would fail are
+refined again."""
 
 
 def refine_and_verify(
@@ -34,18 +35,18 @@ def refine_and_verify(
     solve: Solve,
     options: RefinementOptions,
 ) -> Candidate:
-    """Refine and verify; only verify where the time is up.
+    """Refine and verify; only verify if the time is up.
 
-    A peak may be narrower than the refinement's grid, as next to a singularity. Where the verification alone sees it,
-    the motion is refined once more, on a denser grid.
+    Close to a singularity, a peak may be narrower than the spacing of the refinement's grid. If only the verification
+    sees it, the motion is refined once more, on a denser grid.
 
     Parameters
     ----------
     candidate : RankedCandidate or FinishedCandidate
-        Of which the program is made.
+        Candidate from which the program was made.
     program : Program
     reports : tuple of SolverReport
-        Of all solves so far; the last one is the program's.
+        Reports of all solves so far; the last one is that of the program.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     options : RefinementOptions
@@ -70,19 +71,19 @@ def verify(
     before: tuple[SolverReport, ...],
     refined: SolvedProgram,
 ) -> Candidate:
-    """Make the trajectory of a refined program and verify it.
+    """Extract the trajectory of a refined program and verify it.
 
     Parameters
     ----------
     candidate : RankedCandidate or FinishedCandidate
     before : tuple of SolverReport
-        Of earlier solves.
+        Reports of earlier solves.
     refined : SolvedProgram
 
     Returns
     -------
     Candidate
-        A finished one where there is a trajectory.
+        A finished candidate if there is a trajectory.
     """
     problem = candidate.problem
     verification = None
@@ -115,7 +116,7 @@ def verify(
 def _in_words(
     refined: SolvedProgram, verification: Verification | None, tolerance: float
 ) -> str:
-    """Say what became of a refined program, whose limits may be exceeded by a fraction `tolerance`."""
+    """Describe the outcome of a refined program, whose limits may be exceeded by a fraction `tolerance`."""
     last = refined.report
     if verification is not None and verification.passed:
         return "verified"

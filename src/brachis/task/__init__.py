@@ -1,4 +1,4 @@
-"""What is asked: the task file as frozen models, its loader and its schema. No numerics."""
+"""The task: the task file as frozen models, its loader and its schema. No numerics."""
 
 from brachis.task.fitted import fit_path
 from brachis.task.keywords import RobotKeywords, TaskKeywords, check_keywords, task_with

@@ -1,4 +1,4 @@
-"""Bodies of a scene as a program makes them: ``scene=[brachis.Box([0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])]``.
+"""Bodies of a scene for programs: ``scene=[brachis.Box([0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])]``.
 
 All lengths are in m, angles in degrees. A body is fixed to the world, or to the link of the robot that ``link`` names.
 """
@@ -14,22 +14,22 @@ from brachis.task.scene import SceneBody
 
 
 class Where(TypedDict, total=False):
-    """What every body takes besides its shape."""
+    """The keywords that every body takes in addition to its shape."""
 
     name: str
-    """Unique; left out: its shape and its number in the scene."""
+    """Unique name; by default its shape and its number in the scene."""
     link: str
-    """Link that carries it; left out: it stands still."""
+    """Link that carries the body; by default it stands still."""
     frame: str
-    """Frame of the task in which it is placed; left out: the world."""
+    """Frame of the task in which the body is placed; by default the world."""
     position: Sequence[float]
-    """In the world, in its frame, or in the link's frame, m."""
+    """Position in the world, in its frame, or in the frame of its link, m."""
     rpy_deg: Sequence[float]
     """Roll, pitch, yaw about fixed axes, degrees."""
 
 
 def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a box with lengths along x, y and z, m; `where`: see `Where`.
+    """Make a box with its lengths along x, y and z, m; for `where` see `Where`.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N8
 
 
 def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a ball with a radius, m; `where`: see `Where`.
+    """Make a ball with a radius, m; for `where` see `Where`.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
 
 
 def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a cylinder about its z axis, its middle at the origin, m; `where`: see `Where`.
+    """Make a cylinder about its z axis, centred at the origin, m; for `where` see `Where`.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:
 
 
 def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a cylinder with round caps, which its length leaves out, m; `where`: see `Where`.
+    """Make a cylinder with round caps, which its length does not include, m; for `where` see `Where`.
 
     Examples
     --------
@@ -81,12 +81,12 @@ def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody: 
 def HalfSpace(  # noqa: N802
     normal: Sequence[float], offset: float = 0.0, **where: Unpack[Where]
 ) -> SceneBody:
-    """Make all that is behind a plane, such as a floor.
+    """Make the space behind a plane, such as a floor.
 
     Parameters
     ----------
     normal : sequence of float
-        Direction out of the half-space, any length.
+        Direction out of the half-space, of any length.
     offset : float, optional
         Distance of the plane from the origin along the normal, m.
     **where
@@ -105,7 +105,7 @@ def HalfSpace(  # noqa: N802
 def Mesh(  # noqa: N802
     file: str | PathLike[str], scale: float = 1.0, **where: Unpack[Where]
 ) -> SceneBody:
-    """Make the convex hull of a mesh file; `scale` turns its unit into m; `where`: see `Where`.
+    """Make the convex hull of a mesh file; `scale` converts its unit to m; for `where` see `Where`.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Segments as a program makes them: ``+`` joins them to a path.
+"""Segments for programs, joined to a path by ``+``.
 
-`Line`, `Arc`, `Circle`, `Helix` and `Spline` are made of the models in `brachis.task.segments`: their keywords are the
-keys of a segment.
+`Line`, `Arc`, `Circle`, `Helix` and `Spline` are made from the models in `brachis.task.segments`. Their keywords are
+the keys of a segment.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _S = TypeVar("_S", bound=SegmentModel)
 
 
 def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
-    """Return the function by which a program makes a segment; `example` is one of its docstring.
+    """Return the function with which a program makes a segment; `example` goes into its docstring.
 
-    Its keywords are the keys of the segment's kind and those beside it. The first one of a kind without several forms
-    needs no name.
+    Its keywords are the keys of the segment's kind and of the segment itself. If the kind has a single form, its first
+    key can be positional.
     """
     (kind,) = required_keys(model)
     name = kind.capitalize()
@@ -76,8 +76,8 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
 
 _DOCSTRING = """{summary}
 
-Arrays are lists here. A transform such as Pinocchio's SE3 may be the end of a line, a sequence of them, or of (4, 4)
-matrices, the waypoints of a spline; SciPy's Rotation or (n, 3, 3) matrices their orientations.
+Arrays may stand for lists. The end of a line may be a transform such as Pinocchio's SE3. The waypoints of a spline may
+be a sequence of transforms or of (4, 4) matrices, and their orientations a SciPy Rotation or (n, 3, 3) matrices.
 
 Parameters
 ----------
@@ -86,7 +86,7 @@ Parameters
 Raises
 ------
 TaskError
-    A value is wrong; or none, or several, of the forms are given.
+    A value is wrong, or not exactly one of the forms is given.
 
 Examples
 --------

@@ -1,8 +1,8 @@
 """Building blocks of the task models: the base class, strict scalar types, and unions chosen by form or by key.
 
-A plain pydantic union answers a wrong value with one complaint per member. Here a function looks at the value first and
-picks the member that was meant, so that a wrong value gets one complaint, about what the user had in mind. Tags are
-written ``<like this>`` because they appear in pydantic's error locations; `brachis.task.messages` removes them there.
+For a wrong value, a plain pydantic union reports one error per member. Here a function first looks at the value and
+picks the member that was meant, so that a wrong value gets one error, about what the user had in mind. Tags are written
+``<like this>`` because they appear in pydantic's error locations, from which `brachis.task.messages` removes them.
 """
 
 from __future__ import annotations
@@ -50,28 +50,28 @@ from brachis.common.summary import show_value
 from brachis.errors import MissingAttributeError
 
 REFUSED = "brachis_refused"
-"""Error type of a value that a validator of ours refuses; see `refuse`."""
+"""Error type of a value that one of our validators refuses; see `refuse`."""
 WRONG_FORM = "brachis_form"
-"""Error type of a value that has none of a union's forms; see `ByForm`."""
+"""Error type of a value that has none of the forms of a union; see `ByForm`."""
 WRONG_KEYS = "brachis_keys"
 """Error type of a mapping whose keys do not select one member of a union; see `ByKey`."""
 
 POSITION: Final = ("x", "y", "z")
-"""Rows of the position of a tool."""
+"""Rows of the tool's position."""
 LEAST = 1e-6
-"""Least limit of torque, velocity, acceleration or their rates, in SI units."""
+"""Smallest allowed limit of torque, velocity, acceleration or their rates, in SI units."""
 LARGEST = 1e12
-"""Largest coordinate, angle or limit, in SI units: products and squares of larger numbers may overflow."""
+"""Largest allowed coordinate, angle or limit, in SI units; products of larger numbers might overflow."""
 
 
 class Model(BaseModel):
     """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity.
 
-    The docstring below a field is its description in the documentation, the JSON schema and messages: see
-    `describe_fields`. Pydantic would read them when classes are made, which takes longer than a plan.
+    The docstring below a field is its description in the documentation, the JSON schema and messages; see
+    `describe_fields`. Pydantic itself would read the docstrings when classes are made, which takes longer than a plan.
     """
 
-    # Instances are checked again, because a program can make limits that nobody has checked.
+    # Instances are checked again, because a program can make limits that were never checked.
     model_config = ConfigDict(
         frozen=True,
         extra="forbid",
@@ -83,23 +83,23 @@ class Model(BaseModel):
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Refuse a name that is not there, and name the one that may be meant."""
+            """Raise an error that names the attribute that may be meant."""
             try:
                 return super().__getattr__(name)
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
     def __repr__(self) -> str:
-        """Show it as a program makes it."""
+        """Return the call by which a program makes it."""
         return f"{type(self).__name__}({', '.join(show_arguments(self))})"
 
     def __str__(self) -> str:
-        """Show it as `repr` does."""
+        """Return the same as `repr`."""
         return repr(self)
 
 
 def show_arguments(model: Model, without: str = "") -> list[str]:
-    """Show the keys of a model that are not as by default as a program gives them: ``to=[1, 2]``."""
+    """Return the keys that differ from their defaults, as arguments of a call: ``to=[1, 2]``."""
     arguments = []
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
@@ -112,14 +112,14 @@ def show_arguments(model: Model, without: str = "") -> list[str]:
 
 
 Mistake = tuple[str, str, str]
-"""The key to blame, such as ``spline.knots`` or ``path[2].blend``; what is wrong; what is allowed."""
+"""The wrong key, such as ``spline.knots`` or ``path[2].blend``, the problem, and what is allowed."""
 
 
 class CheckedModel(Model):
     """A model whose keys may contradict each other."""
 
     def _mistakes(self) -> Iterator[Mistake]:
-        """Yield what is wrong with the keys together; the first mistake is the one that is reported."""
+        """Yield contradictions between keys, of which the first is reported."""
         yield from ()
 
     @model_validator(mode="after")
@@ -133,7 +133,7 @@ class CheckedModel(Model):
 
 
 def describe_fields(model: type) -> dict[str, str]:
-    """Return the description of every field of a model or dataclass: from `Field`, else from the docstring below it."""
+    """Return the descriptions of a model's or dataclass's fields, from `Field` or from the docstrings below them."""
     descriptions: dict[str, str] = {}
     for base in model.__mro__[::-1]:
         descriptions |= _docstrings_in(base.__module__).get(base.__name__, {})
@@ -145,7 +145,7 @@ def describe_fields(model: type) -> dict[str, str]:
 
 @cache
 def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
-    """Read the docstrings below the fields of the classes of one of our modules: by class, then by field."""
+    """Return the docstrings below the fields in one of our modules, by class and by field."""
     if not module.startswith("brachis."):
         return {}
     try:
@@ -174,16 +174,16 @@ _NUMBER_AND_UNIT = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class WithUnit:
-    """Lets a number be written with a unit, such as ``0.05 mm``, in a task and in its JSON schema.
+    """Allows a number with a unit, such as ``0.05 mm``, in a task and in its JSON schema.
 
     Attributes
     ----------
     units : mapping of str to float
-        Factors to the unit of bare numbers.
+        Factors to the unit of numbers without a unit.
     example : str
-        For messages.
+        Example for messages.
     pattern : str
-        For the JSON schema.
+        Regular expression for the JSON schema.
     """
 
     units: Mapping[str, float]
@@ -193,13 +193,13 @@ class WithUnit:
     def __get_pydantic_core_schema__(
         self, number: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Read a number with a unit before it is checked."""
+        """Convert a number with a unit before it is checked."""
         return no_info_before_validator_function(self._read, handler(number))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Allow a string beside the number."""
+        """Allow a string as an alternative to the number."""
         text = {"type": "string", "pattern": self.pattern}
         return {"anyOf": [handler(schema), text]}
 
@@ -211,14 +211,14 @@ class WithUnit:
             raise refuse(
                 "this is not a number with a unit",
                 found=value,
-                allowed=f"a number with a unit ({', '.join(self.units)}), as {self.example}, or a number",
+                allowed=f"a number with a unit ({', '.join(self.units)}), such as {self.example}, or a number",
             )
-        # Divided, for 7 % to be 0.07 and not 0.07000000000000001.
+        # Dividing gives 0.07 for 7 %, and not 0.07000000000000001.
         return float(match[1]) / (1.0 / self.units[match[2]])
 
 
 def _check_version(version: object) -> object:
-    # Python holds true == 1, so that a literal alone would accept `brachis: true`.
+    # In Python true == 1, so that a literal alone would accept `brachis: true`.
     if type(version) is not int:
         raise refuse(
             "the version of the format must be a whole number",
@@ -229,12 +229,12 @@ def _check_version(version: object) -> object:
 
 
 Version = Annotated[Literal[1], BeforeValidator(_check_version)]
-# Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
-# are accepted as real ones.
+# Strict: the string "3" or the boolean true in place of a number is a mistake of the user. Whole numbers are accepted
+# as real ones.
 Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 AnyPositive = Annotated[float, Strict(), Field(gt=0)]
 AnyNonNegative = Annotated[float, Strict(), Field(ge=0)]
-# Those of drives may be any: the robot refuses them by their joints.
+# Numbers of drives have no upper limit here: the robot checks them and names their joints.
 Positive = Annotated[AnyPositive, Field(le=LARGEST)]
 NonNegative = Annotated[AnyNonNegative, Field(le=LARGEST)]
 Count = Annotated[int, Strict()]
@@ -252,9 +252,9 @@ def plain(
 ) -> object:
     """Return `value` with arrays and sequences as `sequence`, array scalars as numbers, and path objects as strings.
 
-    Numbers with names, such as a row of a pandas table, become a mapping, because their order may be any.
+    Numbers with names, such as a row of a pandas table, become a mapping, because they may be in any order.
     """
-    # An array is known by its method and not by its class: this stage has no need for NumPy.
+    # An array is recognised by its method and not by its class, so that this module does not need NumPy.
     if hasattr(value, "tolist"):
         names = list(value.keys()) if hasattr(value, "keys") else []
         value = value.tolist()
@@ -268,9 +268,9 @@ def plain(
 
 
 def merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge mappings key by key; everything else of `changes` takes the place of what there is.
+    """Merge mappings key by key; all other values of `changes` replace those of `content`.
 
-    A start of the path is replaced as a whole, since its orientation may be in another convention.
+    ``path_start`` is replaced as a whole, because its orientation may be in a different convention.
     """
     both = {
         key: merge(content[key], value)
@@ -296,19 +296,19 @@ def refuse(
     problem : str
         What is wrong.
     key : str, optional
-        Where, below the validated value, for example ``"[2].blend"`` or ``"degree"``.
+        Key below the validated value, for example ``"[2].blend"`` or ``"degree"``.
     found : object, optional
-        What was found; None where the fault is that nothing was given.
+        The wrong value; None if a value is missing.
     allowed : str, optional
         What would have been accepted.
     """
-    # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
+    # Pydantic fills the braces of the template from the context, in which messages find these facts.
     facts = {"problem": problem, "key": key, "found": found, "allowed": allowed}
     return PydanticCustomError(REFUSED, "{problem}", facts)
 
 
 def check_defined(kind: str, uses: Mapping[str, Any], known: Collection[str]) -> None:
-    """Refuse names of a kind, by the keys that use them, that are not among the known ones; other values pass."""
+    """Refuse names that are not known; `uses` has them by key, and values that are not names pass."""
     for key, name in uses.items():
         if isinstance(name, str) and name not in known:
             raise refuse(
@@ -320,7 +320,7 @@ def check_defined(kind: str, uses: Mapping[str, Any], known: Collection[str]) ->
 
 
 def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterValidator:
-    """Return what refuses values for which `holds` is false, and says what is wrong and what is allowed."""
+    """Return a validator that refuses values for which `holds` is false, with a problem and what is allowed."""
 
     def check(value: Any) -> Any:
         if not holds(value):
@@ -332,7 +332,7 @@ def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterVal
 
 @dataclass(frozen=True)
 class ByForm:
-    """Chooses a union's member by the form of the value: a word, a number, a list, a mapping or null.
+    """Chooses the member of a union by the form of the value: a word, a number, a list, a mapping or null.
 
     Attributes
     ----------
@@ -345,13 +345,13 @@ class ByForm:
     def __get_pydantic_core_schema__(
         self, union: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Tag every member with its form."""
+        """Tag every member of the union with its form."""
         members = {_form_of_type(member): member for member in get_args(union)}
         word = members.get("<word>")
         words = get_args(word) if get_origin(word) is Literal else ()
 
         def choose(value: object) -> str | None:
-            """Return the tag of the member for a value; None if there is none."""
+            """Return the tag of the member that fits a value; None if no member does."""
             if hasattr(value, "homogeneous"):  # a transform, such as Pinocchio's SE3
                 return "<mapping>"
             form = _form_of_class(type(value))
@@ -361,19 +361,19 @@ class ByForm:
             choose,
             custom_error_type=WRONG_FORM,
             custom_error_message="must be {allowed}",
-            custom_error_context={"allowed": self.allowed, "words": " ".join(words)},
+            custom_error_context={"allowed": self.allowed, "expected": str(words)},
         )
         return _tagged_union(members, by_tag, handler)
 
 
 @dataclass(frozen=True)
 class ByKey:
-    """Chooses a union's member, a model, by the keys of the mapping: those that the model requires.
+    """Chooses the member of a union of models by the keys that each model requires.
 
     Attributes
     ----------
     problem : str
-        What to say where the keys select no member, or more than one.
+        Message if the keys select no member, or more than one.
     """
 
     problem: str
@@ -381,12 +381,12 @@ class ByKey:
     def __get_pydantic_core_schema__(
         self, union: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Tag every model with its name."""
+        """Tag every model of the union with its name."""
         members = {f"<{model.__name__}>": model for model in get_args(union)}
         required = {tag: required_keys(model) for tag, model in members.items()}
 
         def choose(value: object) -> str | None:
-            """Return the tag of the member for a value; None if there is none."""
+            """Return the tag of the member that fits a value; None if no member does."""
             if isinstance(value, BaseModel):
                 return f"<{type(value).__name__}>"
             if not isinstance(value, Mapping):
@@ -408,7 +408,7 @@ class ByKey:
 
 
 def required_keys(model: type[BaseModel]) -> tuple[str, ...]:
-    """Return the keys that a model requires, in order."""
+    """Return the required keys of a model, in order."""
     fields = model.model_fields.items()
     return tuple(name for name, field in fields if field.is_required())
 

@@ -34,26 +34,26 @@ from brachis.task.segments import (
 )
 
 _HAS_UNIT = re.compile(r"[_ (\[](deg|degrees|mm|cm)[)\]]?$", re.IGNORECASE)
-"""How the header of a column ends whose numbers are neither in rad nor in m."""
+"""Ending of the header of a column whose numbers are in neither rad nor m."""
 
 
 def segments_along(
     points: Points, segment: CsvSegment, where: str
 ) -> list[SplineSegment | BSplineSegment]:
-    """Return the segments along points, whose first one is where they start.
+    """Return the segments along points, which start at the first point.
 
     Parameters
     ----------
     points : Points
     segment : CsvSegment
-        What is asked of the path along them. Its file is what the user calls the points.
+        Settings of the path along them. Its file is the user's name of the points.
     where : str
-        Where the task names them, for messages.
+        Key of the task that names them, for messages.
 
     Raises
     ------
     TaskError
-        Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
+        The points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     settings = segment.csv
     if points.has_quaternions and segment.orientation is not None:
@@ -103,7 +103,7 @@ def segments_along(
 
 
 def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
-    """Return the keys that the last curve along a file takes from the file's segment."""
+    """Return the keys of the file's segment that hold for the last curve along it."""
     shared = ("orientation", "speed", "blend", "stop", "dwell")
     return {key: getattr(segment, key) for key in shared}
 
@@ -111,9 +111,9 @@ def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
 def _spline_through(
     points: Points, fit: FitReport | None, settings: PointFile
 ) -> SplineThrough:
-    """Return the spline through the points of a part of a file, of which only the first one has the report, `fit`.
+    """Return the spline through the points of one section of a file; only the first section has the report, `fit`.
 
-    Behind a corner the waypoints begin with it, so that the first one after it is passed, however near it is.
+    After a corner the waypoints begin with the corner, so that the spline passes the next point however close it is.
     """
     first = 1 if fit else 0
     keys: dict[str, Any] = {"relative": settings.relative, "fit": fit}
@@ -126,12 +126,12 @@ def _spline_through(
 
 
 def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
-    """Refuse corners where they are not to be rounded, and turns that would have to go on over them.
+    """Refuse corners if the task forbids them, and turns that would have to continue across them.
 
     Raises
     ------
     TaskError
-        It lists the corners.
+        The message lists the corners.
     """
     if not report.corners:
         return
@@ -153,21 +153,21 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
 
 
 def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
-    """Return the task with curves in place of every segment from a file.
+    """Return the task in which curves replace every segment from a file.
 
     Parameters
     ----------
     task : Task
-        A task as it is written.
+        The task as the user wrote it.
     source : str
-        File name, or what else the task came from, for messages.
+        File name or other origin of the task, for messages.
     folder : Path
-        What the files' paths are relative to.
+        Folder to which the paths of files are relative.
 
     Raises
     ------
     TaskError
-        A file is missing or wrong; the message names its line.
+        A file is missing or wrong; the message names the line.
     """
     path: list[Segment] = []
     for i, segment in enumerate(task.path):
@@ -211,7 +211,7 @@ def _read(
 def _along_joints(
     segment: CsvSegment, text: str, path: Path, where: str
 ) -> SplineSegment:
-    """Return the spline through all rows of a file whose columns are joints, in rad and m."""
+    """Return the spline through all rows of a file with a column for each joint, in rad and m."""
     settings = segment.csv
     usual = PointFile(file=settings.file)
     for key in ("orientation", "units", "tolerance", "corner"):
@@ -264,7 +264,7 @@ def fit_path(
     orientation: OrientationMode = None,
     relative: bool = False,
 ) -> tuple[SplineSegment | BSplineSegment, ...]:
-    """Return the segments of a path along points, the first one included; for the ``path`` of a task.
+    """Return the segments of a path along points, including the first point, for the ``path`` of a task.
 
     Parameters
     ----------
@@ -272,31 +272,31 @@ def fit_path(
         Positions in the rows of the task space; or homogeneous matrices; or objects with such a matrix: Pinocchio's
         ``SE3``, or SciPy's ``RigidTransform``.
     tolerance : mapping or FitTolerance, optional
-        ``{"position": "0.05 mm", "orientation": "0.1 deg"}`` as in a task file; without it the path passes all points.
+        ``{"position": "0.05 mm", "orientation": "0.1 deg"}`` as in a task file. By default the path passes all points.
     orientations : Rotation, or array_like, (n, 3, 3) or (n,), optional
-        Of the tool, beside positions: SciPy's rotations (``Rotation.from_quat(q)`` takes quaternions x, y, z, w);
-        rotation matrices; yaw.
+        Orientations of the tool at the positions: SciPy rotations (``Rotation.from_quat(q)`` takes quaternions x, y, z,
+        w), rotation matrices, or yaw angles.
     speed : float or array_like, (n,), optional
-        One number is a process speed: it is held all along. Several are largest speeds on the way to each point; NaN
-        where none is prescribed; with a tolerance only.
+        One number is a process speed, which is held along the whole path. An array contains the largest speed on the
+        way to each point, NaN if none is prescribed; it needs a tolerance.
     units : mapping or FileUnits, optional
-        ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``; m, rad (of yaw) and m/s unless given.
+        ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``. By default m, rad (for yaw) and m/s.
     corner : {"blend", "refuse", "stop"}, optional
         As in a task file.
     orientation : optional
-        How the tool turns along the path where no orientations are given, as in a task file.
+        How the tool turns along the path if no orientations are given, as in a task file.
     relative : bool, optional
         Whether the path may start anywhere, as in a task file.
 
     Returns
     -------
     tuple of SplineSegment or BSplineSegment
-        One, or as many as there are stretches between corners.
+        One segment, or one for each section between corners.
 
     Raises
     ------
     TaskError
-        Points are wrong, or no smooth curve lies within the tolerance; the message names the row, from 0 on.
+        The points are wrong, or no smooth curve lies within the tolerance; the message names the row, counted from 0.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Tasks from keywords: the keys of a task file without its sections, for programs."""
+"""Tasks from keywords: the keys of a task file, without its sections, for programs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Settings = Mapping[str, Any]
 
 
 class RobotKeywords(TypedDict, total=False):
-    """Keys of the section ``robot`` of a task, without its files."""
+    """Keys of the section ``robot`` of a task, except its files."""
 
     tool_frame: str | None
     tool_offset: Placement | Settings | Transform | None
@@ -50,10 +50,10 @@ class RobotKeywords(TypedDict, total=False):
 
 
 class TaskKeywords(RobotKeywords, total=False):
-    """Keys of a task; those of its sections ``robot``, ``boundary``, ``spline`` and ``search`` stand for themselves.
+    """Keys of a task; keys of its sections ``robot``, ``boundary``, ``spline`` and ``search`` need no section.
 
-    A posture may be an array, a list or a mapping by joint name; a path one segment, or an array of points (n, m), of
-    which the first one is where the path begins.
+    A posture may be an array, a list or a mapping by joint name. A path may be one segment, or an array of points
+    (n, m), of which the first one is the start of the path.
     """
 
     path: (
@@ -120,14 +120,14 @@ _SECTION_OF = {
 def task_with(
     source: Source | None = None, /, **keywords: Unpack[TaskKeywords]
 ) -> Task:
-    """Return a task made of keywords, or one with some of its keys changed.
+    """Return a task made from keywords, or a given task with some keys changed.
 
     Parameters
     ----------
     source : path-like, mapping or Task, optional
         The task to change; see `load_task`.
     **keywords
-        See `TaskKeywords`. Mappings are merged with those of `source` key by key, everything else takes its place.
+        See `TaskKeywords`. Mappings are merged with those of `source` key by key; all other values replace its values.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def task_with(
 def check_keywords(
     keywords: Iterable[str], where: str = "plan", arguments: Sequence[str] = ()
 ) -> None:
-    """Refuse unknown keywords, and say where keys of these names belong, or which is meant.
+    """Refuse unknown keywords; the message says where a key of this name belongs, or which keyword is meant.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def check_keywords(
     where : str, optional
         The function that takes them.
     arguments : sequence of str, optional
-        What else it takes by name.
+        Names of its other arguments.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _as_keyword(names: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture, or a solver's name, as a task file does."""
+    """Return a posture, or a solver given by name, in the form of a task file."""
     if key == "solver":
         return expand_solver_name(value)
     if key not in {"start", "end"} or isinstance(value, str | Model):

@@ -1,6 +1,6 @@
-"""The table of joint-limit kinds. Task models, robot, limits, verification, messages and plots all read it.
+"""The table of the kinds of joint limits, read by task models, robot, limits, verification, messages and plots.
 
-A new kind is a row of this table, its keyword in `LimitKeywords`, a class in `brachis.limits.joint` and a formula in
+A new kind needs a row of this table, a keyword in `LimitKeywords`, a class in `brachis.limits.joint` and a formula in
 `brachis.verify.limits.joint`.
 """
 
@@ -17,36 +17,36 @@ from brachis.task.fields import AnyPositive, Model
 
 
 class Array(Protocol):
-    """What a NumPy array or scalar is to this stage, which does not import NumPy."""
+    """A NumPy array or scalar, for this package, which does not import NumPy here."""
 
     def tolist(self) -> Any:
         """Return plain numbers."""
 
 
 PerUnit = dict[str, float]
-"""A number for revolute joints, ``rad``, and one for prismatic joints, ``m``."""
+"""A number for revolute joints, ``rad``, and another for prismatic joints, ``m``."""
 
 
 @dataclass(frozen=True)
 class UsualLimit:
-    """How large limits of a kind usually are; a larger one was probably written in another unit.
+    """Usual sizes of the limits of one kind; a larger limit was probably written in a different unit.
 
     Attributes
     ----------
     mistaken_unit : dict of str to str
-        What larger limits look like, by the unit of the joint's position.
+        Unit in which larger limits were probably written, by the unit of the joint's position.
     largest : dict of str to float
         Largest usual limit of any robot.
     urdf_kind : str
-        Kind of limit of the URDF that it is compared with; empty for none.
+        Kind of limit of the URDF with which it is compared; empty for none.
     urdf_factor : float
         Largest usual ratio to the limit of the URDF.
     urdf_least : float
-        Limits below this are usual whatever the URDF states.
+        Limits below this are plausible whatever the URDF states.
     compares_weight : bool
-        Whether it is compared with the torque that holds the arm.
+        Whether it is compared with the torque needed to hold the arm.
     overridden : bool
-        Whether the speed override is a factor on it.
+        Whether the speed override scales it.
     by_curve : bool
         Whether a torque-speed curve replaces it.
     """
@@ -76,12 +76,12 @@ class LimitKind:
     form : {"number", "pair", "range"}
         A number > 0 for each joint, the same in both directions; also a pair [lower, upper] around zero; or a range.
     scale : str
-        What the factor below ``robot.limits.scale`` acts on; empty for no factor.
+        Limits on which the factor below ``robot.limits.scale`` acts, in words; empty for no factor.
     urdf : str
-        Attribute of a URDF's ``<limit>`` that states it; empty for none.
+        Attribute of ``<limit>`` in a URDF that states it; empty for none.
     usual : UsualLimit or None
     needs_masses : bool
-        Whether the quantity follows from the masses of the robot.
+        Whether the quantity depends on the masses of the robot.
     """
 
     name: str
@@ -94,20 +94,20 @@ class LimitKind:
     needs_masses: bool = False
 
     def in_words(self, position_unit: str) -> str:
-        """Name the quantity of a joint; the torque of a prismatic joint is a force."""
+        """Return the name of the quantity for a joint; the torque of a prismatic joint is called force."""
         words = self.name.replace("_", " ")
         return words if position_unit == "rad" else words.replace("torque", "force")
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """Names of its arrays in `Limits`: of lower and upper limits, or one name for both."""
+        """Names of its arrays in `Limits`: one each for lower and upper limits, or one for both."""
         if self.form == "number":
             return (self.name,)
         return (f"{self.name}_lower", f"{self.name}_upper")
 
 
 FASTEST: Final[PerUnit] = {"rad": 60.0, "m": 50.0}
-"""Usual speeds, rad/s or m/s: axes of small SCARA and delta robots turn at up to 50 rad/s, rails move at 10 m/s."""
+"""Fastest usual speeds, rad/s or m/s: axes of small SCARA and delta robots reach 50 rad/s, and rails 10 m/s."""
 _ANY = {"rad": math.inf, "m": math.inf}
 _TORQUE = {"rad": "Nm", "m": "N"}
 _USUAL_TORQUE = UsualLimit(
@@ -154,7 +154,7 @@ _ROWS = (
     LimitKind(
         "position",
         {"rad": "rad", "m": "m"},
-        "Range [low, high], rad (m); null stands for an open end.",
+        "Range [low, high], rad (m). null stands for an open end.",
         form="range",
     ),
     LimitKind(
@@ -167,7 +167,7 @@ _ROWS = (
     LimitKind(
         "rms_torque",
         _TORQUE,
-        "Largest root mean square of the torque over the motion, N m (force, N), for the heat in a motor.",
+        "Largest root mean square of the torque over the motion, N m (force, N), against heat in the motor.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
         needs_masses=True,
@@ -214,11 +214,11 @@ _Factors: Any = create_model("_Factors", __base__=Model, **_FACTORS)
 
 
 class LimitScale(_Factors):  # type: ignore[misc]
-    """Factors on the limits, to keep a distance from them: one for each row of `LIMIT_KINDS` but the position."""
+    """Factors that reduce the limits as a safety margin: one for each row of `LIMIT_KINDS` except the position."""
 
 
 class LimitKeywords(TypedDict, total=False):
-    """Arguments of `LimitSpec`: every row of `LIMIT_KINDS`, and limits that are not one number for each joint."""
+    """Arguments of `LimitSpec`: every row of `LIMIT_KINDS`, and limits that are not single numbers for joints."""
 
     torque: StatedLimit
     velocity: StatedLimit

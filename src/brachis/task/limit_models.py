@@ -1,12 +1,12 @@
 """Joint limits as the task file describes them.
 
-For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
-the key is null, and nothing limits the joint; the key has a value. The models write the absent key as `FROM_URDF`,
-which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
-joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``, ``jerk`` or
-``torque_rate``: absent means none.
+For ``torque``, ``velocity`` and ``position`` there are three cases. If the key is absent, the limit comes from the
+URDF. If it is null, the joint has no such limit. Otherwise it has a value. The models represent the absent key by
+`FROM_URDF`, which a task file may also spell out, so that absent and null stay different in comparisons and in saved
+tasks. A joint that a mapping leaves out keeps the limit of the URDF. A URDF states no ``acceleration``, ``jerk`` or
+``torque_rate``; if they are absent, there is no limit.
 
-Limits on the motion of the tool.
+The module also has the limits on the motion of the tool.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from brachis.task.fields import (
 from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
 
 FROM_URDF: Final = "urdf"
-"""The value of a limit whose key is absent: the URDF supplies it."""
+"""The value of a limit whose key is absent: the limit of the URDF holds."""
 
 
 Interval = Annotated[
@@ -64,27 +64,27 @@ _Entry = Annotated[
 ]
 _EntryOrNull = Annotated[
     AnyPositive | _Pair | None,
-    ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
+    ByForm("a number > 0, a pair [lower, upper] around zero, or null (no limit)"),
 ]
 PairEntry = Annotated[
     Literal["urdf"] | AnyPositive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
     ByForm(
-        "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
-        "zero or null; null (no limit), urdf (as in the URDF)"
+        "a number > 0 for all joints; a list or a mapping by joint name, of numbers > 0, pairs [lower, upper] around "
+        "zero, or null; null (no limit); or urdf (as in the URDF)"
     ),
 ]
 NumberEntry = Annotated[
     AnyPositive | NonEmpty[AnyPositive] | dict[Name, AnyPositive | None] | None,
     ByForm(
-        "a number > 0 for all joints, a list of numbers > 0, "
-        "a mapping of joint name to number > 0 or null, null (no limit)"
+        "a number > 0 for all joints; a list of numbers > 0; "
+        "a mapping of joint names to numbers > 0 or null; or null (no limit)"
     ),
 ]
 RangeEntry = Annotated[
     Literal["urdf"] | NonEmpty[Interval] | dict[Name, Interval | None] | None,
     ByForm(
-        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), "
-        "urdf (as in the URDF)"
+        "a list of pairs [low, high]; a mapping of joint names to [low, high] or null; null (no limit); "
+        "or urdf (as in the URDF)"
     ),
 ]
 TorqueCurve = Annotated[
@@ -109,25 +109,25 @@ _JointLimits: Any = make_dataclass(
 
 @dataclass(frozen=True)
 class LimitSpec(_JointLimits):  # type: ignore[misc]
-    """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation).
+    """Joint limits: with an absent key the URDF's limit holds, and null removes it (see the module's documentation).
 
-    They are checked when a robot is made with them, whose joints are known.
+    They are checked when a robot is made with them, because its joints are then known.
 
     Parameters
     ----------
     torque, velocity : float, sequence, array, mapping or None, optional
-        Nm or N; rad/s or m/s. One number for all joints, one for each in chain order, or numbers by joint name; a pair
-        [lower, upper] around zero in the place of a joint's number; None, also for a single joint: not limited;
+        Nm or N; rad/s or m/s. One number for all joints, one for each in chain order, or numbers by joint name. A pair
+        [lower, upper] around zero can replace the number of a joint. None, also for a single joint: no limit.
         `FROM_URDF`: as in the URDF.
     position : sequence, array, mapping or None, optional
-        Pairs [lower, upper], rad or m, likewise; an end that is None is open.
+        Pairs [lower, upper], rad or m, likewise. An end that is None is open.
     acceleration, power, rms_torque, jerk, torque_rate : float, sequence, array, mapping or None, optional
-        rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. One number, numbers or None as for the torque. The
-        last two need ``spline.degree`` >= 3 and acceleration at rest.
+        rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. One number, several or None as for the torque.
+        Limits on jerk and torque rate need ``spline.degree`` >= 3 and zero acceleration at rest.
     scale : mapping or LimitScale, optional
-        Factors on limits, applied after all else.
+        Factors on limits, applied last.
     total_power : float or None, optional
-        W.
+        Largest sum of the powers of all joints, W.
     torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
         Points [speed, torque] by joint name.
 
@@ -141,11 +141,11 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
     total_power: AnyPositive | None = None
-    """Largest sum of all joints' powers, drawn or returned, W."""
+    """Largest sum of the powers of all joints, drawn or returned, W."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
-    N), the first at speed 0, torques never rising. Linear in between; the last slope continues to zero torque. It
-    holds in both directions, for driving and braking."""
+    N), the first at speed 0. Torques never rise. The curve is linear between points, and its last slope continues to
+    zero torque. It holds in both directions, for driving and braking."""
 
     __pydantic_config__ = Model.model_config
 
@@ -154,7 +154,7 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
         def __init__(self, **limits: Unpack[LimitKeywords]) -> None: ...
 
     def __post_init__(self) -> None:
-        """Take arrays for plain numbers, and a mapping for the scale."""
+        """Turn arrays into plain numbers, and a mapping of factors into `LimitScale`."""
         for entry in fields(self):
             value: Any = plain(getattr(self, entry.name), tuple)
             if entry.name == "scale" and isinstance(value, Mapping | None):
@@ -163,7 +163,7 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
 
 def without_defaults(limits: LimitSpec) -> dict[str, Any]:
-    """Return what differs from the defaults."""
+    """Return the limits that differ from the defaults."""
     usual = vars(LimitSpec())
     return {kind: value for kind, value in vars(limits).items() if value != usual[kind]}
 
@@ -174,7 +174,7 @@ def per_joint_values(
     names: Sequence[str],
     missing: object,
 ) -> list[object]:
-    """Spread a scalar, list or mapping over the joints; `missing` where a mapping leaves a joint out.
+    """Return one value for each joint from a scalar, list or mapping; `missing` for joints that a mapping leaves out.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def map_by_joint(
     names: Sequence[str],
     missing: object,
 ) -> dict[str, object]:
-    """Return the values of the joints by name, without those that are `missing`; see `per_joint_values`."""
+    """Return the values by joint name, without those that are `missing`; see `per_joint_values`."""
     values = per_joint_values(key, value, names, missing)
     pairs = zip(names, values, strict=True)
     return {name: joint_value for name, joint_value in pairs if joint_value != missing}
@@ -217,13 +217,13 @@ _PathCoordinates = Annotated[
 
 
 class SpeedTable(CheckedModel):
-    """Largest speed of the tool along the path: linear between places, and as at the nearest one beyond them.
+    """Largest speed of the tool along the path, linear between path coordinates and constant before and after them.
 
-    A step is two speeds at the same place; at the place itself the lower one of them holds.
+    A step consists of two speeds at the same path coordinate, at which the lower of the two holds.
     """
 
     s: Annotated[_PathCoordinates, Field(min_length=1)]
-    """Ascending path coordinates, 0 to 1. A value given twice is a step."""
+    """Ascending path coordinates, 0 to 1. A coordinate given twice is a step."""
     speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
     """Largest speed at each path coordinate, m/s."""
 
@@ -251,13 +251,13 @@ class SpeedTable(CheckedModel):
 
 
 def _as_sequence(value: object) -> object:
-    """Take one mapping for a list of it."""
+    """Return a list that contains one value, or the list that is given."""
     value = plain(value)
     return value if isinstance(value, list) else [value]
 
 
 class ProcessSpeed(Model):
-    """A constant speed of the tool over a part of the path: what a glue nozzle or a laser needs."""
+    """A constant speed of the tool over a section of the path, such as a glue nozzle or a laser needs."""
 
     speed: Speed
     """Speed of the tool frame's origin, m/s."""
@@ -268,21 +268,21 @@ class ProcessSpeed(Model):
         ],
         must(
             lambda pair: pair[0] < pair[1],
-            "the part of the path is empty",
+            "the section of the path is empty",
             "[begin, end] with begin < end",
         ),
     ]
-    """[begin, end]: path coordinates between which the speed is held. At stops, and at ends of the path that are not
-    passed at this speed, the part is shorter by what the tool moves in 0.1 s at the higher speed. There the tool does
-    not exceed this speed, unless it comes from or goes on at a higher one."""
+    """[begin, end]: path coordinates between which the speed is held. At stops, and at ends of the path that the tool
+    does not pass at this speed, the section is shorter by what the tool moves in 0.1 s at the higher speed. There the
+    tool does not exceed this speed, unless the speed before or after is higher."""
     segment: Count | None = None
-    """Index of the speed's segment; written by brachis."""
+    """Index of the segment that states the speed; written by brachis."""
     within: tuple[Number, Number] | None = None
     """[begin, end] between which the tool does not exceed the speed; written by brachis."""
 
     @property
     def leads(self) -> list[SpeedTable]:
-        """Largest speeds in the leads before and behind the part."""
+        """Largest speeds in the lead-in and lead-out of the section."""
         if self.within is None:
             return []
         sides = ((self.within[0], self.s[0]), (self.s[1], self.within[1]))
@@ -291,29 +291,29 @@ class ProcessSpeed(Model):
 
     @property
     def origin(self) -> str:
-        """Words for messages: of which segment it is, if of any."""
+        """The segment that states the speed, in words for messages; empty if none does."""
         return "" if self.segment is None else f" of path[{self.segment}].speed"
 
 
 class ToolLimits(CheckedModel):
-    """Limits on the motion of the tool itself, also where tolerances let it leave its path."""
+    """Limits on the motion of the tool itself, even where tolerances let it leave the path."""
 
     speed: Annotated[
         Speed | SpeedTable | None,
         ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = None
-    """Largest speed, m/s: a number, or a table over the path {s: [...], speed: [...]}."""
+    """Largest speed, m/s: a number, or a table {s: [...], speed: [...]} along the path."""
     feed: tuple[SpeedTable, ...] = ()
-    """Tables of largest speeds over parts of the path; written by brachis from feed rates."""
+    """Tables of largest speeds; written by brachis from feed rates."""
     acceleration: Speed | None = None
     """Largest acceleration, m/s^2."""
     angular_speed: Speed | None = None
-    """Largest angular speed of the tool, rad/s, without its free roll."""
+    """Largest angular speed of the tool, without its free roll, rad/s."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()
-    """Parts of the path with a constant speed: {speed, s}, or a list of these in order, with gaps in which the speed
-    can change."""
+    """Sections of the path with a constant speed: {speed, s}, or a list of these in order, with gaps in which the speed
+    changes."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for number, (before, section) in enumerate(
@@ -323,8 +323,8 @@ class ToolLimits(CheckedModel):
             if section.s[0] <= end:
                 yield (
                     f"process_speed[{number}].s",
-                    "the parts of the path overlap, meet or are out of order",
-                    f"a begin{section.origin} above {end:g}, the end of the part{before.origin} before it, with a gap",
+                    "the sections of the path overlap, meet or are out of order",
+                    f"a begin{section.origin} above {end:g}, the end of the one{before.origin} before it, with a gap",
                 )
         for number, section in enumerate(self.process_speed):
             cap = _least_between(self.speed, section.s)
@@ -339,7 +339,7 @@ class ToolLimits(CheckedModel):
 def _least_between(
     cap: float | SpeedTable | None, interval: Sequence[float]
 ) -> float | None:
-    """Least of the largest speeds over a part of the path."""
+    """Return the least of the largest speeds over a section of the path."""
     if not isinstance(cap, SpeedTable):
         return cap
     inside = [

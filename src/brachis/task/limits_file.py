@@ -1,4 +1,4 @@
-"""Joint limits from a file of their own, such as those that the maker of a robot publishes."""
+"""Joint limits from a separate file, such as the figures that a manufacturer publishes."""
 
 from __future__ import annotations
 
@@ -37,17 +37,16 @@ from brachis.task.yaml_reader import read_yaml
 
 
 class LimitsFile(CheckedModel):
-    """What a limits file says."""
+    """The content of a limits file."""
 
     brachis_limits: Version
     """Version of the format."""
     source: Name
     """Origin of the figures."""
     joints: NonEmpty[Name]
-    """Joints that the file limits."""
+    """Joints whose limits the file states."""
     limits: LimitSpec
-    """Limits as in robot.limits, without scale. A list is in the order of `joints`; one number holds for all of them.
-    """
+    """Limits as in robot.limits, without scale. A list is in the order of `joints`, and one number holds for all."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         if self.limits.scale != LimitScale():
@@ -58,7 +57,7 @@ class LimitsFile(CheckedModel):
             )
 
     def by_kind(self, where: str) -> dict[str, Any]:
-        """Return the limits by kind and joint, and the one of all joints together; `where` names the file."""
+        """Return the limits by kind and joint, and the total power; `where` names the file."""
         return {
             kind: value
             if kind == "total_power"
@@ -74,14 +73,14 @@ _ROS_KINDS = {
     "jerk": ("jerk", ("max_jerk",)),
     "effort": ("torque", ("max_effort",)),
 }
-"""Kinds of limits in ROS's words: ours, and the keys with their values."""
+"""Kinds of limits in ROS: our names for them, and the keys of their values."""
 _UR_JOINTS = {"shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"}
-"""Joints in files of Universal Robots, which may leave out the ``_joint`` that the names in the URDF end with."""
+"""Joints in files of Universal Robots, which may leave out the ending ``_joint`` of the names in the URDF."""
 _SUFFIX = "_joint"
 
 
 class RosJointLimits(CheckedModel):
-    """Limits of one joint as ROS writes them, in SI units; a kind without figures and ``has_...`` is not stated."""
+    """Limits of one joint in the form of ROS, in SI units. A kind without figures and ``has_...`` is not stated."""
 
     has_position_limits: Flag | None = None
     min_position: Number | None = None
@@ -110,7 +109,7 @@ class RosJointLimits(CheckedModel):
                     yield key, "out of range", f"> 0, or {switch}: false"
 
     def by_kind(self) -> dict[str, Any]:
-        """Return the limits by our kinds: None where one is switched off; without those that are not stated."""
+        """Return the stated limits by our kinds; None for a kind that is switched off."""
         stated: dict[str, Any] = {}
         for kind, (name, keys) in _ROS_KINDS.items():
             figures = tuple(getattr(self, key) for key in keys)
@@ -122,7 +121,7 @@ class RosJointLimits(CheckedModel):
 
 
 class RosLimitsFile(Model):
-    """What a file ``joint_limits.yaml`` of MoveIt, of ros2_control or of Universal Robots says."""
+    """The content of a file ``joint_limits.yaml`` of MoveIt, ros2_control or Universal Robots."""
 
     joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)]
     """Limits by joint: has_velocity_limits, max_velocity and so on."""
@@ -133,7 +132,7 @@ class RosLimitsFile(Model):
 
     @property
     def joints(self) -> dict[str, RosJointLimits]:
-        """Limits by the names of the joints in the URDF."""
+        """Limits by the names that the joints have in the URDF."""
         short = {
             name.removesuffix(_SUFFIX): limits
             for name, limits in self.joint_limits.items()
@@ -143,7 +142,7 @@ class RosLimitsFile(Model):
         return self.joint_limits
 
     def by_kind(self, _where: str) -> dict[str, Any]:
-        """Return the limits by our kinds and joints, and the factors on them."""
+        """Return the limits by our kinds and by joint, and the factors on them."""
         stated: dict[str, Any] = {}
         for name, limits in self.joints.items():
             for kind, value in limits.by_kind().items():
@@ -158,12 +157,12 @@ class RosLimitsFile(Model):
 
 
 def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
-    """Return the limits that a file states, joint by joint; kinds and joints that it leaves out are the URDF's.
+    """Return the limits that a file states, joint by joint; for all others the URDF's limits hold.
 
     Raises
     ------
     TaskError
-        The file is missing, no YAML, or wrong; the message names its key.
+        The file is missing, not YAML, or wrong; the message names the key.
     InputError
         A list of limits has the wrong length.
     UnknownNameError
@@ -183,9 +182,9 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
 def with_limits_of_file(
     content: Mapping[str, Any], source: str, folder: Path
 ) -> Mapping[str, Any]:
-    """Return a task as it is written with the limits of the file that it names in its ``robot.limits``.
+    """Return the content of a task with the limits of its limits file merged into ``robot.limits``.
 
-    What the task itself says counts, joint by joint where it names joints.
+    Limits of the task itself override those of the file, joint by joint if they name joints.
 
     Parameters
     ----------

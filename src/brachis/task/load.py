@@ -1,6 +1,7 @@
-"""Making a `Task` from a file or from a mapping.
+"""Loading a `Task` from a file or a mapping.
 
-Dotted keys of a task: ``spline.intervals``, ``path.0.line.by`` or, as messages write it, ``path[0].line.by``.
+Dotted keys of a task look like ``spline.intervals`` and ``path.0.line.by``, which messages write as
+``path[0].line.by``.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ _INDEX = re.compile(r"\[(\d+)\]")
 
 
 def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
-    """Set a dotted key of a task, as its file would be written, in place.
+    """Set a dotted key in the content of a task, in place.
 
-    Mappings that are absent or null on the way are made. Whether the key is one of a task is for `load_task` to say,
-    which names the keys that are.
+    Mappings on the way that are absent or null are created. Whether a task has such a key is checked by `load_task`,
+    which lists the valid keys.
 
     Parameters
     ----------
@@ -47,12 +48,12 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
     key : str
         Names and, in lists, indices from 0, joined by dots.
     value : object
-        What the task file would have there.
+        The value, in the form of a task file.
 
     Raises
     ------
     TaskError
-        The way leads through a value that has no keys, or past the end of a list.
+        The key leads through a value without keys, or past the end of a list.
 
     Examples
     --------
@@ -79,7 +80,7 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
 
 
 def _step(place: object, name: str, before: list[str], key: str) -> str | int:
-    """Return what `place` has to be indexed with: a name in a mapping, a number within a list."""
+    """Return the index for `place`: a name in a mapping, a number in a list."""
     if isinstance(place, MutableMapping):
         return name
     where = ".".join(before)
@@ -126,7 +127,7 @@ def read_assignment(text: str) -> tuple[str, object]:
 def with_keys(
     content: Mapping[str, Any], changes: Mapping[str, object]
 ) -> dict[str, Any]:
-    """Return a task, not checked yet, with dotted keys set; `content` is left as it is."""
+    """Return the unchecked content of a task with dotted keys set; `content` itself stays unchanged."""
     changed: Any = plain(content)
     for key, value in changes.items():
         set_key(changed, key, value)
@@ -134,9 +135,9 @@ def with_keys(
 
 
 Source = str | os.PathLike[str] | Mapping[str, object] | Task
-"""What a task is made of: its file, or its content."""
+"""The input from which a task is loaded: its file or its content."""
 LARGEST_TASK = 1_000_000
-"""Bytes of YAML, which take some 20 s to read."""
+"""Largest size of a task file, bytes; YAML of this size takes some 20 s to read."""
 
 
 def load_task(source: Source, *, changes: Mapping[str, object] | None = None) -> Task:
@@ -145,25 +146,25 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     Parameters
     ----------
     source : path-like, mapping or Task
-        A YAML file; or what such a file would contain, as a mapping (NumPy arrays are accepted as lists); or a task,
-        which is returned as it is unless keys are to be changed.
+        A YAML file, a mapping with the content of such a file (NumPy arrays are accepted as lists), or a task, which is
+        returned unchanged unless there are changes.
     changes : mapping of str to object, optional
-        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``: they take the place of
-        what `source` says.
+        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``, that replace those of
+        `source`.
 
     Returns
     -------
     Task
-        The validated task. The path of the URDF is absolute: it was relative to the file's folder, or to the current
-        folder for a mapping. CSV files of waypoints, relative to the same folder, are read; what comes back has splines
-        in their place and needs the files no more. So it is with a file of limits.
+        The validated task. The path of the URDF, given relative to the folder of the file or, for a mapping, to the
+        current folder, is made absolute. CSV files of waypoints and a limits file, relative to the same folder, are
+        read: the task contains splines and limits instead, and no longer needs the files.
 
     Raises
     ------
     TaskError
-        The file cannot be read or is not YAML, or the task is wrong. One message has all mistakes, the first
-        twenty with a line each: file, key, what was found and what is allowed. Or a CSV file or a file of
-        limits is wrong; the message names its line or key.
+        The file cannot be read or is not YAML, or the task is wrong. One message lists the mistakes, the first twenty
+        on a line each: file, key, what was found and what is allowed. Or a CSV file or a limits file is wrong; the
+        message names the line or key.
 
     Examples
     --------
@@ -218,14 +219,14 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
 
 @contextmanager
 def name_task_file(source: object, changes: Collection[str] = ()) -> Iterator[None]:
-    """Name the task file in errors that are found after it was read: in its robot, its path, its postures.
+    """Add the name of the task file to errors that are found later, in its robot, path or postures.
 
-    Two kinds of errors stay as they are: those of a URDF file, which name that file, and those of a missing library.
+    Errors of a URDF file, which name that file, and errors of a missing library stay unchanged.
 
     Parameters
     ----------
     source : object
-        What the task was made of. If it is not a task file, errors stay as they are.
+        What the task was made from. If it is not a task file, errors stay unchanged.
     changes : collection of str, optional
         Dotted keys that were set.
     """
@@ -243,12 +244,12 @@ def name_task_file(source: object, changes: Collection[str] = ()) -> Iterator[No
 
 
 def _name_source(source: str, changes: Collection[str]) -> str:
-    """Name a task in messages, with the dotted keys that were set."""
+    """Return the name of a task for messages, with the dotted keys that were set."""
     return f"{source} with {', '.join(changes)} set" if changes else source
 
 
 def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
-    """Return the ``robot`` part of a task that a mapping describes.
+    """Return the ``robot`` section of a task from a mapping.
 
     Raises
     ------
@@ -261,18 +262,18 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
 def task_from(
     content: object, source: str, folder: Path, changes: Mapping[str, object]
 ) -> Task:
-    """Return the task that has this content.
+    """Return the task with this content.
 
     Parameters
     ----------
     content : object
-        As a task file has it.
+        Content in the form of a task file.
     source : str
-        What messages name as the place of mistakes.
+        Name of the content in messages.
     folder : Path
-        What paths of files in it are relative to.
+        Folder to which its paths of files are relative.
     changes : mapping
-        Dotted keys that are set.
+        Dotted keys to set.
 
     Raises
     ------
@@ -295,12 +296,12 @@ def task_from(
 
 
 def _with_start(task: Task, source: str) -> Task:
-    """Fill in where the path begins, if its first segment says so and the task does not: of joints the start posture.
+    """Fill in the start of the path from its first segment if the task does not state it; for joints the start posture.
 
     Raises
     ------
     TaskError
-        Neither does, and the start posture is free.
+        Neither states it, and the start posture is free.
     """
     if task.start != "free" or task.path_start is not None:
         return task
@@ -314,7 +315,7 @@ def _with_start(task: Task, source: str) -> Task:
 
 
 def _with_absolute_files(task: Task, folder: Path) -> Task:
-    """Return the task with the paths of a URDF, an SRDF and meshes, relative to `folder`, made absolute."""
+    """Return the task in which the paths of URDF, SRDF and meshes, relative to `folder`, are absolute."""
     changes: dict[str, object] = {}
     if task.robot.urdf is not None:
         urdf = {"urdf": locate_urdf(task.robot.urdf, folder)}

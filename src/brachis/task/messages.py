@@ -1,10 +1,11 @@
-"""Pydantic's validation errors in plain words: key, what was found, what is allowed, what to try."""
+"""Pydantic's validation errors in plain words: the key, what was found, what is allowed, and what to try."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import is_dataclass
+from itertools import groupby
 from typing import Final, TypeVar, get_args, get_type_hints
 
 from pydantic import ValidationError
@@ -23,21 +24,21 @@ from brachis.task.units import unit_of
 
 _M = TypeVar("_M", bound=Model)
 _MOST_MISTAKES = 20
-"""Mistakes that one message lists: a screen. An array of NaN would give thousands."""
+"""Largest number of mistakes in one message, to fit on a screen. An array of strings could give thousands."""
 _Location = tuple[str | int, ...]
-"""Keys and indices on the way to a value, and tags of unions, as pydantic gives them."""
+"""Keys, indices and tags of unions on the way to a value, as pydantic gives them."""
 
 
 def validate(model: type[_M], content: object, source: str) -> _M:
-    """Return the model with a content, in which arrays may stand for lists.
+    """Return a model made from its content, in which arrays may stand for lists.
 
     Parameters
     ----------
     model : type
     content : object
-        As a task file has it, or a model.
+        Content in the form of a task file, or a model.
     source : str
-        File name, or what else the content came from, for messages.
+        File name or other origin of the content, for messages.
 
     Raises
     ------
@@ -51,31 +52,38 @@ def validate(model: type[_M], content: object, source: str) -> _M:
 
 
 def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskError:
-    """Return the `TaskError` that says in plain words what `error` says.
+    """Return the `TaskError` that states a validation error in plain words.
 
     Parameters
     ----------
     error : ValidationError
-        What pydantic found.
+        The error of pydantic.
     source : str
-        File name, or what else the task came from.
+        File name or other origin of the task.
     model : type
-        The model that was validated; its fields tell which keys are allowed.
+        The validated model, whose fields are the allowed keys.
     """
     details = [
         detail for detail in error.errors(include_url=False) if not _is_echo(detail)
     ]
-    errors = [_one(detail, source, model) for detail in details[:_MOST_MISTAKES]]
-    if len(details) == 1:
+    # The same mistake in several items of a list is one.
+    mistakes = [
+        [*places]
+        for _, places in groupby(
+            details, lambda detail: [repr(detail["input"]), *_names_in(detail["loc"])]
+        )
+    ]
+    errors = [_one(places, source, model) for places in mistakes[:_MOST_MISTAKES]]
+    if len(mistakes) == 1:
         return errors[0]
     lines = "".join(f"\n  {mistake}" for mistake in errors)
-    if len(details) > len(errors):
-        lines += f"\n  and {len(details) - len(errors)} more"
-    return TaskError(f"{len(details)} mistakes{lines}", where=source)
+    if len(mistakes) > len(errors):
+        lines += f"\n  and {len(mistakes) - len(errors)} more"
+    return TaskError(f"{len(mistakes)} mistakes{lines}", where=source)
 
 
 def show(value: object) -> str:
-    """Return a value as a task file would write it, shortened, with its type where that is the question."""
+    """Return a value as a task file would write it, shortened, with its type if that may be the mistake."""
     if isinstance(value, Model):
         value = value.model_dump()
     if value is None:
@@ -85,8 +93,8 @@ def show(value: object) -> str:
     if isinstance(value, str):
         return f"{_shorten(repr(value))} (a string)"
     if isinstance(value, Mapping):
-        keys = ", ".join(map(str, value)) or "none"
-        return f"a mapping with the keys {_shorten(keys)}"
+        keys = _shorten(", ".join(map(str, value)))
+        return f"a mapping with the keys {keys}" if keys else "an empty mapping"
     if isinstance(value, list | tuple):
         return f"{_shorten(repr(list(value)))} (a list)"
     text = repr(value)
@@ -97,9 +105,15 @@ def _shorten(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
+def _one(places: list[ErrorDetails], source: str, model: type[Model]) -> TaskError:
+    """Return the error for one mistake, which names the first of the places where it is made."""
+    detail, *others = places
     problem, *facts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
     key = _write_location(detail["loc"], detail.get("ctx", {}).get("key", ""))
+    if detail["type"] != REFUSED and key in _ALLOWED_AT:
+        facts = [facts[0], _ALLOWED_AT[key]]
+    if others:
+        key += f" and {len(others)} more"
     return TaskError(
         problem,
         where=f"{source}: {key}" if key else source,
@@ -112,12 +126,12 @@ def _is_tag(step: str | int) -> bool:
 
 
 def _names_in(location: _Location) -> list[str]:
-    """Return the keys of a location, without indices and tags of unions."""
+    """Return the keys of a location, without indices and tags."""
     return [step for step in location if isinstance(step, str) and not _is_tag(step)]
 
 
 def _write_location(location: _Location, key: str) -> str:
-    """Return a location, and a key below it, as ``path[0].line.to``, without the tags of unions."""
+    """Return a location and a key below it in the form ``path[0].line.to``, without tags."""
     keys = [
         f"[{step}]" if isinstance(step, int) else step
         for step in location
@@ -127,7 +141,7 @@ def _write_location(location: _Location, key: str) -> str:
 
 
 def models_in(annotation: object) -> Iterator[type]:
-    """Yield the models, and dataclasses, that an annotation names."""
+    """Yield the models and dataclasses in an annotation."""
     if isinstance(annotation, type) and (
         issubclass(annotation, Model) or is_dataclass(annotation)
     ):
@@ -137,14 +151,14 @@ def models_in(annotation: object) -> Iterator[type]:
 
 
 def _fields_of(model: type) -> Mapping[str, object]:
-    """Return the names of a model's fields, or of a dataclass's, and what they are annotated with."""
+    """Return the annotations of the fields of a model or dataclass by their names."""
     if issubclass(model, Model):
         return {name: field.annotation for name, field in model.model_fields.items()}
     return get_type_hints(model)
 
 
 def _models_at(location: _Location, model: type[Model]) -> list[type]:
-    """Return the models that may stand at a location."""
+    """Return the models that are possible at a location."""
     models: list[type] = [model]
     for step in location:
         if _is_tag(step):
@@ -163,14 +177,14 @@ def _models_at(location: _Location, model: type[Model]) -> list[type]:
 
 
 def _keys_at(location: _Location, model: type[Model]) -> list[str]:
-    """Return the keys that are allowed at a location."""
+    """Return the allowed keys at a location."""
     return [
         name for parent in _models_at(location, model) for name in _fields_of(parent)
     ]
 
 
 def key_paths(name: str, model: type[Model]) -> list[str]:
-    """Return the shortest dotted keys, of up to three parts, that end in a name: ``refinement.tolerance``."""
+    """Return the shortest dotted keys of up to three names that end in a name, such as ``refinement.tolerance``."""
     level: list[tuple[str, type]] = [("", model)]
     for _ in range(3):
         paths = [
@@ -188,7 +202,7 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
 
 
 def _description_at(location: _Location, model: type[Model]) -> str | None:
-    """Return what is said of the key at a location."""
+    """Return the description of the key at a location."""
     names = _names_in(location)
     if not names:
         return None
@@ -201,7 +215,7 @@ def _description_at(location: _Location, model: type[Model]) -> str | None:
 
 
 def _is_echo(detail: ErrorDetails) -> bool:
-    """Whether a list is called too short only because pydantic does not count its wrong items."""
+    """Return whether a list seems too short only because pydantic does not count its wrong items."""
     return (
         detail["type"] == "too_short"
         and len(detail["input"]) >= detail["ctx"]["min_length"]
@@ -209,22 +223,31 @@ def _is_echo(detail: ErrorDetails) -> bool:
 
 
 _Parts = tuple[str, *tuple[str | None, ...]]
-"""What is wrong, what was found, what is allowed, what to try; the last ones may be absent."""
+"""The problem, what was found, what is allowed, and what to try; the last ones may be absent."""
 
 
 def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
     if isinstance(detail["loc"][-1], int):
         return "the list is too short: this item is missing", show(detail["input"])
-    about = _description_at(detail["loc"], model) or ""
-    return "this key is required, and missing", None, None, about.partition("; ")[0]
+    about = _description_at(detail["loc"], model)
+    return "this key is required, and missing", None, None, about
 
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
-    name = str(detail["loc"][-1])
-    keys = _keys_at(detail["loc"][:-1], model)
-    elsewhere = " or ".join(key_paths(name, model))
-    hint = elsewhere and f"This key belongs elsewhere: {elsewhere}"
-    return "unknown key", name, ", ".join(keys), hint or suggest(name, keys)
+    location = detail["loc"]
+    name = str(location[-1])
+    above = [
+        _write_location(location[:end], name)
+        for end in range(len(location))
+        if name in _keys_at(location[:end], model)
+    ]
+    paths = above[-1:] or key_paths(name, model)
+    hint = _KEYS_OF_OTHERS.get(name)
+    if paths and _write_location(location, "") not in paths:
+        hint = f"This key belongs elsewhere: {' or '.join(paths)}"
+    keys = _keys_at(location[:-1], model)
+    allowed = None if hint and len(keys) > 12 else ", ".join(keys)
+    return "unknown key", name, allowed, hint or suggest(name, keys)
 
 
 def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
@@ -239,13 +262,13 @@ def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     known = re.findall(r"\w+", facts["allowed"])
     hint = None
     if isinstance(content, Mapping) and not any(key in content for key in known):
-        hints = (suggest(str(name), known) for name in content)
+        hints = (_KEYS_OF_OTHERS.get(name) or suggest(name, known) for name in content)
         hint = next(filter(None, hints), None)
     return facts["problem"], show(content), facts["allowed"], hint
 
 
 def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
-    """Describe a mistake by the table; a wrong type by the keys of the mapping and what the key is for as well."""
+    """Describe a mistake by the tables; for a wrong type add the allowed keys and the description of the key."""
     shown = show(detail["input"])
     location = detail["loc"]
     if location and location[-1] == "[key]":
@@ -258,10 +281,7 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
         return "wrong type", shown, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
     facts = detail.get("ctx", {})
-    words = re.findall(r"'(\w+)'", facts.get("expected", ""))
-    words += facts.get("words", "").split()
-    value = detail["input"]
-    hint = suggest(value, words) if isinstance(value, str) else None
+    hint = suggest(detail["input"], re.findall(r"'(\w+)'", facts.get("expected", "")))
     allowed = form.format(**facts)
     unit = unit_of(".".join(_names_in(location)))
     if problem == _OUT_OF_RANGE and unit:
@@ -269,6 +289,23 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     return problem, shown, allowed or None, hint
 
 
+_ALLOWED_AT: Final = {
+    "brachis": "1",
+    "path": "a list of segments, such as [{line: {to: [...]}}], or [{csv: {file: ...}}] for a file of points",
+    "scene": "a list of bodies, [{box: [1, 1, 1]}, ...], or {file: cell.yaml}",
+    "spline.degree": "a whole number, 3 to 7 with rest: full (from 2 with rest: velocity, from 4 with rest: jerk)",
+    "spline.intervals": "auto, or a whole number from 4 to 10000",
+    "search.jobs": "auto (all processors), or a whole number >= 1",
+    "search.seed": "a whole number >= 0",
+}
+"""What is allowed at keys of a task whose type alone does not tell."""
+_KEYS_OF_OTHERS: Final = {
+    "objective": "brachis always minimises the end time",
+    "tool": "The frame that follows the path is robot.tool_frame",
+    "posture": "A posture is stated by its name: start: home, with postures: {home: [...]}",
+    "points": "For a file of points write csv: {file: ...}, for a list of points spline: {through: [...]}",
+}
+"""What to write in place of keys that brachis does not have."""
 _MAPPING = "a mapping"
 _TYPES: Final = {
     "float_type": "a number",
@@ -281,7 +318,7 @@ _TYPES: Final = {
     "dataclass_type": _MAPPING,
     "none_required": "null",
 }
-"""What is expected, by pydantic's names of errors about types."""
+"""The expected types, by pydantic's names of errors about types."""
 _OUT_OF_RANGE = "out of range"
 _PROBLEMS: Final = {
     "finite_number": ("not a finite number", "a finite number"),
@@ -295,7 +332,7 @@ _PROBLEMS: Final = {
     "string_too_short": ("the string is empty", "a string of at least one character"),
     WRONG_FORM: ("wrong form", "{allowed}"),
 }
-"""What is wrong, and what is allowed with pydantic's facts in braces, by the names of errors."""
+"""The problem and what is allowed, with pydantic's facts in braces, by pydantic's names of errors."""
 _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Parts]]] = {
     REFUSED: _refusal,
     WRONG_KEYS: _wrong_keys,
@@ -303,4 +340,4 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Parts]]] =
     "extra_forbidden": _unknown,
     "unexpected_keyword_argument": _unknown,
 }
-"""Mistakes that need more than the tables."""
+"""Functions for mistakes that need more than the tables, by pydantic's names of errors."""

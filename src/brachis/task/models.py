@@ -1,7 +1,7 @@
-"""The task: what is asked of the planner.
+"""The task: what the planner is asked to do.
 
-`Task` mirrors the task file key by key. Use `brachis.task.load_task` to make one: it reads files and mappings alike,
-and answers mistakes with a `brachis.errors.TaskError` that names the key.
+`Task` mirrors the task file key by key. Create one with `brachis.task.load_task`, which reads files and mappings alike
+and reports mistakes as a `brachis.errors.TaskError` that names the key.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ from brachis.task.tolerances import (
 JointValues = Annotated[
     NonEmpty[Number] | Annotated[dict[Name, Number], Field(min_length=1)],
     ByForm(
-        "a list of numbers in the order of the chain, or a mapping of joint name to number"
+        "a list of numbers in the order of the chain, or a mapping of joint names to numbers"
     ),
 ]
 
@@ -74,13 +74,13 @@ class Posture(Model):
     """A configuration of the robot."""
 
     joints: JointValues
-    """Joint positions, rad (m): in the order of the chain, or by joint name."""
+    """Joint positions, rad (m), in the order of the chain or by joint name."""
 
 
 PathStart = Annotated[
     StartPlace,
     ByForm(
-        "a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
+        "a list of the rows of the task space, or for a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
     ),
 ]
 FreePosture = Annotated[
@@ -99,16 +99,16 @@ Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
 
 
 class PathInFrame(Model):
-    """A path that names its frame."""
+    """A path given in a named frame."""
 
     frame: Name
     segments: Segments
 
 
 class Task(CheckedModel):
-    """A task: a robot, a path for its tool, and how to plan.
+    """A task: a robot, a path for its tool, and settings of the planner.
 
-    Constructed directly it raises pydantic's own errors; `brachis.task.load_task` puts them in plain words.
+    The constructor raises pydantic's own errors; `brachis.task.load_task` puts them in plain words.
 
     Examples
     --------
@@ -123,29 +123,33 @@ class Task(CheckedModel):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
-    """Posture at the start of the path: {joints: ...}, the name of a posture, or free, which needs path_start unless
-    the path begins with a waypoint. A path of joints that begins with one needs no start."""
+    """Posture at the start of the path: {joints: ...}, a name defined in postures, or free. With free, path_start is
+    required unless the path begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, rad). For a pose, or with axis: {position:
-    [x, y, z], rpy_deg: [...]}, or another convention; only the rows of the task space count. Null: the
-    tool's place in the start posture, with which a given point must agree, or the first waypoint."""
+    [x, y, z], rpy_deg: [...]} or another convention; only the rows of the task space count. It must agree with the
+    start posture. Null: the tool's place in that posture, or the first waypoint."""
     end: FreePosture = "free"
-    """Posture at the end, as start. Its tool must be at the path's end, to 1e-6 m or rad; the nearest posture on the
-    path is used."""
+    """Posture at the end, given like start. Its tool must be at the end of the path to within 1e-6 m or rad; the
+    nearest posture on the path is used."""
     task_space: TaskSpace
     """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
     axis, joints (all joint positions; only the timing is planned), or a list of rows: some of x, y, z, then one of yaw,
     pitch, roll (angle about the world's z, y or x axis, rad) or axis (direction of the tool's z axis)."""
     path: Segments
-    """Segments in order; or {frame: NAME, segments: [...]}; or a list of points, each with all task coordinates: the
-    spline through them."""
+    """Segments in order; or a list of points, each with all task coordinates, for the spline through them. In a frame:
+    {frame: NAME, segments: [...]}."""
     frames: dict[Name, FramePlacement] = Field(default={})
-    """Places of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
+    """Placements of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
         dict[Name, JointValues],
-        must(lambda named: "free" not in named, "free names no posture", "other names"),
+        must(
+            lambda named: "free" not in named,
+            "free cannot be the name of a posture",
+            "different names",
+        ),
     ] = Field(default={})
-    """Joint positions by name, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
+    """Named joint positions, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None
     """Name of the frame of path and path_start. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
@@ -160,20 +164,20 @@ class Task(CheckedModel):
         ),
         AfterValidator(name_bodies),
     ] = ()
-    """Bodies around the robot and on it, or {file: cell.yaml} (see docs/my_cell.md)."""
+    """Bodies around the robot or carried by it, or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
-    """Clearance, and which pairs of bodies keep it."""
+    """Clearance, and the pairs of bodies that keep it."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """Ranges within which the tool may leave the path."""
     margins: Margins = Field(default_factory=Margins)
-    """Margins from singular postures and from the ends of joint ranges."""
+    """Distances to keep from singular postures and from the ends of joint ranges."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
-    """Joints whose motion is optimised. auto plans in charts, and tries closed forms while no motion is verified. With
-    pose_free_roll there is one more joint, tool_roll, which the list may leave out."""
+    """Joints whose motion is optimised. auto plans in charts, and tries closed forms until a motion is verified.
+    pose_free_roll adds a joint, tool_roll, which the list may leave out."""
     branch: Name = "auto"
-    """Label of the branch of the closed form. auto: that of the start posture, or all with start: free."""
+    """Label of the branch of the closed form. auto: the branch of the start posture; all branches with start: free."""
     search: SearchSettings = Field(default_factory=SearchSettings)
     """Search for the fastest motion."""
     spline: SplineSettings = Field(default_factory=SplineSettings)
@@ -184,17 +188,17 @@ class Task(CheckedModel):
             expand_solver_name, json_schema_input_type=SolverSettings | str
         ),
     ] = Field(default_factory=SolverSettings)
-    """Solver: its name or a mapping."""
+    """Solver, by name or as a mapping."""
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: implausible figures are errors. false: they are warnings. null: only a start posture, or one by name, that
-    looks like degrees is an error."""
+    """true: implausible figures are errors. false: they are warnings. null: only a start or named posture that looks
+    like degrees is an error."""
 
     @model_validator(mode="before")
     @classmethod
     def _expand(cls, content: object) -> object:
-        """Give a path of joints a free start, and take a path apart that says its frame."""
+        """Give a path of joints a free start by default, and split a path given in a frame."""
         if not isinstance(content, Mapping):
             return content
         if content.get("task_space") == "joints":
@@ -204,7 +208,7 @@ class Task(CheckedModel):
             return content
         if set(path) != {"frame", "segments"}:
             raise refuse(
-                "a path in a frame is the frame's name and the segments",
+                "a path in a frame needs the keys frame and segments",
                 key="path",
                 found=path,
                 allowed="{frame: NAME, segments: [...]}",
@@ -250,16 +254,18 @@ class Task(CheckedModel):
             )
         if len(rows) > 1 and all(isinstance(row, list) for row in rows):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
-        if rows and all(isinstance(row, list | int | float) for row in rows):
+        if all(isinstance(row, list | int | float) for row in rows):
             raise refuse(
-                "a path cannot be made of these numbers",
+                "a path cannot be made of these numbers"
+                if rows
+                else "there is no segment",
                 found=rows,
-                allowed="two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}",
+                allowed="at least one segment, such as {line: {by: [0, 0.4, 0]}}, or two points or more, [[...], ...]",
             )
         return path
 
     def joints_at(self, end: str) -> tuple[Any, str] | None:
-        """Return the joint positions given at ``start`` or ``end``, and their key; None where it is free."""
+        """Return the joint positions at ``start`` or ``end`` and their key; None if the posture is free."""
         posture = getattr(self, end)
         if isinstance(posture, Posture):
             return posture.joints, f"{end}.joints"
@@ -268,13 +274,13 @@ class Task(CheckedModel):
         return self.postures[posture], f"postures.{posture}"
 
     def posture_key(self, end: str) -> str:
-        """Return the key of the joint positions at ``start`` or ``end``; of a periodic motion that of its start."""
+        """Return the key of the joint positions at ``start`` or ``end``; for a periodic motion the key of its start."""
         stated = self.joints_at(end) or self.joints_at("start")
         return stated[1] if stated else f"{end}.joints"
 
     @property
     def _start_forms(self) -> str:
-        """How ``path_start`` is written in this task space."""
+        """The form of ``path_start`` in this task space, for messages."""
         if self.of_poses:
             return f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}"
         if isinstance(self.task_space, tuple):
@@ -289,7 +295,7 @@ class Task(CheckedModel):
         yield from self._mistakes_in_splines()
 
     def _check_names(self) -> None:
-        """Refuse names of frames and postures that are not defined."""
+        """Refuse names of frames and postures that the task does not define."""
         frames = {"path_frame": self.path_frame}
         frames |= {f"scene[{i}].frame": body.frame for i, body in enumerate(self.scene)}
         check_frames(self.frames, frames)
@@ -328,7 +334,7 @@ class Task(CheckedModel):
         if has_path_start and self.of_poses and not is_pose:
             yield (
                 "path_start",
-                "a list does not state its convention, such as whether w of a quaternion is first or last",
+                "a list does not state its convention, such as whether w of a quaternion comes first or last",
                 self._start_forms,
             )
         if is_pose and not self.of_poses:
@@ -350,8 +356,8 @@ class Task(CheckedModel):
         if last.stop:
             yield (
                 f"{at}dwell" if last.dwell else f"{at}stop",
-                "the last segment cannot stop: the path ends there, and the motion with it",
-                "no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
+                "the last segment cannot stop, because the path and the motion end there",
+                "no stop and no dwell on the last segment; boundary.end_speed: 0 makes the motion end at rest",
             )
         if self.task_space != "joints":
             return
@@ -381,19 +387,19 @@ class Task(CheckedModel):
             yield (
                 "tolerances.orientation",
                 "the path does not prescribe the orientation",
-                "tolerances of the orientation with task_space: pose or axis",
+                "no tolerances of the orientation, or task_space: pose or axis",
             )
         if tolerances.position != PositionTolerance() and not of_places:
             yield (
                 "tolerances.position",
                 "this task space has no tolerances of the position",
-                "task_space: position, pose or pose_free_roll with them",
+                "no tolerances of the position, or task_space: position, pose or pose_free_roll",
             )
         if tolerances.orientation.roll is not None and self.task_space != "pose":
             yield (
                 "tolerances.orientation.roll",
                 "the roll is free in this task space",
-                "task_space: pose with it",
+                "no tolerance of the roll, or task_space: pose",
             )
 
     def _mistakes_in_splines(self) -> Iterator[Mistake]:
@@ -401,7 +407,7 @@ class Task(CheckedModel):
         if self.boundary.in_motion and spline.knots == "free":
             yield (
                 "spline.knots",
-                "free knots need a motion that begins and ends at rest",
+                "free knots need a motion that starts and ends at rest",
                 "uniform, or a boundary at rest",
             )
         if self.boundary.periodic:
@@ -423,20 +429,20 @@ class Task(CheckedModel):
 
     @property
     def collision_mode(self) -> str:
-        """How collisions are treated: ``avoid``, ``check`` or ``off``."""
+        """Treatment of collisions: ``avoid``, ``check`` or ``off``."""
         if self.collisions.mode != "auto":
             return self.collisions.mode
         return "avoid" if self.scene else "off"
 
     @property
     def of_poses(self) -> bool:
-        """Whether the path has an orientation of the tool, or of its axis."""
+        """Whether the path prescribes an orientation of the tool or of its axis."""
         space = self.task_space
         return space in {"pose", "pose_free_roll"} or "axis" in space
 
     @property
     def start_place(self) -> StartPlace:
-        """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
+        """Start of the path that the first segment states, in the form of `path_start`; None if it states none."""
         place, turn = self.path[0].start or (None, None)
         if place is None or not self.of_poses:
             return place
@@ -447,19 +453,19 @@ class Task(CheckedModel):
 
     @property
     def speed_unit(self) -> str:
-        """Unit of a speed along the path; of joints it is the norm of their velocities."""
+        """Unit of a speed along the path; along a path of joints the speed is the norm of their velocities."""
         return "rad/s (m/s)" if self.task_space == "joints" else "m/s"
 
     @property
     def fits(self) -> tuple[FitReport, ...]:
-        """Where the path comes from points, one for each file or array: what they were, and how near it is to them."""
+        """Reports of the fits to points, one for each file or array from which the path was made."""
         fits = (getattr(segment.shape, "fit", None) for segment in self.path)
         return tuple(fit for fit in fits if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the task as plain mappings, lists, numbers and strings.
 
-        All defaults are spelled out, so that the result keeps its meaning should a default change.
+        All defaults are spelled out, so that the result keeps its meaning if a default changes.
         ``load_task(task.to_dict()) == task``.
         """
         return self.model_dump(mode="json")

@@ -1,8 +1,8 @@
-"""How the tool is oriented along a segment, as the task file writes it; for task spaces of poses.
+"""The orientation of the tool along a segment, as the task file states it, for task spaces of poses.
 
-``orientation: fixed`` stands beside the segment's kind, or ``{rotate: ...}``, ``{to: ...}``, ``tangent``. A given
-orientation is that of the tool frame in the frame of the path, the world unless it is another, in one of the
-conventions of `brachis.task.points.units`. Angles are in degrees where the key ends with ``_deg``, else in radians.
+``orientation`` stands beside the kind of the segment. It is ``fixed``, ``tangent``, ``{rotate: ...}``, ``{to: ...}`` or
+``{tangent: ...}``. A given orientation is that of the tool frame in the frame of the path, by default the world, in one
+of the conventions of `brachis.task.points.units`. Angles are in degrees if the key ends with ``_deg``, else in radians.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Direction = Annotated[
     must(
         lambda vector: math.hypot(*vector) >= 1e-9,
         "a direction cannot have zero length",
-        "any other vector; its length does not matter",
+        "any other vector, whatever its length",
     ),
 ]
 Profile = Annotated[
@@ -53,7 +53,7 @@ def _unit_length(quaternion: tuple[float, ...]) -> tuple[float, ...]:
         raise refuse(
             f"the quaternion's length is {length:.6g}",
             found=quaternion,
-            allowed="a quaternion of length 1, to 1 %",
+            allowed="a quaternion of length 1 to within 1 %",
         )
     return quaternion
 
@@ -65,19 +65,17 @@ _DEGREES = "_deg"
 
 
 def _about(name: str) -> Any:
-    """Return the field of a convention, with its meaning."""
+    """Return the field of a convention, described by its meaning."""
     convention = CONVENTIONS[name]
     unit = ", rad" if name == "rotation_vector" else " (length 1, to 1 %)"
     if convention.euler:
         unit = ", degrees"
     meaning = convention.meaning[0].upper() + convention.meaning[1:]
-    return Field(
-        default=None, description=f"{meaning}{unit}. Used by {convention.makers}."
-    )
+    return Field(default=None, description=f"{meaning}{unit}: {convention.makers}.")
 
 
 class Attitude(Model):
-    """An orientation, in exactly one of these conventions."""
+    """An orientation in exactly one of these conventions."""
 
     model_config = ConfigDict(
         json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF)
@@ -113,7 +111,7 @@ class Attitude(Model):
 
     @property
     def rotation(self) -> transform.Rotation:
-        """The orientation as SciPy's rotation."""
+        """The orientation as a SciPy rotation."""
         stated = self.model_dump(include=set(Attitude.model_fields))
         ((key, values),) = stated.items()
         if key.endswith(_DEGREES):
@@ -125,13 +123,13 @@ _ONE_OF: list[JsonValue] = [{"required": [key]} for key in Attitude.model_fields
 
 
 class Target(Attitude):
-    """An orientation that a turn leads to."""
+    """An orientation at which a turn ends."""
 
     profile: Profile = "uniform"
 
 
 class ToolPose(Attitude):
-    """A place of the tool: its position, and its orientation in exactly one of these conventions."""
+    """A pose of the tool: its position, and its orientation in exactly one of these conventions."""
 
     position: Vector3
     """x, y, z, m."""
@@ -139,7 +137,7 @@ class ToolPose(Attitude):
     @model_validator(mode="before")
     @classmethod
     def _of_transform(cls, content: object) -> object:
-        """Take a transform such as Pinocchio's SE3 too."""
+        """Accept a transform such as Pinocchio's SE3."""
         if not hasattr(content, "homogeneous"):
             return content
         ((position, turn),) = poses_of([content], "transform")
@@ -147,13 +145,13 @@ class ToolPose(Attitude):
 
 
 StartPlace = tuple[Number, ...] | ToolPose | None
-"""Where a path begins: its task coordinates, or a pose; None where that is left open."""
+"""Start of a path: its task coordinates or a pose; None if the task leaves it open."""
 
 
 def poses_of(
     transforms: Any, source: str, orientations: Any = None
 ) -> list[tuple[list[float], dict[str, Any]]]:
-    """Return positions, m, and orientations as a task file writes them; `source` names the transforms in messages."""
+    """Return positions, m, and orientations in the form of a task file; `source` names the transforms in messages."""
     from brachis.task.point_data import FileUnits
     from brachis.task.points.points import points_from
 
@@ -176,9 +174,9 @@ class Rotation(Model):
     axis: Direction
     """Axis of the rotation, right-hand rule, of any length."""
     angle_deg: Number
-    """Angle, degrees; also negative, or more than 360."""
+    """Angle, degrees, which may be negative or exceed 360."""
     frame: Literal["path", "tool"] = "path"
-    """Frame of the axis: path (the world, or path_frame) or tool."""
+    """Frame of the axis: path (the world or path_frame) or tool."""
     profile: Profile = "uniform"
 
 
@@ -190,24 +188,24 @@ class Tangent(Model):
 
 
 class Rotate(Model):
-    """The tool turns about an axis that stands still."""
+    """The tool turns about a fixed axis."""
 
     rotate: Rotation
     """The rotation."""
 
 
 class TurnTo(Model):
-    """The tool turns to an orientation, the shortest way."""
+    """The tool turns to an orientation by the shortest way."""
 
     to: Target
-    """Orientation at the segment's end."""
+    """Orientation at the end of the segment."""
 
 
 class AlongTangent(Model):
     """The tool turns with the tangent."""
 
     tangent: Tangent
-    """What the tool keeps its attitude to."""
+    """The direction that stays up while the tool turns."""
 
 
 Turning = Annotated[

@@ -1,4 +1,4 @@
-"""Points of a path from files, as the task file writes them, and the smooth curves that are fitted to them."""
+"""Files of points, as the task file states them, and reports of the smooth curves fitted to the points."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ OrientationWord = Annotated[
 
 
 class FileUnits(Model):
-    """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
+    """Units of the numbers in a file, unless a header such as ``x_mm`` states them."""
 
     length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
     """Unit of positions. Null: the header's unit, or m."""
@@ -48,18 +48,18 @@ class FileUnits(Model):
 
 
 class FitTolerance(Model):
-    """How far points may be from the path; numbers with their unit (0.05 mm, 0.1 deg), or in m and rad."""
+    """Largest distances of points from the path, with a unit (0.05 mm, 0.1 deg) or in m and rad."""
 
     position: Length
     """Largest distance of a point from the path."""
     orientation: Angle = ANGLES["deg"] / 10.0
-    """Largest angle between a given orientation or yaw and the path's; by default 0.1 deg."""
+    """Largest angle between a given orientation or yaw and that of the path; by default 0.1 deg."""
     corner: Length | None = None
-    """The same at a rounded corner. Null: as position."""
+    """Largest distance at a rounded corner. Null: as position."""
 
     @property
     def at_corners(self) -> float:
-        """The largest distance where a corner is rounded, m."""
+        """Largest distance of a point from the path where a corner is rounded, m."""
         return self.corner or self.position
 
 
@@ -67,15 +67,15 @@ CornerMode = Literal["blend", "refuse", "stop"]
 
 
 class PointFile(Model):
-    """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
+    """Points in a CSV or G-code file, which `brachis.task.load_task` reads and turns into a smooth curve."""
 
     file: Name
     """CSV or G-code file (.nc, .ngc, .gcode, .tap)."""
     relative: Flag = False
-    """Whether points are moved so that the first one is at the segment's start, as in a spline."""
+    """Whether points are moved so that the first one is at the start of the segment."""
     orientation: OrientationWord | None = Field(
         default=None,
-        description="Convention of the orientation columns, if their names do not define it: "
+        description="Convention of the orientation columns, if their names leave it open: "
         f"{', '.join(CONVENTIONS)}.",
     )
     units: FileUnits = Field(default_factory=FileUnits)
@@ -84,64 +84,64 @@ class PointFile(Model):
     """Largest distances of the points from the path: {position: 0.1 mm, orientation: 0.5 deg}. Null: the path passes
     through all points."""
     corner: CornerMode = "blend"
-    """What happens at corners. blend: they are rounded within the tolerance. stop: the tool stops. refuse: an error
-    lists them. Without a tolerance only stop finds corners."""
+    """blend: corners are rounded within the tolerance. stop: the tool stops there. refuse: an error lists them. Only
+    stop finds corners without a tolerance."""
 
 
 class FoundCorner(Model):
-    """A corner of the points."""
+    """A corner found in the points."""
 
     row: Count
-    """Line of the file, or index, of the nearest point."""
+    """Line in the file, or index in the array, of the nearest point."""
     angle: Number
     """Change of direction, rad."""
     distance: Number
-    """Along the path from its first point, m."""
+    """Distance along the path from its first point, m."""
     blend: NonNegative
-    """What its blend takes from either side, m; 0 where the tool stops."""
+    """Length that its blend takes from either side, m; 0 if the tool stops."""
 
     def __str__(self) -> str:
-        """Say how sharp it is, and where."""
+        """Return its angle and its row."""
         return f"{degrees(self.angle):.3g} deg at row {self.row}"
 
 
 class FitReport(Model):
-    """Where a curve comes from, and how near it is to the points; written by brachis."""
+    """The source of a curve and its distances from the points; written by brachis."""
 
     source: Name
-    """File, or what the points were given as."""
+    """File, or name of the argument with the points."""
     points: Count
     """Number of points."""
     length: NonNegative
     """Length of the path, m."""
     position_error: NonNegative = 0.0
-    """Largest distance of a point from the path, m, beside corners."""
+    """Largest distance of a point from the path, corners left out, m."""
     position_rms: NonNegative = 0.0
     """Root mean square of the distances, m."""
     position_tolerance: NonNegative = 0.0
-    """What was allowed, m; 0 where all points are passed."""
+    """Allowed distance, m; 0 if the path passes through all points."""
     orientation_error: NonNegative = 0.0
-    """Largest angle between given and fitted orientation, rad."""
+    """Largest angle between a given and the fitted orientation, rad."""
     orientation_tolerance: NonNegative = 0.0
-    """What was allowed, rad."""
+    """Allowed angle, rad."""
     intervals: Count
-    """Number of knot intervals of all curves of these points."""
+    """Number of knot intervals of all curves fitted to these points."""
     corners: tuple[FoundCorner, ...] = ()
     """Corners, in order."""
     told: tuple[str, ...] = ()
-    """What was found out about the data."""
+    """Findings about the data, such as units and repeated rows."""
     doubt: str | None = None
-    """What looks implausible in the data."""
+    """Remark on data that look implausible."""
     profile: tuple[tuple[Number, Number, Number], ...] = ()
-    """Along the path, m: the largest distance, m, and angle, rad, of the points there."""
+    """Rows [distance along the path, m, largest distance, m, and largest angle, rad, of the points there]."""
 
     @property
     def listed_corners(self) -> str:
-        """The first ten corners."""
+        """List of the first ten corners."""
         return name_first([str(corner) for corner in self.corners], ", ", count=10)
 
     def __str__(self) -> str:
-        """Say it in one line, lengths in mm."""
+        """Return the report in one line, with lengths in mm."""
         corners = "no corners"
         if self.corners:
             is_blended = any(corner.blend for corner in self.corners)
@@ -163,5 +163,5 @@ class FitReport(Model):
         return "; ".join([*statements, corners, *self.told])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON, without the profile."""
+        """Return the report as plain data for JSON, without the profile."""
         return self.model_dump(mode="json", exclude={"profile"})

@@ -1,4 +1,4 @@
-"""The scene of a task: bodies around the robot and on it, and how it keeps clear of them; or a file with the bodies."""
+"""The scene of a task: bodies around the robot or carried by it, files of bodies, and the clearance between them."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from brachis.task.settings import Placement
 from brachis.task.yaml_reader import read_yaml
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh", "urdf")
-"""Keys of which a body has exactly one."""
+"""Keys of the shapes, of which a body has exactly one."""
 
 
 class Round(Model):
-    """A cylinder about its z axis, its middle at the origin; of a capsule without the caps."""
+    """A cylinder about its z axis, centred at the origin; also the cylindrical part of a capsule."""
 
     radius: Positive
     """Radius, m."""
     length: Positive
-    """Length, of a capsule without its caps, m."""
+    """Length, for a capsule without its caps, m."""
 
 
 class HalfSpaceShape(Model):
-    """All that is behind a plane."""
+    """The space behind a plane."""
 
     normal: Direction
     """Direction out of the half-space."""
@@ -50,7 +50,7 @@ class HalfSpaceShape(Model):
 
 
 class SceneBody(CheckedModel):
-    """A body that the robot keeps clear of, fixed to the world or to one of the robot's links; it has one shape."""
+    """A body of one shape, fixed to the world or to a link of the robot, that the robot must not touch."""
 
     name: Name | None = None
     """Unique name. Null: its shape and its number."""
@@ -59,12 +59,12 @@ class SceneBody(CheckedModel):
     sphere: Positive | None = None
     """Radius, m."""
     cylinder: Round | None = None
-    """Cylinder about z, its middle at the origin: {radius: ..., length: ...}, m."""
+    """Cylinder about z, centred at the origin: {radius: ..., length: ...}, m."""
     capsule: Round | None = None
-    """Capsule about z: a cylinder of this length with round caps beyond it, m."""
+    """Capsule about z: like the cylinder, with round caps beyond its length, m."""
     half_space: HalfSpaceShape | None = None
-    """All behind a plane: {normal: [x, y, z], offset: 0}; the normal points out, the offset is the distance from the
-    origin along it, m."""
+    """Space behind a plane: {normal: [x, y, z], offset: 0}. The normal points out of it; offset is the distance from
+    the origin along the normal, m."""
     mesh: Name | None = None
     """Mesh file; its convex hull is used."""
     urdf: Name | None = None
@@ -82,12 +82,12 @@ class SceneBody(CheckedModel):
 
     @property
     def shape(self) -> str:
-        """The key of its shape."""
+        """Key of the body's shape."""
         return next(key for key in SHAPES if getattr(self, key) is not None)
 
     @property
     def size(self) -> float:
-        """Largest length that its shape states, m; 0 of a mesh and of a URDF."""
+        """Largest length that the shape states, m; 0 for a mesh or a URDF."""
         shape = getattr(self, self.shape)
         if isinstance(shape, Round):
             return max(shape.radius, shape.length)
@@ -97,7 +97,7 @@ class SceneBody(CheckedModel):
 
     @property
     def placement(self) -> Placement:
-        """Where it is in the world, in its frame, or in the link's frame."""
+        """Placement of the body in the world, in its frame, or in the frame of its link."""
         return Placement(xyz=self.position, rpy_deg=self.rpy_deg)
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -122,7 +122,7 @@ class SceneBody(CheckedModel):
             if any(getattr(self, key)):
                 yield (
                     key,
-                    "a half-space has no other place than its plane",
+                    "a half-space is placed by its plane alone",
                     "normal and offset in half_space",
                 )
 
@@ -133,22 +133,22 @@ class CollisionSettings(Model):
     clearance: NonNegative = 0.01
     """Least distance between bodies, m."""
     mode: Literal["auto", "avoid", "check", "off"] = "auto"
-    """avoid: distances are a limit of the plan, also between the robot's links without a scene. check: only the
-    verification looks at them. off: they are ignored. auto: avoid with a scene, else off."""
+    """avoid: the plan keeps the clearance, without a scene between the robot's own links. check: only the verification
+    checks it. off: distances are ignored. auto: avoid with a scene, else off."""
     self_collision: Flag = True
-    """Whether the robot also keeps clear of itself."""
+    """Whether the clearance also holds between the links of the robot."""
     disable: tuple[tuple[Name, Name], ...] = ()
     """Pairs of links or bodies that may touch."""
     srdf: Name | None = None
-    """SRDF file whose disabled pairs may touch too."""
+    """SRDF file whose disabled pairs may also touch."""
     padding: dict[Name, NonNegative] = Field(default={})
-    """Margin added to the bodies of a link, by link, m."""
+    """Margins added to the bodies of links, by link, m."""
     capsules: Literal["none", "auto"] = "none"
-    """auto: capsules along the links of a robot without collision geometry."""
+    """auto: put capsules along the links of a robot without collision geometry."""
 
 
 def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
-    """Name bodies without a name by their shape and their number, and refuse two bodies of one name."""
+    """Name unnamed bodies by their shape and number, and refuse two bodies with the same name."""
     named = tuple(
         body.model_copy(update={"name": body.name or f"{body.shape} {number}"})
         for number, body in enumerate(scene)
@@ -156,32 +156,34 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     names = [body.name for body in named]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        raise refuse("two bodies have this name", found=twice[0], allowed="each once")
+        raise refuse(
+            "two bodies have this name", found=twice[0], allowed="each name once"
+        )
     return named
 
 
 class SceneSource(Model):
-    """A scene whose bodies are in a file."""
+    """A scene whose bodies are in a file of their own."""
 
     file: Name
     """Scene file, relative to the task file."""
     frame: Name | None = None
-    """Name of the frame of the bodies that state neither frame nor link. Null: the world."""
+    """Name of the frame of all bodies that state neither frame nor link. Null: the world."""
 
 
 class SceneFile(Model):
-    """What a scene file says."""
+    """The content of a scene file."""
 
     brachis_scene: Version
     """Version of the format."""
     bodies: tuple[SceneBody, ...]
-    """Bodies as in scene; files are relative to this file, and frames are those of the task."""
+    """Bodies as in scene. File names are relative to this file, and frames are those of the task."""
 
 
 def with_scene_of_file(
     content: Mapping[str, Any], source: str, folder: Path
 ) -> Mapping[str, Any]:
-    """Return a task as it is written with the bodies of the file that its ``scene`` names.
+    """Return the content of a task with the bodies of the file that its ``scene`` names.
 
     Parameters
     ----------

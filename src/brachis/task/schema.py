@@ -13,9 +13,9 @@ from brachis.task.models import Task
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a task file.
 
-    An editor with the YAML language server completes and checks keys with it, given a first line
-    ``# yaml-language-server: $schema=task.schema.json``. What crosses several keys (an angle only as the last row, no
-    blend on the last segment) is checked by `brachis.task.load_task` alone.
+    An editor with the YAML language server uses it to complete and check keys, if the file begins with
+    ``# yaml-language-server: $schema=task.schema.json``. Conditions on several keys (an angle only as the last row, no
+    blend on the last segment) are checked only by `brachis.task.load_task`.
     """
     schema = Task.model_json_schema(mode="validation")
     known: list[type] = [LimitSpec, *_subclasses(Model)]

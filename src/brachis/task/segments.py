@@ -1,12 +1,13 @@
 """Segments of the prescribed path, as the task file writes them.
 
 A path is a list of mappings, ``- line: {to: [0.5, 0]}``, each with an optional ``blend`` and, in task spaces of poses,
-an optional ``orientation``. A segment begins where its predecessor ends, the first one at the task coordinates of the
-start posture. Lengths are in metres, angles in degrees except yaw, pitch and roll as task coordinates, which are
-in radians. Coordinates are those of all rows of the task space; of a pose they are x, y, z. Whether their
-number fits the task space is for the path to say (`brachis.path.build_path`), which knows both.
+an optional ``orientation``. A segment begins where its predecessor ends, and the first one at the task coordinates of
+the start posture. Lengths are in metres and angles in degrees. Yaw, pitch and roll as task coordinates are in radians.
+Points have the coordinates of all rows of the task space; for a pose these are x, y, z. Whether their number fits the
+task space is checked by `brachis.path.build_path`, which knows both.
 
-A kind of segment is a model here, in the union `Segment`, and the function in `brachis.path` that makes its curve.
+A kind of segment consists of a model in this module, in the union `Segment`, and a function in `brachis.path` that
+makes its curve.
 """
 
 from __future__ import annotations
@@ -53,31 +54,32 @@ JointOrder = Annotated[
     ),
 ]
 SMOOTHNESS = 3
-"""Derivatives that a path must have."""
+"""Number of continuous derivatives that a path must have."""
 
 
 class BSplineCurve(CheckedModel):
-    """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
+    """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` turns a curve into one."""
 
     degree: Annotated[Count, Field(ge=SMOOTHNESS + 1, le=15)] = 5
     """Degree of the spline."""
     knots: Vector
-    """Ascending knots: the first and last one degree + 1 times, others up to degree - 3 times. Blends and speeds are in
-    m only if the knots are in m along the curve."""
+    """Ascending knots: the first and last degree + 1 times, inner ones up to degree - 3 times. Blends and speeds are in
+    m only if the knots are lengths along the curve in m."""
     control_points: Annotated[tuple[Vector, ...], Field(min_length=SMOOTHNESS + 2)]
-    """Points with all task coordinates (m, rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the curve of
-    quaternions is divided by its length."""
+    """Points with all task coordinates (m, rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz, where the curve of the
+    quaternion is normalised."""
     relative: Flag = False
     """Whether the curve is moved to the segment's start."""
     joints: JointOrder = None
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = ()
-    """Tables of the largest tool speed along parts of the curve: pairs [distance, m, speed, m/s], linear in between."""
+    """Tables of the largest tool speed along sections of the curve: pairs [distance (m), speed (m/s)], interpolated
+    linearly."""
     fit: FitReport | None = None
     """Origin of the points; written by brachis."""
 
     @property
     def has_orientations(self) -> bool:
-        """Whether the control points say how the tool turns."""
+        """Whether the control points include orientations of the tool."""
         return len(self.control_points[0]) == 7
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -95,14 +97,14 @@ class BSplineCurve(CheckedModel):
             yield (
                 "control_points",
                 "control points differ in their number of coordinates",
-                "one",
+                "the same number for all",
             )
         ends = (knots[0], knots[-1])
         clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
         if not clamped or list(knots) != sorted(knots):
             yield (
                 "knots",
-                "the B-spline is not clamped",
+                "the B-spline is not clamped, or its knots descend",
                 "ascending knots, the first and the last one degree + 1 times",
             )
         allowed = self.degree - SMOOTHNESS
@@ -114,15 +116,15 @@ class BSplineCurve(CheckedModel):
         if often:
             yield (
                 "knots",
-                f"a knot occurs {max(often)} times, so often that a derivative up to the third jumps",
-                f"{allowed} times at most",
+                f"a knot occurs {max(often)} times, so that a derivative up to the third jumps",
+                f"at most {allowed}",
             )
 
 
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw, pitch or roll along the segment, if it is a row: fixed, or tangent (turning with it)."
+        description="Yaw, pitch or roll along the segment, if it is a row: fixed, or tangent (turns with the tangent)."
     ),
 ]
 Normal = Annotated[
@@ -140,12 +142,12 @@ Coordinates = Annotated[
     Vector,
     BeforeValidator(lambda value: [value] if isinstance(value, int | float) else value),
 ]
-"""A number is the one coordinate that it is."""
+"""A single number stands for a list of one coordinate."""
 
 
 Turns = Annotated[
     Number,
-    must(bool, "a circle without turns has zero length", "a number other than 0"),
+    must(bool, "a circle with zero turns has zero length", "a number other than 0"),
 ]
 
 
@@ -157,22 +159,22 @@ class LineTo(Model):
 
 
 class LineBy(Model):
-    """A straight line by a displacement."""
+    """A straight line given by a displacement."""
 
     by: Coordinates
     """Displacement: all task coordinates (m, angles in rad)."""
 
 
 class LineToPosture(Model):
-    """A straight line to the tool's place in a posture, with its orientation in task spaces of poses."""
+    """A straight line to where the tool is in a named posture; in task spaces of poses also to its orientation."""
 
     to_posture: Name
-    """Name of a posture: the line ends at its tool's place, for poses with its orientation."""
+    """Name of a posture. The line ends at its tool position, for poses also with its orientation."""
     has_orientations: ClassVar[bool] = True
 
 
 class LineHeading(Model):
-    """A straight line of given length and direction, in the plane of two position rows; the angle stays."""
+    """A straight line of given length and direction in the plane of two position rows, along which the angle stays."""
 
     length: NonNegative
     """Length, m."""
@@ -185,16 +187,16 @@ class ArcCenter(Model):
 
     center: Centre
     angle_deg: Number
-    """Swept angle, degrees; positive about the normal, or from the first towards the second position coordinate."""
+    """Swept angle, degrees, positive about the normal or from the first towards the second position coordinate."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
 
 class ArcVia(Model):
-    """A circular arc through a point to another one."""
+    """A circular arc through one point to another."""
 
     via: Vector
-    """Point in between, m: the position coordinates alone."""
+    """Point on the arc, m: the position coordinates alone."""
     to: Vector
     """End point, m: the position coordinates alone."""
     yaw: Yaw = "fixed"
@@ -205,45 +207,45 @@ class CircleTurns(Model):
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, not zero; its sign as that of an arc's angle."""
+    """Number of turns, not zero, with the sign of an arc's angle."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
 
 class HelixTurns(Model):
-    """Turns about an axis that climb along it, in three position rows."""
+    """Turns about an axis, climbing along it, in three position rows."""
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, not zero; positive about the normal."""
+    """Number of turns, not zero, positive about the normal."""
     pitch: Number
-    """Rise of each turn along the normal, m."""
+    """Rise per turn along the normal, m."""
     normal: Direction = (0.0, 0.0, 1.0)
     """Axis of rotation, right-hand rule, of any length."""
 
 
 class SplineThrough(CheckedModel):
-    """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
+    """A smooth curve from the start of the segment through waypoints, of which the first may equal the start."""
 
     through: NonEmpty[Coordinates]
     """Waypoints, each with all task coordinates (m, angles in rad)."""
     orientations: tuple[Attitude, ...] | None = None
-    """Orientation of the tool at each waypoint, for poses. Null: the segment's orientation counts."""
+    """Orientation of the tool at each waypoint, for poses. Null: as the segment's orientation says."""
     relative: Flag = False
-    """Whether waypoints are relative to the segment's start. Displacements are in the path's frame, rotations in the
-    tool frame."""
+    """Whether waypoints are relative to the start of the segment, displacements in the path's frame and rotations in
+    the tool frame."""
     starts_at: Vector | None = None
-    """Expected start of the segment, all task coordinates: refused if more than 1e-4 m or rad away. With relative,
-    waypoints are relative to this point."""
+    """Expected start of the segment, all task coordinates, to within 1e-4 m or rad. With relative, waypoints are
+    relative to this point."""
     starts_oriented: Attitude | None = None
-    """Expected orientation at the start, with orientations."""
+    """Expected orientation at the start; only with orientations."""
     fit: FitReport | None = None
     """Origin of the points; written by brachis."""
     joints: JointOrder = None
 
     @property
     def has_orientations(self) -> bool:
-        """Whether the waypoints say how the tool turns."""
+        """Whether the waypoints have orientations of the tool."""
         return self.orientations is not None
 
     @model_validator(mode="before")
@@ -277,7 +279,7 @@ class SplineThrough(CheckedModel):
 
 
 def are_matrices(values: Any) -> bool:
-    """Tell transforms, rotations and their matrices from coordinates and from what a task file has."""
+    """Return whether values are transforms, rotations or their matrices, not coordinates or content of a task file."""
     first = values[0] if isinstance(values, list) and values else values
     return any(hasattr(first, name) for name in ("homogeneous", "as_matrix")) or (
         isinstance(first, list) and isinstance(first[0] if first else None, list)
@@ -293,14 +295,15 @@ _Start = tuple[tuple[float, ...], Attitude | None]
 
 
 class SegmentModel(CheckedModel):
-    """What all segments share."""
+    """The keys that all segments share."""
 
     blend: Positive | None = None
-    """Rounds the corner at the END of the segment: length cut from it and from the next one, m."""
+    """Rounding of the corner at the END of the segment: length cut from this segment and from the next one, m."""
     stop: Flag = False
-    """Whether all joints are at rest at the end of the segment; the path may have a corner there."""
+    """Whether the tool stops at the end of this segment: all joints are at rest there, and the path may have a corner.
+    """
     dwell: NonNegative = 0.0
-    """Time for which the arm stops at the end of the segment, s."""
+    """Time at rest at the end of the segment, s."""
 
     @model_validator(mode="before")
     @classmethod
@@ -314,7 +317,7 @@ class SegmentModel(CheckedModel):
             yield (
                 "dwell",
                 "the dwell is shorter than a cycle of a robot's controller",
-                "0, or 0.001 s and more",
+                "0, or at least 0.001 s",
             )
         if self.dwell and not self.stop:
             yield "stop", "a dwell needs a stop", "true, or no dwell"
@@ -328,24 +331,24 @@ class SegmentModel(CheckedModel):
     def __add__(
         self, following: SegmentModel | tuple[SegmentModel, ...]
     ) -> tuple[SegmentModel, ...]:
-        """Join a segment, or a path, to the end of this segment."""
+        """Append a segment or a path to this segment."""
         if isinstance(following, SegmentModel):
             return (self, following)
         return (self, *following) if isinstance(following, tuple) else NotImplemented
 
     def __radd__(self, path: tuple[SegmentModel, ...]) -> tuple[SegmentModel, ...]:
-        """Join this segment to the end of a path."""
+        """Append this segment to a path."""
         return (*path, self) if isinstance(path, tuple) else NotImplemented
 
     def __repr__(self) -> str:
-        """Show it as a program makes it."""
+        """Return the call by which a program makes the segment."""
         arguments = show_arguments(self.shape) + show_arguments(self, self.kind)
         name = type(self).__name__.removesuffix("Segment")
         return f"{name}({', '.join(arguments)})"
 
     @property
     def start(self) -> _Start | None:
-        """Coordinates at which the segment says that it begins, and the tool's orientation; None where that is open."""
+        """Coordinates and tool orientation at which the segment states that it starts; None if it states none."""
         return None
 
     @property
@@ -355,19 +358,19 @@ class SegmentModel(CheckedModel):
 
     @property
     def shape(self) -> Any:
-        """What stands below the key that names the segment: a `LineTo`, an `ArcCenter`, ..."""
+        """The value of the key that names the segment: a `LineTo`, an `ArcCenter`, ..."""
         return getattr(self, self.kind)
 
 
 class MovingSegment(SegmentModel):
-    """What all segments share along which the position moves."""
+    """The keys shared by all segments along which the position moves."""
 
     orientation: OrientationMode = None
-    """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
-    Null: as a spline's orientations or the posture say, else fixed."""
+    """Turning of the tool along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
+    Null: as a spline's orientations or the posture say, otherwise fixed."""
     speed: Positive | None = None
-    """Process speed: constant speed of the tool along the segment except its blends, m/s, as tool_limits.process_speed.
-    It replaces feed rates of points."""
+    """Process speed: constant speed of the tool along the segment except its blends, m/s, as in
+    tool_limits.process_speed. It replaces feed rates of points."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()
@@ -381,7 +384,7 @@ class MovingSegment(SegmentModel):
 
 
 class LineSegment(MovingSegment):
-    """A straight line: `to` a point, `by` a displacement, of a `length` in a direction, or to a named posture."""
+    """A straight line `to` a point, `by` a displacement, of a `length` in a direction, or to a named posture."""
 
     line: LineForm
 
@@ -402,7 +405,7 @@ class LineSegment(MovingSegment):
 
 
 class ArcSegment(MovingSegment):
-    """A circular arc: about a `center` by an angle, or `via` a point `to` another one."""
+    """A circular arc about a `center` by an angle, or `via` one point `to` another."""
 
     arc: ArcForm
 
@@ -414,19 +417,19 @@ class CircleSegment(MovingSegment):
 
 
 class HelixSegment(MovingSegment):
-    """Turns about an axis that climb along it, in three position rows."""
+    """Turns about an axis, climbing along it, in three position rows."""
 
     helix: HelixTurns
 
 
 class SplineSegment(MovingSegment):
-    """A smooth curve through waypoints, from the end of the segment before it or the path's start."""
+    """A smooth curve through waypoints, from the end of the previous segment or the start of the path."""
 
     spline: SplineThrough
 
     @property
     def start(self) -> _Start | None:
-        """`starts_at`, or else the first waypoint; None where the waypoints are relative."""
+        """`starts_at`, or else the first waypoint; None if the waypoints are relative."""
         spline = self.spline
         if spline.relative:
             return None
@@ -449,7 +452,7 @@ class BSplineSegment(MovingSegment):
 
     @property
     def start(self) -> _Start | None:
-        """The first control point; None where the curve is relative."""
+        """The first control point; None if the curve is relative."""
         if self.bspline.relative:
             return None
         first = self.bspline.control_points[0]

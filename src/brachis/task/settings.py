@@ -1,4 +1,4 @@
-"""The settings of a task: the robot, with its friction, payload and mounting, and how to plan."""
+"""The settings of a task: the robot with its friction, payload and mounting, and the settings of the planner."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class Placement(Model):
-    """Where a frame is in another one."""
+    """The placement of a frame in another one."""
 
     xyz: Vector3 = (0.0, 0.0, 0.0)
     """Position of the origin, m."""
@@ -44,7 +44,7 @@ class Placement(Model):
     @model_validator(mode="before")
     @classmethod
     def _of_transform(cls, content: object) -> object:
-        """Take a transform such as Pinocchio's SE3 too."""
+        """Accept a transform such as Pinocchio's SE3."""
         if not hasattr(content, "homogeneous"):
             return content
         from pinocchio import rpy
@@ -55,21 +55,21 @@ class Placement(Model):
 
     @property
     def transform(self) -> SE3:
-        """The placement as Pinocchio's transform."""
+        """The placement as a Pinocchio transform."""
         from pinocchio import SE3, rpy
 
         return SE3(rpy.rpyToMatrix(*np.radians(self.rpy_deg)), np.array(self.xyz))
 
 
 class FramePlacement(Placement):
-    """Where a frame is in the world, or in another frame."""
+    """The placement of a frame in the world or in another frame."""
 
     frame: Name | None = None
     """Name of the frame in which it is placed. Null: the world."""
 
 
 def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Placement:
-    """Return where a frame is in the world, through all frames in which it is placed; None is the world."""
+    """Return the placement of a frame in the world, through all frames in which it is placed; None is the world."""
     if name is None:
         return Placement()
     placed = frames[name]
@@ -85,7 +85,7 @@ def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Place
 def check_frames(
     frames: Mapping[str, FramePlacement], uses: Mapping[str, str | None]
 ) -> None:
-    """Refuse names of frames, by the keys that use them, that are not defined, and frames that are in themselves.
+    """Refuse frames that are placed in themselves, and names of undefined frames; `uses` has the names by their keys.
 
     Raises
     ------
@@ -124,14 +124,14 @@ class InertiaMatrix(Model):
 
 
 class Payload(Model):
-    """A rigid body that is held to the tool frame."""
+    """A rigid body fixed to the tool frame."""
 
     mass: Positive
     """Mass, kg."""
     com: Vector3 = (0.0, 0.0, 0.0)
     """Centre of mass in the tool frame of the URDF, m."""
     inertia: InertiaMatrix | None = None
-    """Inertia about the centre of mass, in the tool frame's axes. Null: a point mass."""
+    """Inertia about the centre of mass, in the axes of the tool frame. Null: a point mass."""
 
 
 _WORDS: Final = {
@@ -139,16 +139,16 @@ _WORDS: Final = {
     "wall": (0.0, 90.0, 0.0),
     "ceiling": (180.0, 0.0, 0.0),
 }
-"""Roll, pitch and yaw of the usual mountings, degrees."""
+"""Roll, pitch and yaw of the named mountings, degrees."""
 
 
 def _expand_word(mounting: object) -> object:
-    """Read a word as a placement."""
+    """Return the placement for a word such as ``wall``."""
     if not isinstance(mounting, str):
         return mounting
     if mounting not in _WORDS:
         raise refuse(
-            "no mounting",
+            "this is not a mounting",
             found=mounting,
             allowed=f"{', '.join(_WORDS)}, or a mapping {{xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}}",
         )
@@ -167,13 +167,13 @@ Mounting = Annotated[
 PerJoint = Annotated[
     AnyNonNegative | NonEmpty[AnyNonNegative] | dict[Name, AnyNonNegative],
     ByForm(
-        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"
+        "a number >= 0 for all joints, a list of numbers, or a mapping of joint names to numbers"
     ),
 ]
 PerJointPositive = Annotated[
     Positive | NonEmpty[Positive] | dict[Name, Positive],
     ByForm(
-        "a number > 0 for all joints, a list of numbers, a mapping of joint name to number"
+        "a number > 0 for all joints, a list of numbers, or a mapping of joint names to numbers"
     ),
 ]
 UrdfFriction = Annotated[
@@ -183,51 +183,51 @@ UrdfFriction = Annotated[
     | dict[Name, AnyNonNegative]
     | None,
     ByForm(
-        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number, null (none), "
-        "urdf (as in the URDF)"
+        "a number >= 0 for all joints, a list of numbers, a mapping of joint names to numbers, null (none), "
+        "or urdf (as in the URDF)"
     ),
 ]
 
 
 class FrictionSettings(Model):
-    """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
+    """Drive inertia and friction at the joints: numbers for all joints, lists, or mappings by joint name."""
 
     armature: UrdfFriction = FROM_URDF
-    """Inertia of the drive as seen at the joint, kg m^2 (kg). Absent: that of an MJCF file or Pinocchio model."""
+    """Inertia of the drive as seen at the joint, kg m^2 (kg). Absent: the value of an MJCF file or Pinocchio model."""
     rotor_inertia: PerJoint = 0.0
-    """Inertia of the rotor about its axis, kg m^2, in place of armature = rotor_inertia * gear_ratio^2."""
+    """Inertia of the rotor about its axis, kg m^2; armature is then rotor_inertia * gear_ratio^2."""
     gear_ratio: PerJointPositive | None = None
-    """Turns of the rotor per turn of the joint (rad per m)."""
+    """Turns of the rotor per turn of the joint (prismatic: rad per m)."""
     viscous: UrdfFriction = FROM_URDF
-    """Viscous friction, N m s/rad (N s/m). Absent: damping of the URDF."""
+    """Viscous friction, N m s/rad (N s/m). Absent: the damping of the URDF."""
     coulomb: UrdfFriction = FROM_URDF
-    """Coulomb friction, N m (N). Absent: friction of the URDF."""
+    """Coulomb friction, N m (N). Absent: the friction of the URDF."""
     coulomb_velocity: PerJointPositive = 0.01
-    """Speed at which Coulomb friction reaches tanh 1 = 76 % of its value, rad/s (m/s)."""
+    """Speed at which Coulomb friction reaches 76 % (tanh 1) of its full value, rad/s (m/s)."""
 
 
 class RobotSettings(Model):
-    """The robot: its URDF and what the task adds to it."""
+    """The robot: its URDF, and the settings that the task adds."""
 
     urdf: Name | None = None
-    """URDF or MJCF file, or the name of an included robot. Required in a task file."""
+    """URDF or MJCF file, or name of an included robot. Required in a task file."""
     tool_frame: Name | None = None
     """Frame that follows the path. Null: the only leaf link."""
     tool_offset: Placement = Field(default_factory=Placement)
-    """Place of the frame that follows the path in the URDF's tool frame: {xyz: ..., rpy_deg: ...}."""
+    """Placement, in the URDF's tool frame, of the frame that follows the path: {xyz: ..., rpy_deg: ...}."""
     base_frame: Name | None = None
     """First frame of the chain. Null: the root of the URDF."""
     mounting: Mounting = Field(default_factory=Placement)
-    """Place of the URDF's root link in the world: floor, wall (z along the world's x axis), ceiling (upside down,
-    turned about x), or {xyz: ..., rpy_deg: ...}."""
+    """Placement of the root link of the URDF in the world: floor, wall (z along the world's x axis), ceiling (upside
+    down, turned about x), or {xyz: ..., rpy_deg: ...}."""
     gravity: tuple[Number, Number, Number] = (0.0, 0.0, -9.81)
     """Gravity [x, y, z] in the world frame, m/s^2."""
     locked_joints: dict[Name, Number] = Field(default={})
-    """Positions of joints that do not move, by name, rad (m). Joints that mimic them follow."""
+    """Positions of joints that do not move, by name, rad (m). Joints that mimic them take the matching positions."""
     payload: Payload | None = None
     """Rigid body fixed to the tool frame: {mass: ..., com: ..., inertia: ...}."""
     limits_file: Name | None = None
-    """File of joint limits, such as MoveIt's joint_limits.yaml; see below."""
+    """File of joint limits, such as MoveIt's joint_limits.yaml."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Share = Field(default=1.0, gt=0.0, le=1.0)
@@ -248,26 +248,27 @@ class SplineSettings(CheckedModel):
     """The B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(default=3, ge=2, le=7)
-    """Degree of the splines: 3 for continuous torque, 4 for a continuous torque rate."""
+    """Degree of the splines: 3 for a continuous torque, 4 for a continuous torque rate."""
     intervals: Intervals = "auto"
-    """Knot intervals of every phase. auto: the fastest timing of the best joint path, with knots where it needs them;
-    with limits on jerk, torque rate or means it halves the intervals that lose most time, until two rounds gain less
-    than half the tolerance. A number (required by knots: free) makes planning faster and the motion slower."""
+    """Number of knot intervals of every phase. auto: the fastest timing of the best joint path, with knots where it
+    needs them; with limits on jerk, torque rate or means it halves the intervals that cost most time until two rounds
+    gain less than half the tolerance. A number (required by knots: free) makes planning faster and the motion slower.
+    """
     tolerance: Share = Field(default=1.0e-3, gt=0.0, le=0.1)
-    """With intervals: auto, accepted loss of end time against very many intervals: 0.1 % or 0.001."""
+    """With intervals: auto, accepted loss of end time compared with very many intervals: 0.1 % or 0.001."""
     knots: Literal["uniform", "free"] = "uniform"
     """uniform: intervals of equal length. free: their lengths are optimised."""
     shortest_interval: Share = Field(default=0.1, gt=0.0, lt=1.0)
-    """With knots: free, the shortest interval over the mean one; never below 5e-5 of the end time."""
+    """With knots: free, the shortest interval relative to the mean; never below 5e-5 of the end time."""
     rest: Literal["velocity", "full", "jerk"] = "full"
-    """What is zero at both ends and at stops. velocity: the velocity. full: also the acceleration. jerk: also jerk and
-    torque rate; needs degree >= 4."""
+    """Derivatives that are zero at both ends and at stops. velocity: the velocity. full: also the acceleration. jerk:
+    also jerk and torque rate; needs degree >= 4."""
     points_per_interval: Count = Field(default=3, ge=1, le=100)
-    """Collocation points per knot interval."""
+    """Number of collocation points per knot interval."""
 
     @property
     def vanishing(self) -> int:
-        """How many derivatives of the joint positions vanish at both ends and at stops."""
+        """Number of derivatives of the joint positions that vanish at both ends and at stops."""
         return _VANISHING[self.rest]
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -282,7 +283,7 @@ class SplineSettings(CheckedModel):
         if self.knots == "free" and self.intervals == "auto":
             yield (
                 "intervals",
-                "knots: free needs a number of intervals; auto is the default",
+                "knots: free needs a number of intervals, and the default is auto",
                 "a number such as 12, or knots: uniform",
             )
 
@@ -297,23 +298,23 @@ class SearchSettings(CheckedModel):
     """The search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
-    """How far the search goes: single (one plan, from the best guess; like fast if that fails), fast, thorough,
-    exhaustive (ever more guesses)."""
+    """Extent of the search, with ever more guesses: single (one plan from the best guess; like fast if that fails),
+    fast, thorough, exhaustive."""
     guesses: Literal["lattice", "numeric"] = "lattice"
-    """Source of the initial guesses: lattice (of postures), or numeric (inverse kinematics from the start)."""
+    """Source of the initial guesses: lattice (of postures) or numeric (inverse kinematics from the start posture)."""
     jobs: Jobs = 1
-    """Processes that plan at the same time, no more than processors. auto: all processors, if the remaining work takes
-    more than 3 s, or 0.7 s if they run already. The answer does not depend on it, unless the time runs out."""
+    """Number of processes that plan at the same time, at most that of processors. auto: all processors if the remaining
+    work takes more than 3 s, or 0.7 s if they run already. The result does not depend on it, unless the time runs out.
+    """
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time limit of the whole plan, s. The best verified motion is returned, or else an unverified one up to 2 s
-    later."""
+    """Time limit of the whole plan, s. The best verified motion is returned, or an unverified one up to 2 s later."""
     seed: Count = Field(default=0, ge=0)
     """Seed of the random numbers."""
     least_motion: Flag = True
-    """Whether the smoothest motion (least joint accelerations) within 1e-4 of the fastest end time is chosen. With more
-    than 200 variables, as intervals: auto often has, only if slower is set."""
+    """Whether to choose the smoothest motion (least joint accelerations) within 1e-4 of the fastest end time. With more
+    than 200 variables, as intervals: auto often has, this needs slower."""
     slower: Share = Field(default=0.0, ge=0.0, le=1.0)
-    """How much slower the smoothest motion may be: 1 % or 0.01."""
+    """Fraction by which the smoothest motion may be slower: 1 % or 0.01."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         if self.slower and not self.least_motion:
@@ -325,10 +326,10 @@ class SearchSettings(CheckedModel):
 
 
 class SolverSettings(Model):
-    """The solver of the optimisation problem and its bounds."""
+    """The solver of the optimisation problem and its settings."""
 
     name: Name = "auto"
-    """auto (begins with uno), uno, uno_interior, or ipopt if ipyopt is installed."""
+    """auto (starts with uno), uno, uno_interior, or ipopt if ipyopt is installed."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
     time_limit: Positive = Field(default=60.0, le=1e6)
@@ -338,34 +339,35 @@ class SolverSettings(Model):
 
 
 class RefinementSettings(Model):
-    """Adding collocation points until the limits hold in between them as well."""
+    """Adding collocation points until the limits are also met between them."""
 
     tolerance: Share = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
-    """Largest accepted violation of a limit at any time, relative to the limit; of a position in rad (m), or relative
-    to half its range if that is below 1 rad (m). The checks do not resolve less than 1e-5."""
+    """Largest accepted violation of a limit at any time, relative to the limit. For a position it is in rad (m), or
+    relative to half its range if that is below 1 rad (m). The checks do not resolve less than 1e-5."""
     density: Count = Field(default=10, ge=10, le=1000)
-    """Points per collocation point at which limits are checked."""
+    """Number of points, per collocation point, at which limits are checked."""
     max_rounds: Count = Field(default=10, ge=0, le=1000)
-    """Maximum number of rounds; 0: no refinement."""
+    """Maximum number of rounds. 0: no refinement."""
 
 
 def expand_solver_name(solver: object) -> object:
-    """Read ``solver: ipopt`` as the solver's name."""
+    """Return the mapping for a solver that is given by its name alone, ``solver: ipopt``."""
     return {"name": solver} if isinstance(solver, str) else solver
 
 
 class BoundarySettings(CheckedModel):
-    """Speeds at both ends of the path, or a motion that goes round for ever."""
+    """Speeds at both ends of the path, or a motion that repeats without end."""
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
-    """Speed along the path at its start, m/s; rad/s if the tool only turns there; for a path of joints, the norm of
-    their velocities. If it is not zero, velocities of redundant joints are free there, and with spline.rest: full the
-    speed is constant at that instant."""
+    """Speed along the path at its start, m/s (rad/s if the tool only turns there; for a path of joints the norm of
+    their velocities). If it is not zero, velocities of redundant joints are free there, and with spline.rest: full the
+    speed does not change at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
-    """The same at the path's end."""
+    """The same at the end."""
     periodic: Flag = False
-    """Whether a closed path is repeated without stopping: it ends with the posture (except for whole turns of joints
-    without a range), velocity and acceleration of its start. With spline.degree: 2 the acceleration jumps there."""
+    """Whether a closed path is repeated without stopping. It then ends with the posture (except for whole turns of
+    joints without a range), velocity and acceleration of its start. With spline.degree: 2 the acceleration jumps
+    there."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for key in ("start_speed", "end_speed"):
@@ -378,5 +380,5 @@ class BoundarySettings(CheckedModel):
 
     @property
     def in_motion(self) -> bool:
-        """Whether an end is passed in motion."""
+        """Whether the robot moves at an end of the path."""
         return self.periodic or self.start_speed > 0.0 or self.end_speed > 0.0

@@ -1,4 +1,4 @@
-"""What a path prescribes, the tolerances within which the tool may leave it, and margins that the arm keeps."""
+"""The rows that a path prescribes, the tolerances within which the tool may leave it, and the margins of the arm."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from brachis.task.fields import (
 
 Row = Literal["x", "y", "z", "roll", "pitch", "yaw", "axis"]
 _SPACE_FORMS = (
-    "a list of rows out of x, y, z and one of roll, pitch, yaw, axis; "
-    "or one of position, pose, pose_free_roll, axis, joints"
+    "a list of some of x, y, z, then at most one of roll, pitch, yaw, axis; "
+    "or one of the words position, pose, pose_free_roll, axis, joints"
 )
 
 EACH_ONCE = must(
@@ -39,7 +39,7 @@ _ANGLE_LAST = must(
 
 
 def _name_space(space: str | tuple[str, ...]) -> str | tuple[str, ...]:
-    """Give a task space one name, so that equal ones compare equal."""
+    """Return the one name of a task space, so that equal task spaces compare equal."""
     if space == (*POSITION, "axis"):
         return "pose_free_roll"
     return {"position": POSITION, "axis": ("axis",)}.get(str(space), space)
@@ -60,10 +60,10 @@ _FARTHEST = 10.0
 
 
 def _range_within(largest: float) -> AfterValidator:
-    """Return what reads a number a as [-a, a], and refuses ranges that are empty or end farther from zero."""
+    """Return a validator that reads a number a as [-a, a], and refuses empty ranges and ends farther from zero."""
 
     def read(value: _Given) -> _Given:
-        """Read one range."""
+        """Return one range as a pair."""
         if value is None or value == "free":
             return value
         low, high = value if isinstance(value, tuple) else (-value, value)
@@ -91,7 +91,7 @@ _Distance = Annotated[_Ends, _range_within(_FARTHEST)]
 def _ranges_outside(
     model: Model, largest: str, ranges: Iterable[str]
 ) -> Iterator[Mistake]:
-    """Yield the ranges that lie outside the cone or sphere beside them."""
+    """Yield the ranges that lie outside the cone or sphere of the same model."""
     reach = getattr(model, largest)
     for key in ranges:
         ends = getattr(model, key)
@@ -99,18 +99,19 @@ def _ranges_outside(
             yield (
                 key,
                 f"the range lies outside {largest}: {reach:g}",
-                f"a range of which a part is within {reach:g} of zero",
+                f"a range that reaches to within {reach:g} of zero",
             )
 
 
 class OrientationTolerance(CheckedModel):
-    """How far the tool may turn away from the orientation of the path, about the axes of the tool frame."""
+    """Ranges in which the tool may turn away from the orientation of the path, about the axes of the tool frame."""
 
     tilt: Annotated[Positive, Field(le=80.0)] | None = None
-    """Largest angle between the tool's z axis and that of the path, degrees: a cone. Null: as lead and side say."""
+    """Largest angle between the tool's z axis and that of the path, degrees: a cone. Null: only lead and side count."""
     lead: _Lean = None
     """Angle by which the z axis leans towards the x axis of the path's orientation, degrees: a number for both sides,
-    or [low, high]. Where x points along the path and z out of the torch, it is the torch's lead, negative its lag."""
+    or [low, high]. If x points along the path and z out of the torch, positive angles are lead and negative ones lag.
+    """
     side: _Lean = None
     """Angle by which the z axis leans towards the y axis of the path's orientation, degrees."""
     roll: _Roll = None
@@ -121,19 +122,19 @@ class OrientationTolerance(CheckedModel):
 
 
 class PositionTolerance(CheckedModel):
-    """How far the tool may be from the position that the path states."""
+    """Ranges in which the tool may leave the position of the path."""
 
     sphere: Annotated[Positive, Field(le=_FARTHEST)] | None = None
     """Largest distance, m."""
     x: _Distance = None
     """Displacement along x, m: a number for both sides, or [low, high]. With task_space: position the path has no
-    orientation, and the axes are the tool's own."""
+    orientation, and the axes are those of the tool itself."""
     y: _Distance = None
     """Displacement along y, m."""
     z: _Distance = None
     """Displacement along z, m."""
     axes: Literal["tool", "world"] = "tool"
-    """Axes of x, y and z: those of the path's orientation, or those of the world."""
+    """Frame of x, y and z: the orientation of the path (tool) or the world."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         axes = [axis for axis in POSITION if getattr(self, axis) is not None]
@@ -141,8 +142,8 @@ class PositionTolerance(CheckedModel):
         if self.axes == "world" and len(axes) < len(POSITION):
             yield (
                 "axes",
-                "a box along the world's axes needs all three lengths",
-                f"x, y and z with it (there is {' and '.join(axes) or 'none'}), or axes: tool",
+                "a box along the world's axes needs all three ranges",
+                f"x, y and z together (given: {' and '.join(axes) or 'none'}), or axes: tool",
             )
 
 
@@ -156,10 +157,10 @@ class Tolerances(Model):
 
 
 class Margins(Model):
-    """Margins that the motion keeps; their smallest values are reported in any case."""
+    """Margins that the motion keeps. The smallest ones of a motion are reported in any case."""
 
     singularity: Positive | None = None
-    """Least singular value of the Jacobian of the task space's rows by the arm's own joints (m and rad, per rad and m);
-    tolerances and a free roll do not count. Null: none."""
+    """Least allowed singular value of the Jacobian of the task space's rows with respect to the arm's own joints (m and
+    rad per rad and m), without tolerances and free roll. Null: none."""
     joint_ends: Annotated[Positive, Field(lt=0.5)] | None = None
-    """Part of each joint's range that is kept free at both ends, such as 0.05. Null: none."""
+    """Fraction of each joint's range to keep free at either end, such as 0.05. Null: none."""

@@ -35,11 +35,11 @@ _UNITS = {
     }.items()
     for name in names.split()
 }
-"""Units by the last two names of a key; in brackets that of prismatic joints."""
+"""Units by the last two names of a key; the unit of prismatic joints is in brackets."""
 
 
 def unit_of(key: str) -> str:
-    """Return the unit of a dotted key of a task, or of a joint's or row's entry in it; empty where it has none.
+    """Return the unit of a dotted key of a task, or of a joint's or row's entry in it; empty if it has none.
 
     Examples
     --------

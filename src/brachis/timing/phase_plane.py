@@ -8,16 +8,15 @@ Every limit on velocities, accelerations and torques becomes a row in (u, x) mid
 
     lower <= a u + b x + c <= upper,        a = v_a q_dp,   b = v_a q_ddp + v_v q_dp / (2 sqrt(x)),
 
-where v_v and v_a are the partial derivatives of its value with respect to qdot and qddot. For torques of rigid bodies
-and for accelerations the rows are exact. Friction, torque that falls with speed, power and the magnitude of the tool's
-acceleration are linearised at the last timing. This is repeated until the rows agree with the values. A limit that does
-not depend on acceleration bounds only x.
+where v_v and v_a are the partial derivatives of its value with respect to qdot and qddot. For rigid-body torques and
+for accelerations the rows are exact. Friction, torque that falls with speed, power and the tool's acceleration are
+linearised at the last timing, until rows and values agree. A limit without acceleration bounds only x.
 
 Between two stations u is constant and x is linear in p, and the rows are met midway between them. A backward pass from
-the end finds, at each station, the interval of x from which the next station's interval can be reached. A forward pass
-then takes the largest u (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
+the end finds, at each station, the interval of x from which the next one can be reached. A forward pass then takes the
+largest u (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
 
-Limits on the third derivative and on means have no such rows and are left out. The time is then a lower bound.
+Limits on the third derivative and on means have no such rows and are left out: the time is then a lower bound.
 """
 
 from __future__ import annotations
@@ -45,8 +44,7 @@ _STOPPED = 1e-6
 _ROUNDS = 20
 """Maximum number of linearisations."""
 _EXACT = 1e-9
-"""Largest difference between rows and values, as a fraction of the limit, that is due to rounding. Such rows are
-kept."""
+"""Largest difference between rows and values, as a fraction of the limit, that is due to rounding."""
 _LOOKS_AT_END = 4
 """Maximum number of linearisations for the largest rate at an end."""
 _CREDIBLE = 1e-2
@@ -435,7 +433,6 @@ class PhasePlane:
         self._linearise(Passage(self._middles, rate, acceleration))
         factors = self._factors(rate, acceleration)
         least = factors.min(axis=1)
-        # Take the first of several equal places.
         number = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
         column = int(np.argmin(factors[number]))
         place = float(self.path.s[number])

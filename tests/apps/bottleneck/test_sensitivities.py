@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.explain import (
-    ActiveSet,
-    Multipliers,
-    multipliers_of,
-    sensitivities_at,
-)
-from brachis.optimise.backends import SolverOptions, solvers_for
+from brachis.explain import ActiveSet, Multipliers, multipliers_of, sensitivities_at
 from support.effort import QUICK
 from support.slides import X, Z
+from support.solvers import solve
 
 from .conftest import FORCE, LENGTH, MASS
 
@@ -67,13 +62,17 @@ def test_lifting_against_gravity(slide):
     assert found.of("j2", "force").label.unit == "N"
 
 
+def slide_in_range(slide, lower, upper):
+    """A motion of two slides along one line, of which the first has a range."""
+    limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
+    robot = {"limits": limits}
+    return slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot=robot)
+
+
 def test_ends_of_a_range(slide):
     """Two slides along one line; the lower one recoils within a narrow range, which costs time."""
     half = 0.02
-    limits = {"torque": {"j1": 30.0}, "position": {"j1": [-half, half]}}
-    result = slide(
-        (X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}
-    )
+    result = slide_in_range(slide, -half, half)
     lower, upper = (
         result.sensitivities.of("j1", "position", end) for end in ("lower", "upper")
     )
@@ -89,9 +88,8 @@ def test_no_limit_costs_less_than_nothing(scara, joint):
     assert all(entry.change(1.0) <= 0.0 for entry in found.limits)
     # Torque limits and nothing else: were all torques f times as large, the time would fall with the root of f.
     expected = -0.5 * scara(joint).solver_report.objective
-    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(
-        expected, rel=2e-3
-    )
+    together = sum(entry.change(1.0) for entry in found.limits)
+    assert together == pytest.approx(expected, rel=2e-3)
 
 
 def test_of_a_timed_motion_the_solver_s_multipliers_count(scara):
@@ -136,18 +134,13 @@ def test_limits_along_a_given_joint_path_cost_what_planning_again_saves():
 @pytest.mark.parametrize("end", [1, -1])
 def test_rows_that_nothing_can_change_do_not_press(slide, end):
     # The first slide begins at an end of its range, which holds whatever x.
-    lower, upper = sorted((0.0, end * 0.5))
-    limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
-    refined = slide(
-        (X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}
-    ).candidate.refined
+    refined = slide_in_range(slide, *sorted((0.0, end * 0.5))).candidate.refined
     program, x = refined.program, refined.reports[-1].x
     active_set = ActiveSet.at(program, x, 1e-5)
     assert np.abs(active_set.slopes).max(axis=1).min() > 0.0
-    at_start = np.flatnonzero(
-        np.minimum(program.rows(x) - program.lower, program.upper - program.rows(x))
-        == 0.0
-    )
+    rows = program.rows(x)
+    room = np.minimum(rows - program.lower, program.upper - rows)
+    at_start = np.flatnonzero(room == 0.0)
     assert set(at_start) - set(active_set.rows), "some row should hold without pressing"
 
 
@@ -188,16 +181,13 @@ def test_branch_boundary_is_told_apart(scara):
     refined = scara("j3").candidate.refined
     program, report = refined.program, refined.reports[-1]
     tight = program.with_margin(0.2)
-    answer = solvers_for("uno")[0].solve(tight, report.x, SolverOptions(), None)
+    answer = solve(tight, report.x)
     assert answer.objective > report.objective + 1e-4
     costs = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
     (boundary,) = costs.boundaries
-    wider = solvers_for("uno")[0].solve(
-        program.with_margin(0.198), answer.x, SolverOptions(), None
-    )
-    assert boundary.derivative * 0.002 == pytest.approx(
-        answer.objective - wider.objective, rel=0.1
-    )
+    wider = solve(program.with_margin(0.198), answer.x)
+    saved = answer.objective - wider.objective
+    assert boundary.derivative * 0.002 == pytest.approx(saved, rel=0.1)
     kinds = {"torque", "velocity", "acceleration", "position"}
     assert {entry.label.kind for entry in costs.limits} <= kinds
 

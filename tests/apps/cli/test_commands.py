@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 import brachis
 from brachis import __version__, planner
@@ -18,6 +19,7 @@ from brachis.errors import InputError
 from brachis.search import pipeline, verified
 from brachis.search.stages import describe_coordinates
 from brachis.trajectory import Trajectory
+from support.scripts import output_of
 
 from .conftest import ROOT, SCARA
 
@@ -98,10 +100,8 @@ def test_without_matplotlib_the_result_is_written_and_the_figures_are_not(
 ):
     figure_class.cache_clear()
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    assert (
-        "its figures are not: a figure needs Matplotlib"
-        in run(f"plan {write(task)} --out {tmp_path / 'out'}").err
-    )
+    told = run(f"plan {write(task)} --out {tmp_path / 'out'}").err
+    assert "its figures are not: a figure needs Matplotlib" in told
     assert names_in(tmp_path / "out") == RESULT
 
 
@@ -169,9 +169,8 @@ def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
     honest = verified.verify_trajectory
 
     def endless(trajectory, **more):
-        return replace(
-            honest(trajectory, **more), worst_ratio=math.inf, path_error=math.nan
-        )
+        verification = honest(trajectory, **more)
+        return replace(verification, worst_ratio=math.inf, path_error=math.nan)
 
     monkeypatch.setattr(verified, "verify_trajectory", endless)
     outcome = run(f"plan {write(task)} --out {tmp_path / 'out'} --json")
@@ -198,20 +197,17 @@ def test_a_plan_says_by_how_much_its_end_time_is_longer(
     assert ("end time lengthened by" in text, words in text) == (is_said, is_said)
 
 
-CHOICES = {
-    "in charts": ({"search": {"effort": "fast"}}, {()}, "chart"),
-    "of every choice": (
-        {"search": {"guesses": "numeric", "least_motion": False}},
-        {("j1",), ("j2",), ("j3",)},
-        "j2",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", CHOICES)
-def test_a_plan_lists_its_candidates(run, task, write, case):
-    settings, choices, name = CHOICES[case]
-    path = write({**task, "redundant_joints": "auto", **settings})
+@pytest.mark.parametrize(
+    ("search", "choices", "name"),
+    [
+        ("effort: fast", {()}, "chart"),
+        ("{guesses: numeric, least_motion: false}", {("j1",), ("j2",), ("j3",)}, "j2"),
+    ],
+    ids=["in charts", "of every choice"],
+)
+def test_a_plan_lists_its_candidates(run, task, write, search, choices, name):
+    settings = {"redundant_joints": "auto", "search": yaml.safe_load(search)}
+    path = write(task | settings)
     text = run(f"plan {path}").out
     data = run(f"plan {path} --json").data
     candidates = data["candidates"]
@@ -277,10 +273,7 @@ def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
 
 def test_help_loads_neither_pinocchio_nor_numpy():
     code = "import sys, brachis.apps.cli.main\nprint(sorted({'pinocchio', 'numpy', 'scipy'} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "[]"
+    assert output_of("-c", code).strip() == "[]"
 
 
 def test_verify_against_a_weaker_robot_fails(run, task, write, tmp_path):
@@ -333,13 +326,13 @@ def test_inspect_says_where_every_limit_holds(run, task, write):
 
 
 def test_inspect_of_a_task_shows_what_is_in_use(run, error_of, task, write):
-    task["robot"] |= {
-        "limits": {"torque": {"j1": [-5, 7]}, "acceleration": {"j2": 30}},
-        "friction": {"viscous": {"j3": 0.25}, "rotor_inertia": 1e-4, "gear_ratio": 100},
-        "payload": {"mass": 2.5},
-        "mounting": "ceiling",
-        "speed_override": "50 %",
-    }
+    task["robot"] |= yaml.safe_load("""
+    limits: {torque: {j1: [-5, 7]}, acceleration: {j2: 30}}
+    friction: {viscous: {j3: 0.25}, rotor_inertia: 0.0001, gear_ratio: 100}
+    payload: {mass: 2.5}
+    mounting: ceiling
+    speed_override: 50 %
+    """)
     path = write(task)
     data = run(f"inspect {path} --json").data
     keys = ("acceleration", "torque", "mass", "viscous", "coulomb", "armature")

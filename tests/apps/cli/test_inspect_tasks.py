@@ -16,15 +16,14 @@ FLOOR = {"name": "floor", "half_space": {"normal": [0, 0, 1], "offset": 0.2}}
 
 
 def written(tmp_path, **keys):
-    content = {
-        "brachis": 1,
-        "robot": {"urdf": "iiwa14"},
-        "postures": {"home": HOME},
-        "frames": {"user1": USER},
-        "start": "home",
-        "task_space": "pose",
-        "path": [{"line": {"by": [0.0, 0.1, 0.0]}}],
-    }
+    content = yaml.safe_load("""
+    brachis: 1
+    robot: {urdf: iiwa14}
+    start: home
+    task_space: pose
+    path: [{line: {by: [0.0, 0.1, 0.0]}}]
+    """)
+    content |= {"postures": {"home": HOME}, "frames": {"user1": USER}}
     file = tmp_path / "task.yaml"
     file.write_text(yaml.safe_dump(content | keys))
     return file

@@ -3,12 +3,10 @@
 import csv
 
 import pytest
-import yaml
 
 import brachis
 from brachis.apps.plots import PLOTS
 from support.chains import Joint, chain_urdf
-from support.effort import QUICK
 
 LIMIT = {"lower": -1.0, "upper": 1.0, "velocity": 3.0, "effort": 20.0}
 ROBOTS = {
@@ -24,16 +22,15 @@ def files(request, tmp_path_factory):
     axis, row, length = ROBOTS[request.param]
     joint = Joint(request.param, axis=axis, limit=LIMIT)
     (folder / "robot.urdf").write_text(chain_urdf([joint], tool=(0.5, 0.0, 0.0)))
-    task = {
-        "brachis": 1,
-        "robot": {"urdf": "robot.urdf", "gravity": [0, 0, 0]},
-        "start": {"joints": [0.1]},
-        "task_space": [row],
-        "path": [{"line": {"by": [length]}}],
-        "spline": {"intervals": 10},
-        "search": QUICK,
-    }
-    (folder / "task.yaml").write_text(yaml.safe_dump(task))
+    (folder / "task.yaml").write_text(f"""
+    brachis: 1
+    robot: {{urdf: robot.urdf, gravity: [0, 0, 0]}}
+    start: {{joints: [0.1]}}
+    task_space: [{row}]
+    path: [{{line: {{by: [{length}]}}}}]
+    spline: {{intervals: 10}}
+    search: {{effort: single, least_motion: false}}
+    """)
     result = brachis.plan(folder / "task.yaml")
     assert result.verified
     result.trajectory.save(folder / "result.npz")

@@ -14,7 +14,6 @@ import yaml
 
 import brachis
 from brachis.apps.cli.output import show_progress
-from support.effort import QUICK
 
 from .conftest import SCARA
 
@@ -28,17 +27,16 @@ def saved(tmp_path_factory):
     folder = tmp_path_factory.mktemp("saved")
     (folder / "robot.urdf").write_text(SCARA.read_text())
     (folder / "points.csv").write_text("x,y\n0,0\n0,0.1\n0,0.3\n")
-    task = {
-        "brachis": 1,
-        "robot": {"urdf": "robot.urdf", "gravity": [0, 0, 0]},
-        "start": {"joints": [0.5236, -2.0944, 2.0944]},
-        "task_space": ["x", "y"],
-        "path": [{"csv": {"file": "points.csv", "relative": True}}],
-        "redundant_joints": ["j3"],
-        "spline": {"intervals": 6},
-        "search": QUICK,
-    }
-    (folder / "task.yaml").write_text(yaml.safe_dump(task))
+    (folder / "task.yaml").write_text("""
+    brachis: 1
+    robot: {urdf: robot.urdf, gravity: [0, 0, 0]}
+    start: {joints: [0.5236, -2.0944, 2.0944]}
+    task_space: [x, y]
+    path: [{csv: {file: points.csv, relative: true}}]
+    redundant_joints: [j3]
+    spline: {intervals: 6}
+    search: {effort: single, least_motion: false}
+    """)
     brachis.plan(folder / "task.yaml").trajectory.save(folder / "result.npz")
     return folder
 

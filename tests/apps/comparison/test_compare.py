@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import brachis
 from brachis.apps import comparison
@@ -76,7 +77,7 @@ def test_the_path_is_recovered_and_the_plan_is_faster(both_motions, today):
 
 def test_both_begin_in_one_posture_and_end_in_one_place(both_motions):
     planned, recorded = both_motions.result.trajectory, both_motions.recorded
-    np.testing.assert_allclose(planned.q[0], recorded.q[0], atol=1e-9)
+    assert_allclose(planned.q[0], recorded.q[0], atol=1e-9)
     _, task_map = bind(recorded.robot, recorded.task.task_space)
     ends = (task_map.value(motion.q[-1]) for motion in (planned, recorded))
     assert np.abs(task_map.difference(*ends)).max() < 1e-6
@@ -155,13 +156,13 @@ def test_the_figure_shows_both(both_motions):
         assert ends == pytest.approx(expected)
     t, speeds = speed.lines[1].get_data()
     motion = both_motions.result.trajectory.at(t)
-    np.testing.assert_allclose(speeds, motion.tool_speed)
+    assert_allclose(speeds, motion.tool_speed)
     assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_plan_may_keep_the_end_posture(both_motions):
     kept = compare(both_motions.recorded, keep_end=True)
-    np.testing.assert_allclose(
+    assert_allclose(
         kept.result.trajectory.q[-1], both_motions.recorded.q[-1], atol=1e-6
     )
     assert kept.saved <= both_motions.saved + 1e-3

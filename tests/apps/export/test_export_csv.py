@@ -1,12 +1,11 @@
 import csv
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from brachis import export
 from brachis.errors import InputError
+from support.scripts import output_of
 
 DT = 0.004
 
@@ -83,12 +82,7 @@ def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else
     path, saved = tmp_path / "motion.csv", tmp_path / "result.npz"
     path.write_text("t,q_old")
     line_trajectory.save(saved)
-    done = subprocess.run(
-        [sys.executable, "-c", TOO_LARGE, saved, path],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout == f"{path}: the file cannot be written; found File too large\n"
+    printed = output_of("-c", TOO_LARGE, saved, path)
+    assert printed == f"{path}: the file cannot be written; found File too large\n"
     assert path.read_text() == "t,q_old"
     assert sorted(tmp_path.iterdir()) == [path, saved]

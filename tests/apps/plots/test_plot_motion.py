@@ -3,17 +3,10 @@ import pytest
 
 from brachis.apps.plots import plot_motion, plot_overview
 from brachis.task import SpeedTable
+from support.figures import lines_by_label
 from support.motions import with_tool_speed
 
 INF = float("inf")
-
-
-def lines_by_label(ax):
-    return {
-        line.get_label(): line
-        for line in ax.get_lines()
-        if not line.get_label().startswith("_")
-    }
 
 
 def levels(ax):

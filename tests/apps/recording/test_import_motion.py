@@ -1,11 +1,13 @@
 """A motion that is written to a file and imported is the motion that it was, with its path."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.interpolate import BPoly
 
 import brachis
 from brachis.apps import bottleneck, export, plots
@@ -15,13 +17,9 @@ from brachis.apps.recording.recording import Recording
 from brachis.errors import InputError, PathError, ResultFileError
 from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import verify_trajectory
+from support.checks import check_of, failing_checks, with_entry
 
 from .conftest import DT, SCARA, smooth_step
-
-
-def failures_of(trajectory):
-    checks = verify_trajectory(trajectory).checks
-    return {check.name for check in checks if not check.passed}
 
 
 def test_the_motion_comes_back(imported, motion):
@@ -33,12 +31,11 @@ def test_the_motion_comes_back(imported, motion):
 
 
 def check_of_path(trajectory):
-    checks = verify_trajectory(trajectory).checks
-    return next(check for check in checks if check.name == "path error")
+    return check_of(verify_trajectory(trajectory), "path error")
 
 
 def test_its_path_comes_back_and_it_verifies(imported, motion):
-    assert failures_of(imported) <= {"torque ratio"}
+    assert failing_checks(imported) <= {"torque ratio"}
     verification = verify_trajectory(imported)
     assert verification.worst_ratio == pytest.approx(1.0, abs=2e-3)
     assert verification.path_error < 1e-6
@@ -70,28 +67,24 @@ def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
     ):
         replace(imported.recovered, tolerance=0.1)
     own = imported.recovered.to_file()
-    wrong = {
-        "the tolerance of a path is out of range": {"tolerance": 0.1},
-        "not the rows of a file; found rows ": {"rows": [[0.0, 1.0, 2.0, 3.0]]},
-        "error .4,.; allowed: rows .K, 4. with ascending times": {"error": [0.0] * 4},
-        "recovered.rows: .*found 'none'": {"rows": "none"},
-        "not a finite number": {
-            "rows": [[0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 2.0, float("nan")]]
-        },
-    }
-    for message, change in wrong.items():
-        monkeypatch.setattr(
-            Recovered, "to_file", lambda _, change=change: {**own, **change}
-        )
+    row = [0.0, 1.0, 2.0, 3.0]
+    for message, key, wrong in (
+        ("the tolerance of a path is out of range", "tolerance", 0.1),
+        ("not the rows of a file; found rows ", "rows", [row]),
+        ("error .4,.; allowed: rows .K, 4. with ascending times", "error", [0.0] * 4),
+        ("recovered.rows: .*found 'none'", "rows", "none"),
+        ("not a finite number", "rows", [row, [1.0, 1.0, 2.0, math.nan]]),
+    ):
+        changed = {**own, key: wrong}
+        monkeypatch.setattr(Recovered, "to_file", lambda _, changed=changed: changed)
         imported.save(tmp_path / "today.npz")
         with pytest.raises(ResultFileError, match=message):
             Trajectory.load(tmp_path / "today.npz")
 
 
 def test_a_motion_that_leaves_its_recovered_path_fails(imported):
-    q = np.array(imported.q)
-    q[len(q) // 2] += 1e-5
-    assert not check_of_path(replace(imported, q=q)).passed
+    off = with_entry(imported, "q", len(imported.q) // 2, 1e-5)
+    assert not check_of_path(off).passed
 
 
 def test_bottlenecks_are_when_limits_are_active(imported):
@@ -127,14 +120,18 @@ def test_few_digits_get_a_smoothing_spline(motion, table, write):
     assert_allclose(again.acceleration(t), motion.acceleration(t + delay), atol=0.2)
 
 
+def read_nodes(path, robot):
+    """A recording, and its nodes by what its digits are off."""
+    recording = read_recording(path, robot, {})
+    return recording, nodes_of(recording, recording.rounding / np.sqrt(3.0))
+
+
 @pytest.mark.parametrize("digits", [4, 5, 6, 8])
 def test_rest_is_found_in_few_digits(digits, motion, table, write):
     """And the time in which the last digit does not show yet that the motion has begun belongs to it."""
     t, q, _ = table
-    recording = read_recording(
-        write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f"), motion.robot, {}
-    )
-    nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
+    path = write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f")
+    recording, nodes = read_nodes(path, motion.robot)
     assert nodes.at_rest == (True, True)
     assert recording.t[-1] == pytest.approx(motion.t_end, abs=2.5 * DT)
 
@@ -146,8 +143,7 @@ def test_accelerations_that_set_in_with_a_jump_are_no_rest(digits, write):
     path = write(
         "t,j1,j2,j3", t, progress, -0.5 * progress, 0.02 * progress, fmt=f"%.{digits}f"
     )
-    recording = read_recording(path, brachis.robots.scara3, {})
-    nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
+    _, nodes = read_nodes(path, brachis.robots.scara3)
     assert nodes.at_rest == (True, False)
 
 
@@ -158,10 +154,9 @@ def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
     rail = robot.position_units.index("m")
     q[:, rail] = q[:, rail].round(4)  # 0.1 mm
     header = ",".join(["t", *robot.joint_names])
-    recording = read_recording(write(header, t, q), robot, {})
+    recording, nodes = read_nodes(write(header, t, q), robot)
     assert recording.rounding[rail] == pytest.approx(5e-5)
     assert not np.delete(recording.rounding, rail).any()
-    nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
     smoothed = "positions in m, velocities and accelerations of a smoothing spline, 2.9e-05 m (rms) off"
     assert smoothed in nodes.notes
     assert not any("rad" in line for line in nodes.notes)
@@ -200,8 +195,6 @@ def test_accelerations_that_jump_do_not_overshoot():
     nodes = nodes_of(
         Recording(t, q, None, None, np.zeros(1), ("rad",), "here", ()), np.zeros(1)
     )
-    from scipy.interpolate import BPoly
-
     pieces = BPoly.from_derivatives(
         nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)
     )
@@ -221,7 +214,7 @@ def test_ends_in_motion(motion, table, write):
     speeds = [boundary.start_speed, boundary.end_speed]
     ends = t[middle][[0, -1]]
     assert speeds == pytest.approx(motion.at(ends).tool_speed, rel=1e-6)
-    assert failures_of(again) <= {"torque ratio"}
+    assert failing_checks(again) <= {"torque ratio"}
 
 
 def test_a_tool_that_stops_and_turns_off_is_an_error(motion, table, write):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 
 import brachis
@@ -21,14 +22,15 @@ from brachis.errors import NotInstalledError
 from brachis.limits import Role
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.plausibility import Issue
+from brachis.task import task_with
 
 from .conftest import data_of, floats
 
 LARGEST = 3_500_000
-CARRIED = {
-    "payload": {"mass": 0.5, "com": [0.0, 0.0, 0.1]},
-    "mounting": {"xyz": [0.0, 0.0, 1.0], "rpy_deg": [0.0, 0.0, 30.0]},
-}
+CARRIED = yaml.safe_load("""
+robot.payload: {mass: 0.5, com: [0.0, 0.0, 0.1]}
+robot.mounting: {xyz: [0.0, 0.0, 1.0], rpy_deg: [0.0, 0.0, 30.0]}
+""")
 
 
 def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page):
@@ -144,10 +146,8 @@ def test_an_unverified_motion_says_which_check_fails(weaker_page):
     header = re.search(r"<header.*?</header>", weaker_page.html, re.DOTALL)[0]
     assert 'class="unverified"' in header
     assert "<h1>NOT VERIFIED: do not run</h1>" in header
-    assert re.search(
-        r"<b>torque ratio</b>: 1\.11\d* \((rail|joint_\d) at 0\.\d+ s\),\s+allowed 1\.0001",
-        header,
-    )
+    told = r"<b>torque ratio</b>: 1\.11\d* \((rail|joint_\d) at 0\.\d+ s\),\s+allowed 1\.0001"
+    assert re.search(told, header)
     assert "Verification: FAILED" in weaker_page.html
     rows = re.findall(r'<tr class="(passed|failed)"><th>(.*?)</th>', weaker_page.html)
     assert rows[0] == ("failed", "torque ratio")
@@ -213,12 +213,8 @@ def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(
 
 def pairs_of(page):
     """What the summary says."""
-    return {
-        name: html.unescape(value)
-        for name, value in re.findall(
-            r"<tr><th>(.*?)</th><td>(.*?)</td></tr>", page.html
-        )
-    }
+    rows = re.findall(r"<tr><th>(.*?)</th><td>(.*?)</td></tr>", page.html)
+    return {name: html.unescape(value) for name, value in rows}
 
 
 def test_the_summary_names_robot_path_and_payload(planar, planar_page):
@@ -234,8 +230,7 @@ def test_the_summary_names_robot_path_and_payload(planar, planar_page):
     today = datetime.now().astimezone().strftime("%Y-")
     assert pairs["report of"].startswith(today)
     assert f"brachis {brachis.__version__}" in planar_page.html
-    changes = {f"robot.{key}": value for key, value in CARRIED.items()}
-    task = brachis.load_task(planar.task.to_dict(), changes=changes)
+    task = brachis.load_task(planar.task.to_dict(), changes=CARRIED)
     robot = robot_from_settings(task.robot)
     moved = dataclasses.replace(planar.trajectory, robot=robot, task=task)
     pairs = tables.identity(reported_motion(moved))
@@ -265,19 +260,9 @@ def test_no_path_of_this_machine_is_in_it(planar, planar_page):
 
 def test_paths_of_many_segments_are_told_in_short():
     points = [[0.01 * i, 0.02 * i] for i in range(1, 30)]
-    path = [
-        {"line": {"by": [0.1, 0.0]}},
-        {"spline": {"through": points}},
-        *[{"line": {"by": [0.0, 0.1]}}] * 7,
-    ]
-    task = brachis.load_task(
-        {
-            "brachis": 1,
-            "start": {"joints": [0.0]},
-            "task_space": ["x", "y"],
-            "path": path,
-        }
-    )
+    first = brachis.Line(by=[0.1, 0.0]) + brachis.Spline(through=points)
+    path = [*first, *[brachis.Line(by=[0.0, 0.1])] * 7]
+    task = task_with(start=[0.0], task_space=["x", "y"], path=path)
     text = tables.describe_path(task)
     assert text.startswith("line (by [0.1, 0]), then spline (through 29 entries), then")
     assert text.endswith(", and 3 more")

@@ -5,26 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import brachis
 
 ROOT = Path(__file__).parents[3]
-CONTENT = {
-    "sweep": 1,
-    "task": str(ROOT / "examples/01_scara_line.yaml"),
-    "fixed": {
-        "search.effort": "single",
-        "search.guesses": "numeric",
-        "search.least_motion": False,
-        "spline.intervals": 5,
-    },
-    "grid": {"path.0.line.angle_deg": [80, 90, 90.0]},
-    "rows": [
-        {"path.0.line.length": 0.9, "spline.degree": 3},
-        {"path.0.line.length": 9.0, "spline.degree": 3},
-        {"path.0.line.length": 0.9, "spline.degree": 9},
-    ],
-}
+CONTENT = yaml.safe_load("""
+sweep: 1
+fixed:
+  search.effort: single
+  search.guesses: numeric
+  search.least_motion: false
+  spline.intervals: 5
+grid: {path.0.line.angle_deg: [80, 90, 90.0]}
+rows:
+- {path.0.line.length: 0.9, spline.degree: 3}
+- {path.0.line.length: 9.0, spline.degree: 3}
+- {path.0.line.length: 0.9, spline.degree: 9}
+""") | {"task": str(ROOT / "examples/01_scara_line.yaml")}
 """Of the rows one is good, one is out of reach, and one has no such degree; an angle already in another row."""
 
 

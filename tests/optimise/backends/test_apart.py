@@ -1,7 +1,5 @@
 """Large solves in a process of their own, which is ended when its time is up."""
 
-from __future__ import annotations
-
 import dataclasses
 import multiprocessing
 import os
@@ -35,7 +33,7 @@ def everything_is_large(monkeypatch):
     monkeypatch.setattr(child_process, "ENTRIES", 0)
 
 
-def own_children() -> list[str]:
+def own_children():
     """Processes of solves; other tests may have left workers that wait for more to do."""
     return [
         process.name
@@ -50,7 +48,7 @@ def solve(options=OPTIONS, progress=None, name="uno"):
 
 @pytest.mark.parametrize("name", INSTALLED)
 def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch):
-    calls: dict[str, list] = {"apart": [], "here": []}
+    calls = {"apart": [], "here": []}
     far = solve(progress=lambda *call: calls["apart"].append(call), name=name)
     monkeypatch.setattr(child_process, "ENTRIES", 10)
     near = solve(progress=lambda *call: calls["here"].append(call), name=name)

@@ -1,10 +1,7 @@
 """Every backend on small programs whose optima are known by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
-import subprocess
 import sys
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -12,7 +9,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import brachis
 from brachis.errors import UnknownNameError
@@ -28,6 +25,7 @@ from brachis.optimise.backends import (
 )
 from brachis.optimise.backends.monitor import SolveMonitor
 from support.programs import corner, disc, impossible, nearest_in_disc, under_hyperbola
+from support.scripts import output_of
 from support.solvers import INSTALLED
 
 ROOT = Path(__file__).parents[3]
@@ -45,7 +43,7 @@ def solve(name, problem, x, options=OPTIONS, progress=None):
     (backend,) = solvers_for(name)
     start = np.array(x, dtype=float)
     report = backend.solve(problem, start, options, progress)
-    np.testing.assert_array_equal(start, x)
+    assert_array_equal(start, x)
     return report
 
 
@@ -295,16 +293,12 @@ print(repr(brachis.plan(line, redundant_joints=["j3"], intervals=20).t_end))
 
 
 def test_an_answer_does_not_depend_on_what_the_process_solved_before():
+    folder = str(Path(brachis.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": folder}
+
     def plan(others_first):
-        done = subprocess.run(
-            [sys.executable, "-c", PLAN.format(others_first=others_first)],
-            cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(Path(brachis.__file__).parents[1])},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return done.stdout
+        code = PLAN.format(others_first=others_first)
+        return output_of("-c", code, cwd=ROOT, env=environment)
 
     assert plan(others_first=True) == plan(others_first=False)
 

@@ -33,7 +33,7 @@ class Ellipsoid(Program):
         )
 
 
-def ellipsoid(known: float | None) -> Ellipsoid:
+def ellipsoid(known):
     program = Ellipsoid(
         COSTS,
         lambda x: np.array([x @ SQUARES @ x]),
@@ -47,7 +47,7 @@ def ellipsoid(known: float | None) -> Ellipsoid:
     return program
 
 
-def solve(known: float | None):
+def solve(known):
     (uno,) = solvers_for("uno")
     start = 0.1 * np.ones(SIZE) / np.sqrt(SIZE)
     return uno.solve(ellipsoid(known), start, SolverOptions(1e-8), None)

@@ -1,7 +1,5 @@
 """What is particular to Uno."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -65,10 +65,10 @@ def test_the_error_names_a_factor_of_a_thousand():
 
 def test_a_note_doubts_a_file_in_other_units():
     assert plausibility_note(points(wave(100))) is None
-    assert "mm for m? Set units: {length: mm}" in str(
+    assert "is it in mm? Set units: {length: mm}" in str(
         plausibility_note(points(1e3 * wave(100)))
     )
-    assert "m for mm? Set units: {length: m}" in str(
+    assert "is it in m? Set units: {length: m}" in str(
         plausibility_note(points(1e-5 * wave(100)))
     )
 
@@ -78,7 +78,7 @@ def test_notes_list_rows_that_repeat():
     kept = without_repetitions(points(position))
     np.testing.assert_array_equal(kept.position, wave(10))
     assert kept.notes == (
-        "left out 3 rows at the place of the row before: rows 2, 7, 8",
+        "left out 3 rows at the position of the row before: rows 2, 7, 8",
     )
     assert without_repetitions(points(wave(10))).notes == ()
 

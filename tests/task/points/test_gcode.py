@@ -82,18 +82,21 @@ MISTAKES = [
         "G0 X1 Y1 Z1\nG1 X2 A5 F10",
         r"line 2: axes other than X, Y, Z are not read; found A5",
     ),
-    ("X1 Y1 Z1", r"line 1: a move before G0"),
+    ("X1 Y1 Z1", r"line 1: coordinates before G0"),
     (
         "G0 X1 Y1 Z1\nG2 X5 Y1 I1 J1 F10",
         r"line 2: invalid arc: its start and end are at different radii; found radius 1.41421 mm at its start",
     ),
     (
         "G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10",
-        r"line 2: invalid arc: no circle of this radius passes both ends; found R 1 mm for ends 4 mm apart",
+        r"line 2: invalid arc: no circle of this radius passes through both ends; found R 1 mm for ends 4 mm apart",
     ),
     ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: this is not understood; found 'X#1'"),
     ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),
-    ("G0 X1 Y1", r"a.nc: the program contains no motion; found 0 places.*Z is missing"),
+    (
+        "G0 X1 Y1",
+        r"a.nc: the program contains no motion; found 0 points.*Z is never stated",
+    ),
     ("G0 X1 Y1 Z1\nM98 P1000", r"line 2: subprograms are not read; found M98"),
     (
         "G0 X1 Y1 Z1\nG91 G28 Z0",
@@ -112,7 +115,7 @@ MISTAKES = [
     ("G0 X1 Y1 Z1\nG1 X.5E+1", r"line 2: this is not understood; found 'X.5E\+1'"),
     ("G0 X1 Y1 Z1\nG1 X 12 E3 Y5E.2", r"line 2: this is not understood; found 'Y5E.2'"),
     ("G0 X1 Y1 Z1\n/G1 X2 F10", r"line 2: this is not understood; .*no / at the start"),
-    ("G0 X1 Y1 Z1\nG1 X2 X3 F10", r"line 2: a letter stands twice .*; found X3"),
+    ("G0 X1 Y1 Z1\nG1 X2 X3 F10", r"line 2: a letter occurs twice .*; found X3"),
     ("G0 X1 Y1 Z1\nG1 X2 P2 F10", r"line 2: the letter P of this G1 .*; found P2"),
     ("G0 X1 Y1 Z1\nG1 X2 L2 F10", r"line 2: the letter L of this G1 .*; found L2"),
     ("G0 X1 Y1 Z1\nG1 X2 I5 F10", r"line 2: the letter I of this G1 .*; found I5"),
@@ -127,7 +130,7 @@ MISTAKES = [
     ("G0 X1 Y1 Z1\nG2 X1 Y1 I5 P1000000", r"line 2: invalid number of turns"),
     (
         "G91\nG1 X20 F300",
-        r"line 2: X is incremental \(G91\), but where the tool is .*Begin with G90 G0",
+        r"line 2: X is incremental \(G91\), but the position before .*Begin with G90 G0",
     ),
     (
         "G90 G0 X1 Y1\nG91 Z-1",

@@ -1,4 +1,4 @@
-"""Paths as CAM gives them: tables of points and G-code, read, checked, and fitted by smooth curves within a tolerance.
+"""Paths from CAM: reading and checking tables of points and G-code, and fitting smooth curves within a tolerance.
 
-It works on numbers alone and knows neither task nor robot; `brachis.task.fitted` makes segments of what it gives.
+The package works on numbers alone and knows neither task nor robot; `brachis.task.fitted` makes segments of its curves.
 """

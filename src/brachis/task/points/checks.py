@@ -1,6 +1,6 @@
-"""What is wrong with points, with its row: repetitions, spikes, other units; and how much points scatter.
+"""Checks of points, with the row of a mistake: repetitions, spikes, changes of unit; and their scatter.
 
-Scatter is about a smooth curve, and matters by what it does to the curvature of a curve through all points.
+Scatter is measured from a smooth curve. It matters because of the curvature that it gives a curve through all points.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from brachis.task.points.points import (
 )
 
 SAME = 1e-9
-"""What a path takes for standing still, m or rad."""
+"""Largest step that counts as standing still, m or rad."""
 _MEDIANS = {1: 0.6745, 2: 1.1774, 3: 1.5382}
 """Median distance from zero of normally distributed points, by their dimension, in standard deviations."""
 
@@ -35,13 +35,13 @@ class Scatter:
     Attributes
     ----------
     deviation : float
-        Standard deviation across the path, m; 0 where the points look smooth, or are too few to tell.
+        Standard deviation across the path, m; 0 if the points look smooth or are too few to tell.
     turning : float
-        Standard deviation of each component of their orientations, rad; of yaw; 0 as above.
+        Standard deviation of each component of the orientations, or of yaw, rad; 0 as above.
     spacing : float
         Median distance of successive points, m.
     decimals : int or None
-        Digits after the decimal point, of metres, to which all positions are rounded.
+        Number of decimals, in metres, to which all positions are rounded.
     """
 
     deviation: float
@@ -50,19 +50,19 @@ class Scatter:
     decimals: int | None
 
     def noisy(self, tolerance: FitTolerance) -> bool:
-        """Tell whether a curve through all points would follow scatter that counts beside a tolerance."""
+        """Return whether a curve through all points would follow scatter that is not small beside a tolerance."""
         return self.deviation > 0.0 or self.turning > 0.1 * tolerance.orientation
 
     @property
     def curvature(self) -> float:
-        """Standard deviation of the curvature of a curve through all points, 1/m, that scatter alone gives it."""
+        """Standard deviation, 1/m, of the curvature that scatter alone gives a curve through all points."""
         if not self.deviation:
             return 0.0
-        # The second difference of white noise of standard deviation 1 has one of sqrt(6).
+        # The second difference of white noise with standard deviation 1 has a standard deviation of sqrt(6).
         return 6.0**0.5 * self.deviation / self.spacing**2
 
     def __str__(self) -> str:
-        """Say what the scatter looks like."""
+        """Describe the scatter in words."""
         spacing = f"at {1e3 * self.spacing:.3g} mm spacing"
         rounding = 0.0 if self.decimals is None else 10.0**-self.decimals
         if rounding / 12.0**0.5 > self.deviation / 3.0:
@@ -73,9 +73,8 @@ class Scatter:
 def scatter_of(points: Points) -> Scatter:
     """Estimate the scatter of points.
 
-    Each point is compared with the cubic through its two neighbours on either side, over chord lengths; of the
-    difference of positions counts what is across the path. Noise makes successive differences alternate, curvature
-    does not.
+    Each point is compared with the cubic, over chord lengths, through its two neighbours on either side. For positions
+    only the difference across the path counts. With noise successive differences alternate, with curvature they do not.
     """
     position = points.position
     turning = points.turning
@@ -90,7 +89,7 @@ def scatter_of(points: Points) -> Scatter:
     deviation = _deviation(across, _MEDIANS[points.dimension - 1])
     of_turning = 0.0
     if turning.shape[1]:
-        # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
+        # Differences of quaternions are half the angle and have three dimensions; for yaw they are the angle itself.
         dimension, factor = (3, 2.0) if points.has_quaternions else (1, 1.0)
         residuals = _residuals(turning, chords)
         of_turning = factor * _deviation(residuals, _MEDIANS[dimension])
@@ -98,7 +97,7 @@ def scatter_of(points: Points) -> Scatter:
 
 
 def _deviation(residuals: Array, unit_median: float) -> float:
-    """Return the standard deviation of residuals, (n, c), if they look like noise; zero where they do not."""
+    """Return the standard deviation of residuals, (n, c), if they look like noise, otherwise zero."""
     sizes = np.linalg.norm(residuals, axis=1)
     median = float(np.median(sizes))
     if median == 0.0:
@@ -107,12 +106,12 @@ def _deviation(residuals: Array, unit_median: float) -> float:
         residuals * np.minimum(1.0, 5.0 * median / np.maximum(sizes, 1e-300))[:, None]
     )
     correlation = float(np.sum(clipped[1:] * clipped[:-1]) / np.sum(clipped**2))
-    # It is -0.8 for white noise and 1 for a smooth curve.
+    # The correlation is -0.8 for white noise and 1 for a smooth curve.
     return median / unit_median if correlation < -0.25 else 0.0
 
 
 def decimals_of(position: Array) -> int | None:
-    """Return the number of decimals to which all values, m, are rounded; None where there are more than twelve."""
+    """Return the number of decimals to which all values, m, are rounded; None if there are more than twelve."""
     for decimals in range(13):
         rounded = np.round(position, decimals)
         if np.allclose(position, rounded, rtol=1e-9, atol=10.0 ** (-6 - decimals)):
@@ -139,12 +138,12 @@ def _residuals(values: Array, chords: Array) -> Array:
 
 
 def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
-    """Leave out points that repeat their predecessors, much more exactly than a tolerance, m, and note which.
+    """Leave out points that repeat their predecessors to a small fraction of a tolerance, m, and note which ones.
 
     Raises
     ------
     TaskError
-        The position stands still while the tool turns, or throughout.
+        The position stands still while the tool turns, or in the whole file.
     """
     again = 1 + np.flatnonzero(is_repeated(points.steps, 0.01 * tolerance))
     turned = angles_between(points.turning[again], points.turning[again - 1])
@@ -159,7 +158,7 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
     if len(remaining) < 2:
         raise TaskError(
             "all rows have the same position",
-            found=f"{len(points)} times the same",
+            found=f"the same position {len(points)} times",
             allowed="at least two different positions",
             where=points.source,
         )
@@ -167,14 +166,14 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
         return points
     count = write_count(len(again), "row")
     rows = name_first([str(row) for row in points.rows[again]], ", ", count=5)
-    note = f"left out {count} at the place of the row before: {points.row}s {rows}"
+    note = f"left out {count} at the position of the row before: {points.row}s {rows}"
     return replace(remaining, notes=(*remaining.notes, note))
 
 
 def refuse_repetitions(points: Points) -> None:
-    """Refuse a row whose position repeats its predecessor's: a curve through all points would have to stop there.
+    """Refuse a row with the position of its predecessor: a curve through all points would have to stop there.
 
-    Where the position stands still in the whole file, the tool turns on the spot, and it is the angles that count.
+    If the position stands still in the whole file, the tool turns on the spot, and the angles are compared instead.
 
     Raises
     ------
@@ -196,7 +195,7 @@ def refuse_repetitions(points: Points) -> None:
 
 
 def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
-    """Refuse a point that is far off the line between its neighbours, or where the unit seems to change.
+    """Refuse a point that is far from the line between its neighbours, and points where the unit seems to change.
 
     Raises
     ------
@@ -226,12 +225,12 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
 
 
 def plausibility_note(points: Points) -> str | None:
-    """Say that the whole path looks like mm where m are stated, or the other way round; None where it does not."""
+    """Return a remark if the whole path looks like mm instead of m or vice versa; None if it does not."""
     extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
     if extent > 100.0:  # paths of robots are shorter
-        return f"the path is {extent:.4g} m long and wide: mm for m? Set units: {{length: mm}}"
+        return f"the path is {extent:.4g} m long and wide: is it in mm? Set units: {{length: mm}}"
     if extent < 1e-4:
-        return f"the path is {1e3 * extent:.4g} mm long and wide: m for mm? Set units: {{length: m}}"
+        return f"the path is {1e3 * extent:.4g} mm long and wide: is it in m? Set units: {{length: m}}"
     return None
 
 
@@ -247,6 +246,6 @@ def _refuse_factors(points: Points) -> None:
             raise points.wrong(
                 i + 1,
                 f"the coordinates are a thousand times {word} than in {points.name_row(i)}",
-                allowed=f"near {points.describe(i)}",
-                hint="mm and m, or a lost decimal point? Write all rows in one unit",
+                allowed=f"coordinates close to {points.describe(i)}",
+                hint="Are mm and m mixed, or is a decimal point missing? Write all rows in one unit",
             )

@@ -1,6 +1,6 @@
-"""Corners of points: places where the direction changes at once, whatever the scale; the gaps and blends at them.
+"""Corners of points, where the direction changes abruptly at any scale, and their blends; and gaps between points.
 
-Long straight ways between points get more points: nothing else would hold a curve to them.
+Long straight sections between points get additional points, which keep a fitted curve straight.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from brachis.task.points.fit import lengths_along
 from brachis.task.points.points import Array, Indices, Points
 
 LEAST_ANGLE = np.deg2rad(12.0)
-"""Smaller changes of direction are left to the fit."""
+"""Smallest angle of a corner, rad. Smaller changes of direction are left to the fit."""
 _SURE = 5.0
-"""Standard deviations by which scatter may not change the comparison of angles: of 50,000 points none goes so far."""
+"""Largest assumed change of compared angles by scatter, standard deviations; none of 50,000 points exceeds it."""
 _STRAIGHT = 0.7
-"""Least straightness of lines whose directions are compared: an arc of 200 degrees, which turns as if by 160 the other
-way, has less."""
+"""Least straightness of lines whose directions are compared. An arc of 200 degrees, which seems to turn by 160 degrees
+in the opposite direction, has less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +32,13 @@ class Corner:
     Attributes
     ----------
     index : int
-        The nearest point.
+        Index of the nearest point.
     before, after : int
-        How many points come before it, and index of the first one after it.
+        Number of points before the corner, and index of the first point after it.
     angle : float
         Change of direction, rad.
     place : (p,) ndarray
-        Where the straight lines before and after meet, m.
+        Position at which the straight lines before and after meet, m.
     """
 
     index: int
@@ -57,15 +57,15 @@ def find_corners(
     ----------
     points : Points
     scatter : Scatter
-        Of the points.
+        Scatter of the points.
     tolerance : float
-        Corners that are rounded within it are corners, m.
+        Corners rounded within this distance still count as corners, m.
     """
     if len(points) < 3 or points.dimension < 2:
         return ()
     u = lengths_along(points.position, scatter.deviation)
     spacing = u[-1] / (len(points) - 1)
-    direction = 0.02  # rad: what scatter may do to a direction
+    direction = 0.02  # rad: largest change of a direction by scatter
     for_direction = 12.0 * spacing * (scatter.deviation / direction) ** 2
     near = for_direction ** (1.0 / 3.0)
     width = max(near, 2.0 * tolerance)
@@ -73,21 +73,21 @@ def find_corners(
     near_turn = _turning(points.position, u, width, least)
     wide_turn = _turning(points.position, u, 2.0 * width, 2 * least)
     angle = near_turn.angle
-    # Between lines that are farther apart a smooth curve turns by more in proportion, a corner by the same angle.
+    # Between lines farther apart, a smooth curve turns by proportionally more, and a corner by the same angle.
     growth = wide_turn.distance / near_turn.distance
     share = (2.0 + growth) / 3.0
     doubt = _SURE * scatter.deviation * near_turn.uncertainty
     sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < share * (angle - doubt))
     sharp &= wide_turn.straightness > _STRAIGHT
-    # A polygon that turns by this much from one side to the next is not a smooth curve.
+    # Points that turn by this much from one side to the next do not lie on a smooth curve.
     sides = _turning(points.position, u, 0.0, 1)
     doubt = 8.0 * scatter.deviation * sides.uncertainty
     sharp |= sides.angle - doubt > np.deg2rad(50.0)
-    # A smooth arc, however small it is beside the tolerance, turns little from one side to the next.
+    # A smooth arc, even if it is small compared with the tolerance, turns little from one side to the next.
     fine = _turning(points.position, u, near, least)
     sharp &= np.minimum(angle, fine.angle) > np.maximum(LEAST_ANGLE, angle / 4.0)
     peaks = _peaks(angle, sharp, u, width, least)
-    # Lines that are longer than scatter asks for miss the corner where the path bends.
+    # Lines longer than scatter requires would miss the corner if the path bends.
     return tuple(
         _locate(points, u, i, float(angle[i]), near, least, tolerance / 4.0)
         for i in peaks
@@ -96,18 +96,18 @@ def find_corners(
 
 @dataclass(frozen=True, eq=False)
 class _Turning:
-    """How points turn, from straight lines that fit them before and after every one; (n,) each.
+    """The turning at every point, from straight lines fitted to the points before and after it; arrays (n,).
 
     Attributes
     ----------
     angle : ndarray
-        Between the two lines, rad; zero at the ends.
+        Angle between the two lines, rad; zero at the ends.
     uncertainty : ndarray
-        Standard deviation that points which scatter by 1 m give the angle, rad.
+        Standard deviation of the angle for a scatter of 1 m, rad.
     distance : ndarray
-        Between the middles of the two lines, along the path, m.
+        Distance between the middles of the two lines along the path, m.
     straightness : ndarray
-        Length of the lines over that of the path, the lower of both; 1 if the points are on the lines.
+        Ratio of the length of a line to that of the path, the lower of the two; 1 if the points are on the lines.
     """
 
     angle: Array
@@ -117,7 +117,7 @@ class _Turning:
 
 
 def _turning(position: Array, u: Array, width: float, least: int) -> _Turning:
-    """Return how points turn at places u, m, between lines through the points within `width`, m, or `least` points."""
+    """Return the turning at places u, m, between lines through the points within `width`, m, or `least` points."""
     index = np.arange(len(u))
     last = len(u) - 1
     begins = np.minimum(np.searchsorted(u, u - width), index - least)
@@ -138,7 +138,7 @@ def _turning(position: Array, u: Array, width: float, least: int) -> _Turning:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Straight lines that fit points: unit vectors, (n, p), and numbers, (n,), as of `_Turning`."""
+    """Straight lines fitted to points: unit vectors, (n, p), and numbers, (n,), as in `_Turning`."""
 
     direction: Array
     uncertainty: Array
@@ -147,7 +147,7 @@ class _Lines:
 
 
 def _lines(position: Array, u: Array, first: Indices, last: Indices) -> _Lines:
-    """Return the lines that fit points `first` to `last`, (n,), of positions (n, p) at places u, (n,)."""
+    """Return lines fitted to the points `first` to `last`, (n,), of positions (n, p) at places u, (n,)."""
     at = u[:, None]
     moment = np.hstack([np.ones_like(at), at, at**2, position, at * position])
     sums = np.cumsum(np.pad(moment, ((1, 0), (0, 0))), axis=0)
@@ -167,7 +167,7 @@ def _lines(position: Array, u: Array, first: Indices, last: Indices) -> _Lines:
 def _peaks(
     angle: Array, sharp: np.ndarray, u: Array, width: float, least: int
 ) -> list[int]:
-    """Return the indices of the largest angles, one in every run of sharp ones as wide as the lines that fit."""
+    """Return the index of the largest angle in every run of sharp angles as wide as the fitted lines."""
     peaks: list[int] = []
     for i in np.flatnonzero(sharp).tolist():
         near = bool(peaks) and (u[i] - u[peaks[-1]] < width or i - peaks[-1] < least)
@@ -181,9 +181,10 @@ def _peaks(
 def _locate(
     points: Points, u: Array, i: int, angle: float, width: float, least: int, off: float
 ) -> Corner:
-    """Return the corner near a point: the point, or where the straight lines before and after come nearest together.
+    """Return the corner near a point: the point itself, or where the lines before and after it come closest.
 
-    It is the point where nothing scatters and the points before it, and those after it, lead there, but for `off`, m.
+    It is the point itself if nothing scatters and both the points before and the points after lead to within `off`, m,
+    of it.
     """
     position = points.position
     here = Corner(i, i, i + 1, angle, position[i])
@@ -216,9 +217,9 @@ def _locate(
 
 
 def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool:
-    """Tell whether the cubic through four points on one side, or what fewer points there give, leads to a point.
+    """Return whether the cubic through four points on one side, or a lower degree through fewer, leads to a point.
 
-    It may miss it by `off`, m, or by a small part of the spacing.
+    It may miss the point by `off`, m, or by a small fraction of the spacing.
     """
     from scipy.interpolate import krogh_interpolate
 
@@ -232,7 +233,7 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
 
 
 def fill_gaps(points: Points) -> Points:
-    """Put points on the straight ways that are five times longer than usual, and note how many ways there are."""
+    """Add points on straight sections that are five times longer than usual, and note the number of these sections."""
     chords = points.steps
     usual = float(np.median(chords))
     times = 5.0
@@ -246,7 +247,7 @@ def fill_gaps(points: Points) -> Points:
     position, turning = np.hsplit(columns, [points.dimension])
     if points.has_quaternions:
         turning = with_like_signs(turning)
-    gaps = write_count(int(np.count_nonzero(long)), "way")
+    gaps = write_count(int(np.count_nonzero(long)), "gap")
     note = f"taken as straight: {gaps} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
     notes = (*points.notes, note)
@@ -254,7 +255,7 @@ def fill_gaps(points: Points) -> Points:
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:
-    """Return what a blend takes from either side, m, that passes a corner of straight lines at a distance, m.
+    """Return the length that a blend takes from either side, m, to pass a corner of straight lines at a distance, m.
 
     With `size` from either side and unit tangents a, b the ends lie at -size a and size b of the corner, and the
     blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.joins`. Its middle is
@@ -266,7 +267,7 @@ def blend_size(angle: float, distance: float, shortest: float) -> float:
         Change of direction, rad.
     distance : float
     shortest : float
-        Length of the shorter neighbour, m.
+        Length of the shorter neighbouring curve, m.
     """
     of_size = 2.0 * sin(angle / 2.0) * (0.5 - 11.0 / 64.0 * (1.0 + cos(angle / 2.0)))
     return min(distance / of_size, 0.45 * shortest)

@@ -1,4 +1,4 @@
-"""From points to curves: checks, corners, a fit between every two of them with its speeds, and a report."""
+"""From points to curves: checks, corners, fits between successive corners with their speeds, and a report."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class FittedCurve:
     Attributes
     ----------
     points : Points
-        With the corners, at their places, as first and last ones.
+        The points, with the corners as first and last point.
     fit : Fit
-        Its errors are those of the user's points, without the corners.
+        The fit, with errors at the user's points only, without the corners.
     speeds : tuple of Run
-        Tables of the speeds that are prescribed along it.
+        Tables of the speeds prescribed along the curve.
     blend : float or None
-        What the blend at its end takes from it and from the next curve, m; None at the last one.
+        Length that the blend at its end takes from it and from the next curve, m; None for the last curve.
     """
 
     points: Points
@@ -57,12 +57,12 @@ class FittedCurve:
 
     @property
     def spline(self) -> BSpline:
-        """Position, m, and turning as in `Points`, over about the arc length, m."""
+        """Position, m, and turning as in `Points`, over roughly the arc length, m."""
         return self.fit.spline
 
     @property
     def length(self) -> float:
-        """Range of sigma, about the arc length, m."""
+        """Range of sigma, roughly the arc length, m."""
         return float(self.fit.breaks[-1])
 
 
@@ -73,9 +73,9 @@ def _fit_between(
     scatter: Scatter,
     note: str | None,
 ) -> list[FittedCurve]:
-    """Cut points at their corners and fit a curve between every two of them.
+    """Cut points at their corners and fit a curve to each section.
 
-    `note` says what looks implausible in the points; it is the hint of the error.
+    `note` is a remark on implausible points, which becomes the hint of the error.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def _blend_between(
             f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
             found=f"points {1e3 * taken:.3g} mm from the fit at {first.points.describe(-1)}",
             allowed=f"{1e3 * tolerance.at_corners:.3g} mm",
-            hint="Give a larger tolerance.corner, or set corner: stop",
+            hint="Set a larger tolerance.corner, or corner: stop",
         )
     return blend_size(corner.angle, remaining, shortest)
 
@@ -150,7 +150,7 @@ def _fit_one(
     looks = str(scatter) if scatter.deviation else ""
     advised = 6.0 * scatter.deviation
     if looks and advised > tolerance.position:
-        looks += f"; give a tolerance of {1e3 * advised:.2g} mm or more"
+        looks += f"; set a tolerance of {1e3 * advised:.2g} mm or more"
     if fit.position_errors[i] <= tolerance.position:
         kind = "orientation"
         miss = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
@@ -168,24 +168,24 @@ def _fit_one(
 
 
 def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
-    """Return tables (sigma, speed), m and m/s, linear in between, of the stretches where a speed is prescribed.
+    """Return tables (sigma, speed), m and m/s, linear in between, of the sections with a prescribed speed.
 
-    The speed of a point is that on the way to it. A point takes the lower one of the ways before and after, so that
-    the table is nowhere above what was prescribed. What linear interpolation gives is left out.
+    The speed of a point applies on the way to it. The table has the lower of the speeds before and after each point, so
+    that it nowhere exceeds a prescribed speed. Rows that linear interpolation gives are left out.
 
     Parameters
     ----------
     sigma : (n,) ndarray
-        Where the points are.
+        Places of the points.
     speed : (n,) ndarray or None
-        On the way to them, m/s; NaN where none is prescribed.
+        Speeds on the way to the points, m/s; NaN where none is prescribed.
     """
     if speed is None or len(sigma) < 2:
         return ()
     sigma = np.maximum.accumulate(sigma)
     step_speeds = speed[1:]
     runs = []
-    # The stubs do not say what it returns: slices, in order.
+    # The function returns slices, in order, which the stubs do not say.
     for run in np.ma.clump_unmasked(np.ma.masked_invalid(step_speeds)):  # type: ignore[no-untyped-call]
         speeds = step_speeds[run]
         values = np.minimum(np.append(speeds[0], speeds), np.append(speeds, speeds[-1]))
@@ -204,19 +204,19 @@ def fit_curves(
     *,
     stops: bool = False,
 ) -> tuple[tuple[FittedCurve, ...], FitReport]:
-    """Return smooth curves within a tolerance of points, and what was found.
+    """Return smooth curves within a tolerance of points, and a report of the findings.
 
     Parameters
     ----------
     points : Points
     tolerance : FitTolerance
     stops : bool, optional
-        Whether the tool stops at corners, which are rounded otherwise.
+        Whether the tool stops at corners, which are otherwise rounded.
 
     Raises
     ------
     TaskError
-        Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
+        The points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     count = len(points)
     points = without_repetitions(points, tolerance.position)
@@ -270,13 +270,13 @@ def fit_curves(
 def _report_corner(
     points: Points, corner: Corner, distance: float, blend: float
 ) -> FoundCorner:
-    """Return what the report says of a corner at a distance along the path, m, with its blend, m."""
+    """Return the report of a corner at a distance along the path, m, with its blend, m."""
     row = int(points.rows[corner.index])
     return FoundCorner(row=row, angle=corner.angle, distance=distance, blend=blend)
 
 
 def _profile(*columns: Array) -> tuple[Any, ...]:
-    """Return the largest values of columns in successive groups of rows, at most a few hundred groups."""
+    """Return the largest values of columns in successive groups of rows, at most 400 groups."""
     count = len(columns[0])
     starts = np.linspace(0, count, min(count, 400), endpoint=False).astype(int)
     largest = [np.maximum.reduceat(values, starts).tolist() for values in columns]
@@ -286,16 +286,16 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
 def cut_at_corners(
     points: Points, *, stops: bool = False
 ) -> tuple[tuple[Points, ...], FitReport]:
-    """Return the parts of points through which one curve each is to go, and what is said of them.
+    """Return the sections of points through which one curve each passes, and their report.
 
-    It is checked that the curvature of these curves is not that of the points' scatter.
+    Points are refused if the curvature of these curves would mainly come from scatter.
 
     Parameters
     ----------
     points : Points
     stops : bool, optional
-        Whether the tool stops at corners, which are then the first and last points of parts. All points are one part
-        otherwise.
+        Whether the tool stops at corners, which are then the first and last points of sections. Otherwise all points
+        form one section.
 
     Raises
     ------
@@ -311,10 +311,10 @@ def cut_at_corners(
     if scatter.curvature * length > largest:
         raise TaskError(
             "the points are too rough for a curve through all of them: its curvature would be noise",
-            found=f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves",
+            found=f"{scatter}, which alone give a curvature of {scatter.curvature:.2g} 1/m",
             allowed=f"less than {largest / length:.2g} 1/m",
             where=points.source,
-            hint=f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}",
+            hint=f"Set a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}",
         )
     corners = find_corners(points, scatter, 0.0) if stops else ()
     cuts = [0, *(corner.index for corner in corners), len(points) - 1]

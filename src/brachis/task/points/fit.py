@@ -1,13 +1,13 @@
 """A smooth curve within a tolerance of points, with few knots.
 
-The curve is a quintic B-spline, C4, through the first and the last point, over about the arc length; of all with the
-same knots it has the least sum of squared distances. Intervals in which the tolerance is exceeded are halved; then
-knots that are not needed are taken away.
+The curve is a quintic B-spline (C4) through the first and the last point, over roughly the arc length. Of all such
+curves with the same knots, it has the least sum of squared distances. Intervals in which the tolerance is exceeded are
+halved; then unnecessary knots are removed.
 
-How far along the curve a point is follows from the points alone, and is then corrected by no more than a few
-tolerances. So a path may wind, cross itself, or be passed several times: no point is taken to another turn, neither by
-a first rough curve nor by the distances that are reported. These are distances to places on the curve in the order of
-the points, so they are never too small.
+The place of a point along the curve follows from the points alone, and is then corrected by no more than a few
+tolerances. So a path may wind, cross itself, or be repeated: no point is assigned to a different turn, neither by a
+first rough curve nor in the reported distances. These are distances to places on the curve in the order of the points,
+so they are never too small.
 """
 
 from __future__ import annotations
@@ -32,37 +32,38 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 DEGREE = 5
-"""Of all fitted curves: C4 at their knots."""
+"""Degree of all fitted curves, which are C4 at their knots."""
 _NOISY_POINTS = 10
-"""Least number of points in an interval where points scatter: with fewer a curve would follow the scatter."""
+"""Minimum number of points in an interval if points scatter: with fewer, a curve would follow the scatter."""
 _AIM = 0.9
-"""Part of the tolerance that a curve takes at points that do not scatter: it is farther off between them.
+"""Fraction of the tolerance that a curve uses at points without scatter, because it is farther away between them.
 With 1 the curves of 60 winding paths were up to 1.38 tolerances off there, with 0.9 up to 1.06, for 2 % more knots."""
 _MANY = 15_000
-"""Number of points for which knots are found: 50,000 of a raster took 9 s. Twenty turns of a helix need 2,000."""
+"""Number of points from which knots are found: 50,000 points of a raster took 9 s. Twenty turns of a helix need 2,000.
+"""
 _REACH = 3.0
-"""How many tolerances a place on the curve may be from where the points' lengths say it is: more than what lengths are
-off by, less than the distance to another turn."""
+"""Largest distance, in tolerances, of a place on the curve from the length along the points: more than the error of
+these lengths, and less than the distance to another turn."""
 _SMALL = 0.3
-"""Part of the tolerance up to which scatter is small."""
+"""Fraction of the tolerance up to which scatter counts as small."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A B-spline near points.
+    """A B-spline fitted to points.
 
     Attributes
     ----------
     spline : BSpline
-        Position and turning over sigma from 0 on, about the arc length, m.
+        Position and turning over sigma, which starts at 0 and is roughly the arc length, m.
     breaks : (N + 1,) ndarray
-        Its knots, each once.
+        Its knots, each listed once.
     sigma : (n,) ndarray
-        For every point, the nearest place on the curve.
+        The nearest place on the curve for every point.
     position_errors : (n,) ndarray
-        Distances, m.
+        Distances of the points from these places, m.
     turning_errors : (n,) ndarray
-        Angles there, rad.
+        Angles between the orientations there, rad.
     """
 
     spline: BSpline
@@ -72,7 +73,7 @@ class Fit:
     turning_errors: Array
 
     def ratios(self, tolerance: FitTolerance) -> Array:
-        """Return for every point how much of the tolerance it takes, (n,)."""
+        """Return the errors relative to the tolerance, (n,), the larger of both kinds at every point."""
         turning = self.turning_errors / tolerance.orientation
         return np.maximum(self.position_errors / tolerance.position, turning)
 
@@ -86,7 +87,7 @@ class Fit:
         )
 
     def over_length(self, dimension: int) -> Fit:
-        """Return the fit over a sigma that ends with the length of its curve, of this many position rows."""
+        """Return the fit over a sigma that ends at the length of the curve, of so many position rows."""
         from scipy.integrate import simpson
         from scipy.interpolate import BSpline
 
@@ -114,13 +115,13 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Fitter:
-    """What fits of the same points share.
+    """Data shared by all fits to the same points.
 
     Attributes
     ----------
     points : Points
     lengths : (n,) ndarray
-        How far along the path the points are, m; strictly ascending from zero.
+        Lengths along the path at the points, m, strictly ascending from zero.
     tolerance : FitTolerance
     """
 
@@ -129,9 +130,9 @@ class _Fitter:
     tolerance: FitTolerance
 
     def fit(self, breaks: Array) -> Fit:
-        """Return the spline of least squares with these knots, (N + 1,); it passes both ends.
+        """Return the least-squares spline with these knots, (N + 1,), through both ends.
 
-        Every interval must contain a point, and there must be N + 5 of them.
+        Every interval must contain a point, and there must be at least N + 5 points.
         """
         from scipy.interpolate import BSpline, make_lsq_spline
 
@@ -148,7 +149,7 @@ class _Fitter:
         return self.measure(BSpline(knots * length, control_points, DEGREE))
 
     def interpolate(self) -> Fit:
-        """Return the spline through all points: through few of them a polynomial, without inner knots."""
+        """Return the spline through all points; through few points it is a polynomial without inner knots."""
         from scipy.interpolate import make_interp_spline
 
         degree = min(len(self.points) - 1, DEGREE)
@@ -159,9 +160,9 @@ class _Fitter:
         return self.measure(spline)
 
     def measure(self, spline: BSpline) -> Fit:
-        """Return the fit with the places on the curve near `lengths` that are nearest to the points.
+        """Return the fit with the places on the curve, close to `lengths`, that are nearest to the points.
 
-        Distances and angles count by their tolerances: of points that scatter, angles tell better where they are.
+        Distances and angles are weighted by their tolerances, because angles locate scattered points better.
         """
         points = self.points
         dimension = points.dimension
@@ -188,8 +189,8 @@ class _Fitter:
 def lengths_along(position: Array, deviation: float) -> Array:
     """Return the length along the path at each of n positions, (n, p), m; strictly ascending from zero.
 
-    Where the points scatter, it is that of the polygon through the means of blocks of points, so long that the scatter
-    of the means is small beside it.
+    If the points scatter, it is the length of the polygon through the means of blocks of points. The blocks are so long
+    that the scatter of the means is small in comparison.
     """
     count = len(position)
     block = _block(position, deviation)
@@ -208,7 +209,7 @@ def lengths_along(position: Array, deviation: float) -> Array:
 
 
 def _arcs(position: Array) -> Array:
-    """Return the lengths of arcs, (n - 1,), m, between n positions: of the circles through three successive ones."""
+    """Return the lengths of arcs between n positions, (n - 1,), m, from circles through three successive positions."""
     chords = np.maximum(steps_of(position), 1e-9)
     directions = np.diff(position, axis=0) / chords[:, None]
     sine = steps_of(directions) * np.linalg.norm(
@@ -222,7 +223,7 @@ def _arcs(position: Array) -> Array:
 
 
 def _block(position: Array, deviation: float) -> int:
-    """Return how many points are averaged: twice as many until the blocks are far apart beside the scatter."""
+    """Return the number of points to average, doubled until the blocks are far apart compared with the scatter."""
     count = len(position)
     block = 1
     while deviation > 0.0 and 8 * block < count:
@@ -234,17 +235,17 @@ def _block(position: Array, deviation: float) -> int:
 
 
 def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
-    """Return a curve within the tolerance of points, with few knots, or the one that is nearest to it.
+    """Return a curve with few knots within the tolerance of points, or the closest curve if there is none.
 
-    Knots are found for some of the points if there are many, and are then added for all of them if needed.
+    If there are many points, knots are first found for some of them, and then added for all of them if needed.
 
     Parameters
     ----------
     points : Points
-        At least two; the position moves from each to the next.
+        At least two points; the position changes from each to the next.
     tolerance : FitTolerance
     scatter : Scatter
-        Of the points.
+        Scatter of the points.
     """
     lengths = lengths_along(points.position, scatter.deviation)
     fitter = _Fitter(points, lengths, tolerance)
@@ -272,14 +273,14 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
 
 
 def _scale(tolerance: FitTolerance, share: float) -> FitTolerance:
-    """Return a part of the tolerance of positions."""
+    """Return the tolerance with a fraction of its tolerance of positions."""
     return tolerance.model_copy(update={"position": share * tolerance.position})
 
 
 def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
-    """List the least numbers of points an interval may have, in the order in which they are tried.
+    """Return the minimum numbers of points per interval, in the order in which they are tried.
 
-    Scatter that is small beside the tolerance may be followed where the path bends.
+    If scatter is small compared with the tolerance, the curve may follow it where the path bends.
     """
     if not scatter.noisy(tolerance):
         return (1,)
@@ -291,9 +292,9 @@ def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
 
 
 def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
-    """Halve the intervals in which the tolerance is exceeded, or their points, until none is or none can be.
+    """Halve the intervals in which the tolerance is exceeded, from `breaks` on, until it is met or none can be halved.
 
-    It begins with `breaks`. No interval gets fewer points than `least`; one that has too few has its neighbours halved.
+    No interval gets fewer points than `least`. If an interval has too few points to be halved, its neighbours are.
     """
     lengths = fitter.lengths
     while True:
@@ -308,7 +309,7 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
         if not halved.any() or count + DEGREE > len(lengths):
             return fit
         middles = (breaks[1:] + breaks[:-1]) / 2.0
-        # In the middle, or as near to it as leaves enough points on both sides.
+        # In the middle, or as close to it as possible with enough points on both sides.
         seconds = np.searchsorted(lengths, middles).clip(
             firsts[:-1] + least, firsts[1:] - least
         )
@@ -321,13 +322,13 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
 
 
 def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
-    """Take knots away, many at a time, as long as all points stay within the tolerance."""
+    """Remove knots, many at a time, as long as all points stay within the tolerance."""
     needed = np.empty(0)
     while True:
         worst = fit.worst_between_knots(fitter.tolerance)
         beside = np.maximum(worst[:-1], worst[1:])
         beside[np.isin(fit.breaks[1:-1], needed)] = np.inf
-        # No two neighbours at once: of every pair the one that has more of the tolerance to spare.
+        # Never two neighbours at once: of every pair the one with more of the tolerance to spare.
         around = np.pad(beside, 1, constant_values=np.inf)
         chosen = (beside < 1.0) & (beside <= around[:-2]) & (beside < around[2:])
         removed = fit.breaks[1:-1][chosen]

@@ -1,9 +1,9 @@
-"""G-code: rapid and straight moves, arcs, feed rates (G0, G1, G2, G3, F), in any plane, absolute or incremental.
+"""G-code: rapid and straight moves, arcs and feed rates (G0, G1, G2, G3, F) in any plane, absolute or incremental.
 
-Moves become points on them: lines are straight between their ends, arcs are met within a micrometre. What does not say
-where the tool's tip goes (spindle, coolant, the tool's length, one work offset) is skipped and reported; what would
-(cycles, cutter compensation, rotary axes, subprograms, a change of the work offset) is refused, and so is a letter that
-may change the path. M2 and M30 end the program.
+Moves are replaced by points on them, with arcs accurate to a micrometre. Codes that do not affect the path of the tool
+tip (spindle, coolant, tool length, one work offset) are skipped and reported. Codes that would affect it (cycles,
+cutter compensation, rotary axes, subprograms, changes of the work offset) are refused, and so are letters that may
+change the path. M2 and M30 end the program.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(
     r"((?<![0-9.])E|[A-DF-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?![0-9.]*E[0-9.+-])"
 )
-"""A letter and its number, which has no exponent: an E that follows a number at once is no word."""
+"""A letter and its number, without exponent: an E directly after a number is not a word."""
 _COMMENT = re.compile(r"\([^)]*\)|;.*$|%")
 _MODES: Final = {
     **{f"G{number}": ("motion", f"G{number}") for number in range(4)},
@@ -38,38 +38,38 @@ _MODES: Final = {
     "G90.1": ("absolute_centres", True),
     "G91.1": ("absolute_centres", False),
 }
-"""What codes set. Of a plane: the axes of its arcs, then the one along its normal."""
+"""Settings made by codes. For a plane: the two axes of its arcs, then the axis along its normal."""
 _UNITS: Final = {"G20": 0.0254, "G21": 1e-3}
 _IGNORED: Final = {"G8", "G15", "G40", "G43", "G49", "G61", "G64", "G69", "G80", "G94"}
 _OFFSET_CHANGES: Final = (
-    "the work offset changes within the program: where the tool goes is not known"
+    "the work offset changes within the program, so the position of the tool is unknown"
 )
 _REFUSED: Final = {
     "G4": "a dwell is not read: cut the file there and set dwell on the segment",
     "G7": "X would be a diameter: write radii (G8)",
-    **dict.fromkeys(("G28", "G30"), "the machine's reference position is not known"),
+    **dict.fromkeys(("G28", "G30"), "the machine's reference position is unknown"),
     **dict.fromkeys(
         ("G73", "G76", *(f"G{number}" for number in range(81, 90))),
         "canned cycles are not read",
     ),
     **dict.fromkeys(("M97", "M98", "M99"), "subprograms are not read"),
 }
-"""Codes that lead the tool to where this reader does not know, with the reason."""
+"""Codes after which this reader would not know the position of the tool, with the reason."""
 _OFFSETS: Final = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _PIECES = 4
-"""Fewest points on a move."""
+"""Minimum number of points on a move."""
 _ROUND = 2e-3
-"""How much the radii of an arc at its start and end may differ, as a fraction of it."""
+"""Largest difference of the radii at the start and end of an arc, as a fraction of the radius."""
 
 _MOST_TURNS: Final = 1_000
-"""Of one arc: with a radius of 1 m its points take 53 MB."""
+"""Largest number of turns of one arc; with a radius of 1 m its points take 53 MB."""
 
 
 @dataclass
 class _Machine:
-    """What the words so far have set; `at` has NaN where an axis has not been stated yet.
+    """State after the words read so far; `at` has NaN for an axis that has not been stated yet.
 
-    `moves` has the places on every move, (k, 3), with its speed and its line.
+    `moves` contains the points on every move, (k, 3), with its speed and line.
     """
 
     source: str
@@ -90,20 +90,20 @@ class _Machine:
     def wrong(
         self, problem: str, found: str, allowed: str, hint: str | None = None
     ) -> TaskError:
-        """Return the error that the line is wrong."""
+        """Return the error for a mistake in the current line."""
         where = f"{self.source}: line {self.line}"
         return TaskError(problem, found=found, allowed=allowed, where=where, hint=hint)
 
 
 def read_gcode(text: str, rows: Rows, source: str) -> Points:
-    """Return the points of a program, with notes on what was skipped.
+    """Return the points of a program, with notes on skipped codes.
 
     Parameters
     ----------
     text : str
         The program.
     rows : tuple of str or str
-        Rows of the task space, or the word for one of poses, whose position the program gives.
+        Rows of the task space, or its name if it is one of poses; the program gives the position.
     source : str
         The file, for messages.
 
@@ -133,10 +133,10 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
         missing = ", ".join(compress("XYZ", np.isnan(machine.at)))
         raise TaskError(
             "the program contains no motion",
-            found=write_count(sum(counts), "place"),
+            found=write_count(sum(counts), "point"),
             allowed="2 or more",
             where=source,
-            hint=f"{missing} is missing" if missing else None,
+            hint=f"{missing} is never stated" if missing else None,
         )
     chosen = [POSITION.index(name) for name in names]
     moves, speeds, lines = zip(*machine.moves, strict=True)
@@ -145,7 +145,7 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
     notes = ["G-code"]
     if not machine.unit_stated:
         notes.append(
-            "lengths are in millimetres, as the program has neither G20 nor G21"
+            "lengths are in millimetres, because the program has neither G20 nor G21"
         )
     if machine.skipped:
         notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
@@ -160,7 +160,7 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
 
 
 def _obey(machine: _Machine, code: str) -> None:
-    """Obey one line, without its comments."""
+    """Execute one line without its comments."""
     values, codes = _read_words(machine, code)
     for mode in codes:
         _set_mode(machine, mode)
@@ -182,7 +182,7 @@ def _obey(machine: _Machine, code: str) -> None:
 
 
 def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[str]]:
-    """Return the numbers of a line by their letters, and its codes, such as G1 or M30."""
+    """Return the numbers of a line by letter, and its codes, such as G1 or M30."""
     unread = _WORD.sub("", code).strip()
     if unread:
         raise machine.wrong(
@@ -203,7 +203,7 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
             )
         elif letter in values:
             raise machine.wrong(
-                "a letter stands twice in a line", letter + text, "once"
+                "a letter occurs twice in a line", letter + text, "once"
             )
         elif letter in "XYZIJKRFPLQ":
             values[letter] = float(text)
@@ -213,7 +213,7 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
 
 
 def _set_mode(machine: _Machine, code: str) -> None:
-    """Obey a preparatory function, such as G1, or a miscellaneous one, such as M30."""
+    """Execute a preparatory function, such as G1, or a miscellaneous one, such as M30."""
     if code in _MODES:
         name, value = _MODES[code]
         setattr(machine, name, value)
@@ -229,7 +229,7 @@ def _set_mode(machine: _Machine, code: str) -> None:
             machine.offset = code
         machine.ended |= code in {"M2", "M30"}
         machine.skipped.add(code)
-    elif code != "G92":  # which is obeyed with the places of its line
+    elif code != "G92":  # it is executed with the coordinates of its line
         raise machine.wrong(
             "this code is not read",
             code,
@@ -240,16 +240,16 @@ def _set_mode(machine: _Machine, code: str) -> None:
 def _move(
     machine: _Machine, motion: str | None, values: dict[str, float], absolute: bool
 ) -> None:
-    """Go on to the place that a line names.
+    """Move to the position that a line states.
 
     Raises
     ------
     TaskError
-        There is no motion, a letter may change the path in a way that is not known, or the place is not known.
+        There is no motion code, a letter may change the path in an unknown way, or the position is unknown.
     """
     if motion is None:
         raise machine.wrong(
-            "a move before G0, G1, G2 or G3", "coordinates", "a motion first"
+            "coordinates before G0, G1, G2 or G3", "coordinates", "a motion code first"
         )
     understood = set("XYZ")
     if motion in {"G2", "G3"}:
@@ -266,10 +266,10 @@ def _move(
         if axis in values:
             if not absolute and np.isnan(start[i]):
                 raise machine.wrong(
-                    f"{axis} is incremental (G91), but where the tool is before this move is not known",
+                    f"{axis} is incremental (G91), but the position before this move is unknown",
                     f"{axis}{values[axis]:g}",
-                    "an absolute place before G91",
-                    "Begin with G90 G0 and the place where the tool is; with relative: true any place will do",
+                    "an absolute position before G91",
+                    "Begin with G90 G0 and the position of the tool; with relative: true any position will do",
                 )
             base = 0.0 if absolute else start[i]
             end[i] = base + values[axis] * machine.unit
@@ -289,14 +289,14 @@ def _move(
 
 
 def _shares(count: int) -> Array:
-    """Return the ends of the parts of a move, (count, 1), from 0 to 1."""
+    """Return fractions of a move, (count, 1), evenly spaced up to 1."""
     return (np.arange(1, count + 1) / max(count, 1))[:, None]
 
 
 def _arc(
     machine: _Machine, start: Array, end: Array, values: dict[str, float]
 ) -> Array:
-    """Return places on an arc, (k, 3); in its plane, points are complex numbers."""
+    """Return points on an arc, (k, 3); in its plane, points are complex numbers."""
     *plane, normal = machine.plane
     begin = complex(*start[plane])
     finish = complex(*end[plane])
@@ -312,12 +312,12 @@ def _arc(
         raise machine.wrong(
             "invalid arc: its start and end are at different radii",
             f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end",
-            "one radius; I, J, K from the start",
+            "one radius; I, J, K measured from the start",
         )
     turn = -2.0 * pi if machine.motion == "G2" else 2.0 * pi
     swept = (
         phase(finish - centre) - phase(begin - centre)
-    ) % turn  # of the sign of turn
+    ) % turn  # with the sign of turn
     if min(abs(swept), abs(swept - turn)) < 1e-9:
         swept = turn
     turns = values.get("P", 1.0)
@@ -341,14 +341,14 @@ def _arc(
 def _centre(
     machine: _Machine, begin: complex, finish: complex, radius: float
 ) -> complex:
-    """Return the centre of an arc of given radius; a negative one is that of more than half a turn."""
+    """Return the centre of an arc of given radius; a negative radius means more than half a turn."""
     chord = finish - begin
     length = abs(chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
         raise machine.wrong(
-            "invalid arc: no circle of this radius passes both ends",
+            "invalid arc: no circle of this radius passes through both ends",
             f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart",
-            "ends at most 2 R apart, and not the same",
+            "different ends, at most 2 R apart",
         )
     away = sqrt(max(radius**2 - length**2 / 4.0, 0.0))
     side = -1.0 if (machine.motion == "G2") != (radius < 0.0) else 1.0

@@ -1,4 +1,4 @@
-"""Points that a path is to follow, in SI units, with what messages need to name them; from arrays and transforms."""
+"""Points of a path in SI units, made from arrays and transforms, with their names for messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 Rows = tuple[str, ...] | str
-"""Rows of the task space, or the word for one of poses."""
+"""Rows of the task space, or its name if it is one of poses."""
 QUATERNION = 4
 
 
@@ -29,9 +29,9 @@ class Points:
     Attributes
     ----------
     position : (n, p) ndarray
-        m.
+        Positions, m.
     turning : (n, q) ndarray
-        Unit quaternions w, x, y, z whose signs make neighbours close (q = 4), yaw in rad (q = 1), or nothing (q = 0).
+        Unit quaternions w, x, y, z with signs that make neighbours close (q = 4), yaw in rad (q = 1), or none (q = 0).
     speed : (n,) ndarray or None
         Speed of the tool on the way to each point, m/s; NaN where it is not prescribed.
     rows : (n,) int ndarray
@@ -39,9 +39,9 @@ class Points:
     source : str
         File or argument, for messages.
     row : str
-        What `rows` counts: ``line`` or ``row``.
+        Word for an entry of `rows`: ``line`` or ``row``.
     notes : tuple of str
-        What was found out about the points.
+        Findings about the points.
     """
 
     position: Array
@@ -73,11 +73,11 @@ class Points:
 
     @property
     def steps(self) -> Array:
-        """Distances of successive points, (n - 1,), m."""
+        """Distances between successive points, (n - 1,), m."""
         return steps_of(self.position)
 
     def only(self, chosen: Any) -> Points:
-        """Return some of the points."""
+        """Return the chosen points."""
         return replace(
             self,
             position=self.position[chosen],
@@ -87,33 +87,33 @@ class Points:
         )
 
     def name_row(self, i: int) -> str:
-        """Name the row of a point."""
+        """Return the name of a point's row."""
         return f"{self.row} {self.rows[i]}"
 
     def describe(self, i: int) -> str:
-        """Name the row and the position of a point."""
+        """Return the row and the position of a point in words."""
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
         return f"{self.name_row(i)}, [{place}] m"
 
     def wrong(self, i: int, problem: str, **details: Unpack[Details]) -> TaskError:
-        """Return the error that something is wrong with a point; without `found`, with its row and position."""
+        """Return the error for a mistake at a point; `found` is by default its row and position."""
         details.setdefault("found", self.describe(i))
         details["where"] = f"{self.source}: {self.name_row(i)}"
         return TaskError(problem, **details)
 
 
 def steps_of(position: Array) -> Array:
-    """Return the distances, (n - 1,), of successive positions, (n, p)."""
+    """Return the distances, (n - 1,), between successive positions, (n, p)."""
     return np.linalg.norm(np.diff(position, axis=0), axis=1)
 
 
 def is_repeated(
     steps: Array, largest: float = tolerances.WRITTEN
 ) -> npt.NDArray[np.bool_]:
-    """Tell which of n - 1 steps, m or rad, lead to no other place.
+    """Return which of n - 1 steps, m or rad, repeat a point.
 
-    They are shorter than rounding, or shorter than `largest` and than a hundredth of the steps before and after: a
-    curve through both places would swing into the direction from one to the other, which says nothing.
+    They are shorter than rounding, or shorter than both `largest` and a hundredth of the steps before and after. A
+    curve through both points would swing into the direction from one to the other, which is meaningless.
     """
     around = np.pad(steps, 1, mode="reflect")
     shorter = np.minimum(around[:-2], around[2:])
@@ -127,9 +127,9 @@ def sum_up(steps: npt.ArrayLike) -> Array:
 
 
 def project_on_sides(points: Array, begin: Array, side: Array) -> tuple[Array, Array]:
-    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,).
+    """Return the places nearest to points, (n, p), on the sides that start at `begin`, and the distances there, (n,).
 
-    Beside it stand the distances there, (n,).
+    The places are fractions of the sides, (n,).
     """
     away = points - begin
     lengths = np.maximum(np.sum(side**2, axis=1), 1e-300)
@@ -138,7 +138,7 @@ def project_on_sides(points: Array, begin: Array, side: Array) -> tuple[Array, A
 
 
 def angles_between(first: Array, second: Array) -> Array:
-    """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
+    """Return the angles, (n,), rad, between orientations (n, q) as in `Points.turning`; zero if there are none."""
     if first.shape[1] != QUATERNION:
         return np.abs(first - second).sum(axis=1)
     unit = first / np.linalg.norm(first, axis=1)[:, None]
@@ -157,27 +157,28 @@ def points_from(
     *,
     least: int = 2,
 ) -> Points:
-    """Return points from what a program has.
+    """Return points from the arrays or transforms of a program.
 
     Parameters
     ----------
     points : array_like, (n, p) or (n, 4, 4), or sequence of transforms
-        Positions; or homogeneous matrices, or objects that have one.
+        Positions, homogeneous matrices, or objects that have such a matrix.
     orientations : Rotation, array_like, (n, 3, 3) or (n,), or None
-        SciPy's rotations; rotation matrices; yaw.
+        SciPy rotations, rotation matrices, or yaw angles.
     speed : array_like, (n,), or None
-        NaN where none is prescribed.
+        Speeds, NaN where none is prescribed.
     units : FileUnits
-        Of the numbers; m, rad and m/s where not stated.
+        Units of the numbers; m, rad and m/s if not stated.
     source : str
-        What messages call the points.
+        Name of the points in messages.
     least : int, optional
-        How many there must be.
+        Minimum number of points.
 
     Raises
     ------
     TaskError
-        Arrays of wrong shapes, with numbers that are not finite, or matrices that are not rotations; with the row.
+        An array has the wrong shape or numbers that are not finite, or a matrix is not a rotation; the message names
+        the row.
     """
     values = _array(_matrices(points), source, source)
     if values.ndim == 3 and values.shape[1:] == (4, 4) and orientations is None:
@@ -207,7 +208,7 @@ def points_from(
 
 
 def _matrices(points: Any) -> Any:
-    """Return the homogeneous matrices of transforms; anything else as it is."""
+    """Return the homogeneous matrices of transforms; other values are returned unchanged."""
     if isinstance(points, list | tuple) and points:
         if all(hasattr(transform, "homogeneous") for transform in points):
             return [transform.homogeneous for transform in points]
@@ -237,7 +238,7 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     raise TaskError(
         problem,
         found=values.shape,
-        allowed="SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw",
+        allowed="SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w), (n, 3, 3) matrices, or (n,) yaw",
         where=where,
     )
 
@@ -274,7 +275,7 @@ def _numbers(values: Any, where: str) -> Array:
 
 
 def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
-    """Refuse the first of the rows of which anything is bad."""
+    """Refuse the first row with a bad value."""
     rows = np.flatnonzero(bad.any(axis=tuple(range(1, bad.ndim))))
     if rows.size:
         raise TaskError(

@@ -1,4 +1,4 @@
-"""Tables of numbers as text, with delimiters, decimal commas, byte order marks; and what the columns of points are.
+"""Tables of numbers as text, with delimiters, decimal commas and byte order marks; and the columns of points.
 
 Columns are named ``x``, ``x_mm``, ``X [mm]``, ``rx (deg)``, ``feed_mm/min``, ... in any order.
 """
@@ -39,14 +39,14 @@ class Table:
     ----------
     header : tuple of str
     where : str
-        Its place, for messages.
+        Place of the header, for messages.
     body : dict of int to str
-        The other lines by their numbers, from 1 on, with decimal points.
+        The other lines, with decimal points, by their numbers counted from 1.
     delimiter : str
     source : str
-        The file, for messages.
+        Name of the file, for messages.
     notes : tuple of str
-        What was found out about the form of the file.
+        Findings about the form of the file.
     """
 
     header: tuple[str, ...]
@@ -58,17 +58,17 @@ class Table:
 
     @property
     def lines(self) -> Indices:
-        """Where in the file the numbers stand, (n,)."""
+        """Line numbers of the rows in the file, (n,)."""
         return np.array(list(self.body))
 
     @cached_property
     def values(self) -> Array:
-        """The numbers as written, in the file's units, (n, c).
+        """The numbers in the units of the file, (n, c).
 
         Raises
         ------
         TaskError
-            A line has the wrong number of values, or one that is not a finite number; the message names line and
+            A line has the wrong number of values, or a value that is not a finite number; the message names line and
             column.
         """
         if not self.body:
@@ -82,7 +82,7 @@ class Table:
 
 
 def read_table(text: str, source: str, allowed: str) -> Table:
-    """Read a table whose first line names the columns; lines that are empty or begin with ``#`` are skipped.
+    """Return a table whose first line names the columns; empty lines and lines that begin with ``#`` are skipped.
 
     Parameters
     ----------
@@ -91,12 +91,12 @@ def read_table(text: str, source: str, allowed: str) -> Table:
     source : str
         The file, for messages.
     allowed : str
-        The columns that it may have, for messages.
+        The possible columns, for messages.
 
     Raises
     ------
     TaskError
-        The file is empty, or is not a table.
+        The file is empty or not a table.
     """
     notes = ["a byte order mark"] if text.startswith("\ufeff") else []
     body = {
@@ -123,7 +123,7 @@ def read_table(text: str, source: str, allowed: str) -> Table:
 
 
 def _with_point(line: str, where: str) -> str:
-    """Write decimal commas as points, unless there are both: one of them would separate thousands."""
+    """Replace decimal commas by points; a line with both is refused, because one of them would separate thousands."""
     if "," in line and "." in line:
         raise TaskError(
             "the line has both decimal points and decimal commas",
@@ -192,8 +192,8 @@ _ORIENTATIONS: Final = {
     ("a", "e", "r"): ("euler_zyz",),
     ("i", "j", "k"): (),
 }
-"""Columns of orientations, and the conventions that each may be in: the numbers of a convention are in this order. The
-tool's axis has none."""
+"""Columns of orientations with their possible conventions, whose numbers are in this order. The tool's axis has no
+convention."""
 _SPEED: Final = "feed"
 _SPEED_NAMES: Final = ("feed", "feedrate", "f", "speed", "v")
 _HEADING = re.compile(
@@ -202,7 +202,7 @@ _HEADING = re.compile(
 
 
 def _allowed_columns(rows: Rows) -> str:
-    """Return the columns that a file may have, for messages."""
+    """Return the possible columns of a file, for messages."""
     return " | ".join(",".join(choice) for choice in _choices(rows))
 
 
@@ -218,29 +218,29 @@ def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
 def _read_columns(
     table: Table, rows: Rows, stated: str | None
 ) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...], str | None]:
-    """Return what the columns of a table are.
+    """Return the meaning of the columns of a table.
 
     Parameters
     ----------
     table : Table
     rows : tuple of str or str
-        Rows of the task space, or the word for one of poses.
+        Rows of the task space, or its name if it is one of poses.
     stated : str, optional
-        Convention of the orientations, as the task states it.
+        Convention of the orientations that the task states.
 
     Returns
     -------
     places : dict of str to (int, str or None)
         Index and unit of every column by its name.
     names : tuple of str
-        Those that belong to positions and orientations.
+        Names of the columns of positions and orientations.
     convention : str or None
-        That of the orientations, where there are any.
+        Convention of the orientations; None if there are none.
 
     Raises
     ------
     TaskError
-        Columns are missing or unknown, or the convention of their orientations is not known.
+        Columns are missing or unknown, or the convention of their orientations is unknown.
     """
     places = {}
     for column, text in enumerate(table.header):
@@ -263,7 +263,7 @@ def _read_columns(
 
 
 def _heading(text: str) -> tuple[str, str | None]:
-    """Return name and unit of a heading; a name that is not understood as it is written."""
+    """Return name and unit of a heading; a heading that is not understood is returned unchanged."""
     match = _HEADING.match(text.strip().lower())
     if match is None:
         return text, None
@@ -273,7 +273,7 @@ def _heading(text: str) -> tuple[str, str | None]:
 
 
 def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str | None:
-    """Return the convention of the orientations: the only one that the columns leave, or the one that is stated."""
+    """Return the convention of the orientations: the only possible one for the columns, or the stated one."""
     columns = tuple(name for name in names if name not in POSITION)
     possible = _ORIENTATIONS.get(columns, ())
     if stated is None and len(possible) > 1:
@@ -281,7 +281,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
             f"the columns {', '.join(columns)} do not state the convention of the orientation",
             allowed=f"csv.orientation: {choices(possible)}",
             where=where,
-            hint="State it in the task, csv: {file: ..., orientation: ...}; another choice gives another motion",
+            hint="State it in the task, csv: {file: ..., orientation: ...}; the wrong one gives a wrong motion",
         )
     if stated is not None and stated not in possible:
         usual = [
@@ -293,7 +293,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
         if possible:
             hint = f"Or csv.orientation: {choices(possible)}"
         raise TaskError(
-            f"csv.orientation is {stated}, which the columns of the file do not have",
+            f"csv.orientation is {stated}, which does not fit the columns of the file",
             found=", ".join(names),
             allowed=f"columns {' | '.join(usual)} for {stated}",
             where=where,
@@ -305,7 +305,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
 def _factor_of(
     name: str, kind: str, unit: str | None, task_unit: str | None, where: str
 ) -> float:
-    """Return the factor to SI units of a column's unit, which may not differ from the one that the task asks for.
+    """Return the factor from a column's unit to SI units; the unit must not differ from that of the task.
 
     Raises
     ------
@@ -326,7 +326,7 @@ def _factor_of(
     elif task_unit is None or factors[task_unit] == factors[unit]:
         return factors[unit]
     else:
-        problem = "the header contradicts the task's units"
+        problem = "the header contradicts the units in the task"
         allowed = task_unit
     raise TaskError(problem, found=f"{unit} for {name}", allowed=allowed, where=where)
 
@@ -339,17 +339,17 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
     text : str
         The table.
     rows : tuple of str or str
-        Rows of the task space, or the word for one of poses.
+        Rows of the task space, or its name if it is one of poses.
     settings : PointFile
-        Units, and convention of the orientations, as the task states them.
+        Units and convention of the orientations that the task states.
     source : str
-        The file, for messages.
+        Name of the file, for messages.
 
     Raises
     ------
     TaskError
-        Columns are missing or unknown, units are missing or contradict each other, a quaternion or an axis has no unit
-        length, or a feed rate is not positive.
+        Columns are missing or unknown, units are missing or contradict each other, a quaternion or an axis does not
+        have unit length, or a feed rate is not positive.
     """
     table = read_table(text, source, _allowed_columns(rows))
     places, names, convention = _read_columns(table, rows, settings.orientation)
@@ -358,7 +358,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
     notes = [*table.notes]
 
     def read(names: Sequence[str], kind: str) -> Array:
-        """Read columns of one kind of quantity in SI units."""
+        """Return the columns of one kind of quantity in SI units."""
         chosen = [places[name] for name in names]
         task_unit = getattr(settings.units, kind)
         usual = task_unit or defaults.get(kind)
@@ -387,7 +387,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
     if has_axis:
         if rows == "pose":
             raise TaskError(
-                "the columns i, j, k give the tool's axis, and leave its roll open",
+                "the columns i, j, k state the tool's axis but not its roll",
                 found="task_space pose",
                 allowed="task_space pose_free_roll",
                 where=table.where,
@@ -407,7 +407,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
 
 
 def _check_lengths(points: Points, name: str) -> None:
-    """Refuse the first row of `turning` that has no unit length."""
+    """Refuse the first row of `turning` that does not have unit length."""
     lengths = np.linalg.norm(points.turning, axis=1)
     for i in np.flatnonzero(np.abs(lengths - 1.0) > 0.01).tolist():
         raise points.wrong(
@@ -419,7 +419,7 @@ def _check_lengths(points: Points, name: str) -> None:
 
 
 def _with_quaternions(points: Points, convention: str) -> Points:
-    """Return points with quaternions w, x, y, z for orientations in a convention, angles in rad."""
+    """Return points whose orientations, in a convention with angles in rad, become quaternions w, x, y, z."""
     if convention.startswith("quaternion"):
         _check_lengths(points, "quaternion")
     quaternions = quaternions_of(rotation_by(convention, points.turning))
@@ -427,9 +427,9 @@ def _with_quaternions(points: Points, convention: str) -> Points:
 
 
 def _with_rolls(points: Points) -> Points:
-    """Return points with quaternions w, x, y, z for directions of the tool's z axis.
+    """Return points with quaternions w, x, y, z in place of directions of the tool's z axis.
 
-    From each to the next the tool turns about the normal of both axes: it never rolls about its own.
+    From each direction to the next, the tool turns about the normal of both; it never rolls about its own axis.
     """
     from scipy.spatial.transform import Rotation
 
@@ -442,7 +442,7 @@ def _with_rolls(points: Points) -> Points:
     for i in np.flatnonzero(cosines < -1.0 + 1e-6).tolist():
         raise points.wrong(
             i,
-            "the tool's axis turns by half a turn from one row to the next",
+            "the tool's axis reverses from one row to the next",
             hint="Add rows in between",
         )
     half_turns = np.column_stack([np.cross(before, axes), 1.0 + cosines])

@@ -1,6 +1,6 @@
-"""Units of lengths, angles and speeds.
+"""Units of lengths, angles and speeds, and conventions for orientations.
 
-How orientations are written down: by quaternions, rotation vectors, and the angles that the makers of robots use.
+Orientations are written as quaternions, rotation vectors, or the angles used by manufacturers of robots.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ SPEEDS: Final = {
     "inch/min": 0.0254 / 60.0,
 }
 UNITS: Final = {"length": LENGTHS, "angle": ANGLES, "speed": SPEEDS}
-"""Factors to SI units by kind of quantity."""
+"""Factors to SI units, by kind of quantity."""
 
 
 @dataclass(frozen=True)
 class Convention:
-    """Meaning of the numbers of an orientation.
+    """The meaning of the numbers of an orientation.
 
     Attributes
     ----------
     meaning : str
-        In words.
+        Meaning in words.
     makers : str
-        Who uses it.
+        Manufacturers and software that use it.
     euler : str
-        SciPy's word for the axes of three angles: small letters are fixed axes, capitals turn with the tool; empty for
-        what is not made of angles.
+        SciPy's code for the axes of three angles: small letters for fixed axes, capitals for axes that turn with the
+        tool; empty for a convention without such angles.
     """
 
     meaning: str
@@ -88,7 +88,7 @@ CONVENTIONS: Final = {
 
 
 def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> str:
-    """List conventions with their meaning and who uses them, for messages; `suffix` follows those of angles."""
+    """List conventions with their meaning and users, for messages; `suffix` is added to conventions of angles."""
     listed = ((name, CONVENTIONS[name]) for name in names)
     return "; ".join(
         f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})"
@@ -114,11 +114,11 @@ def values_of(convention: str, rotation: Rotation) -> npt.NDArray[Any]:
     if convention == "rotation_vector":
         return rotation.as_rotvec()
     with warnings.catch_warnings():
-        # One of the many ways to write a rotation is as good as another.
+        # In gimbal lock, any of the many ways to write a rotation is fine.
         warnings.filterwarnings("ignore", "Gimbal lock")
         return rotation.as_euler(CONVENTIONS[convention].euler)  # type: ignore[call-overload]
 
 
 def quaternions_of(rotation: Rotation) -> npt.NDArray[Any]:
-    """Return the unit quaternions w, x, y, z, (..., 4), one of both, of rotations."""
+    """Return unit quaternions w, x, y, z of rotations, (..., 4), with either sign."""
     return rotation.as_quat(scalar_first=True)
