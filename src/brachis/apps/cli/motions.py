@@ -132,7 +132,7 @@ def export(
 
     Examples
     --------
-    brachis export out/result.npz --out out/motion.csv --profile kuka_rsi_4ms
+    brachis export out/result.npz --out out/run.csv --profile kuka_rsi_4ms
     brachis export out/result.npz --out out/motion.csv --dt 0.004
     brachis export out/result.npz --out out/motion.gif --dt 0.1
     """

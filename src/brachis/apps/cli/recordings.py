@@ -104,7 +104,9 @@ def compare(
     figures: bool = True,
     json: Json = False,
 ) -> None:
-    """Compare a recorded motion with a plan along its path, or a run with its plan.
+    """Compare a recorded motion with a plan.
+
+    It is planned along the path of the recording; or, with --plan, it is the plan that was run.
 
     Parameters
     ----------
