@@ -9,6 +9,8 @@ from brachis.limits import Label, Limit, Partials
 from brachis.limits.checks import sample_moments
 from brachis.problem.problem import Problem
 from brachis.task import task_with
+from support.checks import check_of
+from support.effort import QUICK
 
 ROBOT = brachis.robots.scara3
 TASK = task_with(brachis.examples.scara_line, redundant_joints=["j1"])
@@ -94,7 +96,7 @@ def test_the_numbers_are_those_of_the_joint():
         bind(wrong)
 
 
-def test_values_that_use_the_jerk_need_order_3():
+def test_values_that_use_the_jerk_need_order_3_and_limit_it():
     def values(motion):
         return motion.qdddot[:, :1] / 10.0
 
@@ -104,7 +106,13 @@ def test_values_that_use_the_jerk_need_order_3():
     with pytest.raises(InputError, match="depends on qdddot") as caught:
         bind(Sum(values, partials))
     assert caught.value.where == "own_limits[0].order"
-    bind(Sum(values, partials, order=3))
+    limit = Sum(values, partials, order=3)
+    result = brachis.plan(ROBOT, TASK, own_limits=[limit], **QUICK)
+    assert result.verified
+    jerk = result.trajectory.jerk(np.linspace(0.0, result.t_end, 2001))[:, 0]
+    assert np.abs(jerk).max() == pytest.approx(10.0, rel=1e-3)
+    check = check_of(result.verification, "sum ratio")
+    assert check.value == pytest.approx(1.0, rel=1e-3)
 
 
 def torque_partials(motion):

@@ -17,6 +17,9 @@ def test_values_are_those_of_the_limits(case):
     evaluation = phase.evaluate(x)
     expected = [limit.values(evaluation.motion) for limit in phase.limits]
     assert_array_equal(evaluation.values, np.hstack(expected))
+    chain = phase.joint_map.robot.chain
+    quick = {limit.kind for limit in phase.limits if limit.kernel_quantity(chain)}
+    assert quick >= {"torque", "velocity", "acceleration", "position", "jerk"}
     is_mean = phase.evaluator.is_mean
     assert evaluation.values.shape == (len(phase.t_norm), len(is_mean))
     assert 0 < np.count_nonzero(is_mean) < len(is_mean)
@@ -41,6 +44,7 @@ def test_limits_of_another_robot_and_subclasses_have_values_of_their_own():
     )
     (phase,) = program.phases
     robot = phase.joint_map.robot
+    assert all(limit.kernel_quantity(robot.chain) for limit in phase.limits)
     heavy = robot.with_payload(3.0)
     joints = np.arange(robot.n)
     limits = (

@@ -164,6 +164,7 @@ WRONG = [
         {"points": wave(5), "orientations": np.ones(4)},
         r"the numbers of points and of rows of orientations differ; found 4; allowed: 5",
     ),
+    ({"points": np.zeros((5, 4))}, r"wrong shape; found \(5, 4\)"),
     ({"points": np.empty((0, 3))}, r"wrong shape; found \(0, 3\)"),
     (
         {"points": wave(5), "speed": np.full(5, np.inf)},

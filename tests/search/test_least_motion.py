@@ -7,9 +7,11 @@ import pytest
 
 import brachis
 from brachis.common.deadline import NEVER, Deadline
+from brachis.robot.from_task import robot_for
 from brachis.search import least_motion
 from brachis.task import task_with
 from brachis.trajectory import Trajectory
+from support.starts import starting_points
 
 NOTEWORTHY = 0.01
 """A velocity above this part of its limit."""
@@ -88,6 +90,20 @@ def compare_sensitivities(first, second, **near):
         label = entry.label
         again = theirs.sensitivities.of(label.subject, label.kind, entry.side)
         assert again.derivative == pytest.approx(entry.derivative, **near)
+
+
+def test_joints_count_in_proportion_to_their_velocity_limits_or_velocities():
+    task = TASKS["free roll"]
+    robot = robot_for(None, task.robot)
+    most = robot.limits.velocity.copy()
+    most[:2] = np.inf
+    program, _ = brachis.transcribe(robot.with_limits(velocity=most), task)
+    x = next(starting_points(program))
+    (state,) = program.states(x)
+    most[:2] = np.abs(state.qdot[:, :2]).max(axis=0)  # a rail and a revolute joint
+    weights = least_motion.least_acceleration(program, x, 0.0).weights
+    np.testing.assert_allclose(weights[:-1] * most, weights[0] * most[0])
+    assert weights[-1] == 0.0, "the virtual roll is no joint"
 
 
 def test_with_many_variables_only_a_slower_one_is_looked_for(monkeypatch):

@@ -332,6 +332,22 @@ def test_time_is_kept_for_a_first_motion_while_nothing_is_verified(clock):
     assert any("only for a first motion" in text for text in result.not_completed)
 
 
+def test_without_a_first_motion_the_search_goes_on_for_a_moment(clock, monkeypatch):
+    finish = pipeline.finish_candidate
+    ends: list[float] = []
+
+    def note(candidate: Any, to_beat: Marks, until: Deadline, *others: Any) -> Any:
+        ends.append(until.at)
+        return finish(candidate, to_beat, until, *others)
+
+    monkeypatch.setattr(pipeline, "finish_candidate", note)
+    monkeypatch.setattr(portfolio, "find_first_motion_of", lambda *_: None)
+    clock.jump(pipeline, "rank_candidate", at=1, by=1.6)
+    problem = Problem.of(ROBOT, load_task(task(search={"effort": "single"})))
+    portfolio.Search(problem, [], Deadline(1.5), lambda _text: None).run()
+    assert ends[0] == pytest.approx(1.7)
+
+
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(clock):
     calls = clock.jump(PostureLattice, "_next", at=5)
     message = r"within the time limit of 60 s: the lattice of all postures was not searched completely; .*\. Raise"

@@ -4,12 +4,15 @@ import os
 import signal
 import time
 from concurrent.futures import wait
+from functools import partial
+from itertools import count
+from types import SimpleNamespace
 
 import pytest
 
 from brachis.errors import BrachisError, PathError
 from brachis.search import processes
-from brachis.search.processes import run_in_processes
+from brachis.search.processes import process_count, run_in_processes
 
 
 class Unsendable:
@@ -59,6 +62,24 @@ def test_work_is_shared_and_comes_back_in_order():
     assert list(made) == list(range(20))
     assert "0" not in here  # the first one was handed out
     assert 0 < len(here) < 20
+
+
+@pytest.mark.usefixtures("workers")
+@pytest.mark.parametrize(("seconds", "here"), [(0.3, "123"), (0.5, "13")])
+def test_auto_shares_what_takes_long(monkeypatch, seconds, here):
+    """Of three the first tells how long the others take."""
+    clock = SimpleNamespace(perf_counter=partial(next, count(step=seconds)))
+    monkeypatch.setattr("brachis.search.processes.time", clock)
+    monkeypatch.setattr("joblib.cpu_count", lambda: 2)
+    said = []
+    made = run_in_processes(say, [1, 2, 3], jobs="auto", listener=said.append)
+    assert list(made) == [1, 2, 3]
+    assert "".join(said) == here
+
+
+def test_there_are_never_more_processes_than_processors(monkeypatch):
+    monkeypatch.setattr("joblib.cpu_count", lambda: 2)
+    assert [process_count(jobs) for jobs in (1, 2, 3, "auto")] == [1, 2, 2, 2]
 
 
 @pytest.mark.usefixtures("workers")

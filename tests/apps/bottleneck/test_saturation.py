@@ -116,3 +116,11 @@ def test_positions_are_measured_by_their_place_in_the_range(motion_with):
         column["j1 position"], (q + 1.0) / 3.0, atol=1e-12
     )  # 0 in the middle, at -1 m
     np.testing.assert_allclose(column["j2 position"], 0.75)  # one end: 0.25 m away
+
+
+def test_a_knot_at_which_the_jerk_jumps_occurs_twice(slide):
+    limits = {"jerk": 100.0}
+    motion = slide(intervals=6, degree=3, rest="full", robot={"limits": limits})
+    t = limit_ratios(motion.trajectory).t
+    knots = np.unique(motion.trajectory.knots)[1:-1] * motion.t_end
+    assert (np.sum(np.abs(t - knots[:, None]) < 1e-9, axis=1) == 2).all()

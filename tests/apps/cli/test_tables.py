@@ -14,14 +14,14 @@ WIDTHS = (60, 80, 120)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
-def print_to_text(width, columns, rows):
+def print_to_text(width, columns, rows, **options):
     console = Console(width=width, highlight=False, markup=False)
     with (
         pytest.MonkeyPatch.context() as patch,
         console.capture() as capture,
     ):
         patch.setattr(output, "result_console", lambda: console)
-        print_table("title", columns, rows)
+        print_table("title", columns, rows, **options)
     return capture.get()
 
 
@@ -33,6 +33,24 @@ def test_long_words_of_text_are_broken_not_lost():
     )
     assert "shoulder_front_elbow_up_wrist_flipped" in re.sub(r"\s|│|branch", "", text)
     assert max(map(len, text.splitlines())) <= 30
+
+
+def test_each_part_of_a_wide_table_fits_and_repeats_the_first_column():
+    names = [f"value {i}" for i in range(9)]
+    row = ["first", *(str(1_000_000 + i) for i in range(9))]
+    text = print_to_text(40, ["", *names], [row], numbers=names)
+    assert max(map(len, text.splitlines())) <= 40
+    assert set(row) <= set(text.split())
+    assert text.count("first") == text.count("title") == 3
+
+
+@pytest.mark.parametrize(("width", "has_lines"), [(50, True), (49, False)])
+def test_lines_go_before_numbers_are_cut(width, has_lines):
+    names = ("", "value", "other", "remark")
+    row = ("first", "123456.789012", "234567.890123", "of a few short words")
+    text = print_to_text(width, names, [row], numbers=names[1:3])
+    assert ("━" in text) == has_lines
+    assert set(row[1:3]) <= set(text.split())
 
 
 SHOWING = {
