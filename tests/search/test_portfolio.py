@@ -336,7 +336,7 @@ def test_without_a_first_motion_the_search_goes_on_for_a_moment(clock, monkeypat
     finish = pipeline.finish_candidate
     ends: list[float] = []
 
-    def note(candidate: Any, to_beat: Marks, until: Deadline, *others: Any) -> Any:
+    def note(candidate, to_beat, until, *others):
         ends.append(until.at)
         return finish(candidate, to_beat, until, *others)
 
