@@ -8,6 +8,7 @@ import pytest
 import brachis
 from brachis.robot import dynamics
 from brachis.task import task_with
+from brachis.trajectory import phase_rows
 from support.checks import check_of
 from support.effort import QUICK
 
@@ -115,6 +116,9 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     assert speeds[is_behind].max() < speed * (1.0 + 1e-3), "faster in a lead"
     assert is_held.sum() * 2.0 * t[1] > 0.5 * 0.5 / speed
     assert check_of(result.verification, "process speed").passed
+    texts = [row[-1] for row in phase_rows(result.trajectory.phases)]
+    held = 300.0 - 200.0 * speed
+    assert f"{speed} m/s on {held:.4g} of 300 mm" in texts
 
 
 def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():

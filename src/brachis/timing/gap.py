@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,8 @@ class TimingGap(Summary):
         Kinds of the limits that the least time leaves out: it is a bound then.
     s_interval : tuple of float
         Shortest part of the path on which four fifths of the difference are lost.
+    advice : str
+        What may give a faster motion.
     """
 
     t_end: float
@@ -76,6 +78,7 @@ class TimingGap(Summary):
     places: int
     left_out: tuple[str, ...]
     s_interval: tuple[float, float]
+    advice: str = "raise search.time_limit"
 
     @property
     def gap(self) -> float:
@@ -94,7 +97,7 @@ class TimingGap(Summary):
             f"(on a grid of {self.places} places)"
         )
 
-    def issues(self, *, has_fixed_intervals: bool) -> tuple[Issue, ...]:
+    def issues(self) -> tuple[Issue, ...]:
         """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
@@ -103,12 +106,9 @@ class TimingGap(Summary):
         where = "along the whole path"
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
-        advice = "raise search.time_limit"
-        if has_fixed_intervals:
-            advice = "set spline.intervals: auto, or a larger number"
         message = (
             f"the same joint path can be passed in {self.least_time:.4g} s, {saved:.1f} % faster; the motion loses "
-            f"this time {where}; for a faster motion, {advice}"
+            f"this time {where}; for a faster motion, {self.advice}"
         )
         motion_text = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
@@ -165,7 +165,10 @@ def find_timing_gap(
         lost.append(np.diff(motion_times) - np.diff(times))
     left_out = sorted({limit.name for limit in limits if is_left_out(limit)})
     interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
-    return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)
+    gap = TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)
+    if trajectory.task.spline.intervals == "auto":
+        return gap
+    return replace(gap, advice="set spline.intervals: auto, or a larger number")
 
 
 def _time_phase(

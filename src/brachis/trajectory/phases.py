@@ -81,6 +81,8 @@ class MotionPhase:
         Given speed of the tool, m/s; None: as fast as the limits allow.
     is_dwell : bool
         Whether the arm waits at rest.
+    leads : float
+        Length of the part with this speed in which the tool reaches and leaves it, m; in other phases.
     """
 
     begin: float
@@ -89,6 +91,7 @@ class MotionPhase:
     s_end: float
     speed: float | None
     is_dwell: bool
+    leads: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -127,6 +130,9 @@ def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
             s += f" to {_write_s(phase.s_end)}"
         time = f"{phase.duration:.4f} s ({phase.begin:.4f} to {phase.end:.4f} s)"
         speed = speeds.get(phase.kind, f"{phase.speed} m/s")
+        if phase.leads:
+            held = 1e3 * phase.duration * (phase.speed or 0.0)
+            speed += f" on {held:.4g} of {held + 1e3 * phase.leads:.4g} mm"
         rows.append((f"{number} {phase.kind}", s, time, speed))
     return rows
 

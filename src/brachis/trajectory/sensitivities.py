@@ -13,7 +13,7 @@ TIMINGS = "timings"
 """Source of sensitivities that come from timings of the joint path, without multipliers."""
 Accuracy = Literal["exact", "estimate", "least", "bound"]
 """How near a saving is to what the motion would gain; see `TaskSaving`."""
-_STATIONARY = 1e-3
+STATIONARY = 1e-3
 """Part of the gradient that may be unbalanced at an optimum."""
 
 
@@ -145,7 +145,7 @@ class Sensitivities(Summary):
     @property
     def reliable(self) -> bool:
         """Whether the answer is an optimum, judged by the multipliers; otherwise they are rough."""
-        return self.residual <= _STATIONARY
+        return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
         """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""

@@ -129,6 +129,15 @@ class Trajectory(Summary):
         """Joints in chain order."""
         return self.robot.joint_names
 
+    @property
+    def redundancy(self) -> str:
+        """Redundant joints, or what stands for them in a chart, in words."""
+        count = len(self.control_points) - 1
+        if self.redundant_joints or not (count and self.chart_rows.size):
+            return ", ".join(self.redundant_joints) or "none"
+        coordinates = write_count(count, "coordinate")
+        return f"none chosen; the self-motion of all joints has {coordinates} (a chart)"
+
     @cached_property
     def pieces(self) -> Pieces:
         """Joint positions less those of the node before; see `position`."""
@@ -193,12 +202,12 @@ class Trajectory(Summary):
             # The phases of a recorded motion are between its stops, and longer than the parts.
             s = (s_begin, s_end)
             matching = (
-                section.speed
+                (section.speed, is_dwell, section.lead_length)
                 for section in speeds
-                if np.allclose(s, section.s, 0.0, 1e-9)
+                if not is_dwell and np.allclose(s, section.s, 0.0, 1e-9)
             )
-            speed = None if is_dwell else next(matching, None)
-            phases.append(MotionPhase(begin, end, *s, speed, is_dwell))
+            kind = next(matching, (None, is_dwell))
+            phases.append(MotionPhase(begin, end, *s, *kind))
         return tuple(phases)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
@@ -322,15 +331,14 @@ class Trajectory(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
-        none = "none by name: a chart" if self.chart_rows.size else "none"
         source = Path(self.robot.source)
         intervals = write_count(len(np.unique(self.knots)) - 1, "interval")
         return {
             "end time": f"{self.t_end:.4f} s",
-            "robot": f"{source.parent.name}/{source.name}",
+            "robot": Path(*source.parts[-2:]).as_posix(),
             "joints": ", ".join(self.joint_names),
-            "redundant joints": ", ".join(self.redundant_joints) or none,
-            "branch": self.branch or "none",
+            "redundant joints": self.redundancy,
+            **({} if len(self.chart_rows) else {"branch": self.branch or "none"}),
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
             **({"recovered from": self.recovered.source} if self.recovered else {}),

@@ -16,7 +16,6 @@ from brachis.apps.cli import folder
 from brachis.apps.plots.style import figure_class
 from brachis.errors import InputError
 from brachis.search import pipeline, verified
-from brachis.search.stages import describe_coordinates
 from brachis.trajectory import Trajectory
 
 from .conftest import ROOT, SCARA
@@ -228,15 +227,21 @@ def test_a_plan_lists_its_candidates(run, task, write, case):
     assert f"{data['t_end']:.4f}" in text
 
 
-def test_coordinates_are_described_without_the_name_of_a_chart_alone(planned):
+def test_a_chart_is_one_row_of_the_summary(planned):
     trajectory = Trajectory.load(planned.out / "result.npz")
-    assert describe_coordinates(trajectory) == "j3"
-    in_chart = replace(trajectory, redundant_joints=(), branch="chart")
-    assert describe_coordinates(in_chart) == (
-        "no joint is chosen; a chart measures the self-motion of all joints by 1 coordinate"
-    )
+    assert trajectory.redundancy == "j3"
+    assert "branch" in trajectory.summary()
+    chart = {
+        "redundant_joints": (),
+        "branch": "chart",
+        "chart_rows": np.ones((1, 1, 4)),
+    }
+    in_chart = replace(trajectory, **chart)
+    words = "none chosen; the self-motion of all joints has 1 coordinate (a chart)"
+    assert in_chart.summary()["redundant joints"] == words
+    assert "branch" not in in_chart.summary()
     only_s = replace(in_chart, control_points=trajectory.control_points[:1])
-    assert describe_coordinates(only_s) == "none"
+    assert only_s.redundancy == "none"
 
 
 def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
@@ -324,12 +329,12 @@ def test_inspect_says_where_every_limit_holds(run, task, write):
     task["robot"]["limits"] = {"rms_torque": 9}
     task["tool_limits"] = {"speed": 2}
     path = write(task)
-    everywhere = "It holds at all instants of a verified motion."
+    everywhere = "met at all instants of a verified motion, to 1e-4"
     data = run(f"inspect {path} --json").data
     assert data["guarantees"]["torque"] == everywhere
     text = " ".join(run(f"inspect {path}").out.split())
-    assert f"tool speed limit: {everywhere}" in text
-    assert "rms torque limit: It holds as a mean over the whole motion." in text
+    assert f"tool speed: {everywhere}" in text
+    assert "limits on rms torque: met as a mean over the whole motion" in text
 
 
 def test_inspect_of_a_task_shows_what_is_in_use(run, error_of, task, write):
@@ -363,6 +368,7 @@ def test_inspect_of_a_task_shows_gravity_postures_and_path(run):
     assert "start posture: rail 0.0000 m, shoulder_pan_joint 0.4000 rad, " in shown
     assert "end posture: free\n" in shown
     assert "path: 2 segments (line), 0.7651 m long\n" in shown
+    assert "path[1] at s = 1 (765.1 mm)\n" in shown
     assert "shoulder_pan_joint 22.9183 deg" in run(f"inspect {WELD} --degrees").out
     data = run(f"inspect {WELD} --json").data
     assert data["start_posture"][:2] == [0.0, 0.4]

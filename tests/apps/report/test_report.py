@@ -56,7 +56,7 @@ def test_it_is_said_where_every_limit_holds(planar, planar_page):
     for limit in planar.candidate.refined.program.limits:
         row = f"<tr><th>{limit.name}</th><td>{limit.guarantee.value}</td></tr>"
         assert (row in planar_page.html) == (limit.role is not Role.SAFEGUARD)
-    assert "It holds at all instants" in planar_page.html
+    assert "met at all instants" in planar_page.html
 
 
 def test_style_and_program_have_nothing_that_the_template_would_fill_in():

@@ -74,13 +74,17 @@ def plan_again(
     slower = trajectory.t_end / planned.t_end - 1.0
     if -_SAME <= slower <= task.search.slower + _SAME:
         return planned
+    hint = "Plan the task again, with a larger search.time_limit"
+    if trajectory.own_limits and not own_limits:
+        hint = (
+            "Pass the limits of your own, which are not saved with the motion, as in "
+            "brachis.bottleneck.report(motion, own_limits=[...])"
+        )
     raise PlanningError(
-        f"planning the saved motion (t_E = {trajectory.t_end:.6g} s) again found a different optimum: what its limits "
-        "cost is unknown",
+        f"a {'faster' if slower > 0.0 else 'slower'} motion was found by planning this one "
+        f"(t_E = {trajectory.t_end:.6g} s) again, so what its limits cost is unknown",
         found=f"t_E = {planned.t_end:.6g} s",
-        hint="If the motion was planned with own_limits, pass them here too: they are not saved with it, as in "
-        "brachis.bottleneck.report(motion, own_limits=[...]). Otherwise run brachis bottleneck on the task file: it "
-        "plans again",
+        hint=hint,
     )
 
 

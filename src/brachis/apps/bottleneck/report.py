@@ -35,6 +35,7 @@ from brachis.robot.joints import shown_unit
 from brachis.search.given_motion import narrow_motion
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory, motion_of, phase_rows
+from brachis.trajectory.sensitivities import STATIONARY
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -284,12 +285,15 @@ def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
     lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
-    if len(costly) < len(savings):
+    if not sensitivities.reliable:
+        lines.append("what other limits cost is unknown")
+    elif len(costly) < len(savings):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     if sensitivities.source == TIMINGS:
         how = "timings of the same joint path with limits raised"
     else:
-        how = f"multipliers by the {sensitivities.source}, residual {sensitivities.residual:.0e}"
+        residual = f"{100.0 * sensitivities.residual:.2g} % of the gradient"
+        how = f"multipliers ({sensitivities.source}), residual {residual}: reliable up to {100.0 * STATIONARY:g} %"
     lines.append(f"(to first order, from {how})")
     if not sensitivities.unique:
         lines.append(
@@ -343,7 +347,7 @@ def _timing(gap: TimingGap, t_end: float) -> list[str]:
         return []
     line = (
         f"the timing costs about {_part(saved, t_end)}: the same joint path takes {gap.least_time:.4g} s "
-        "with torques that may jump; for a faster motion, set spline.intervals: auto or a larger number"
+        f"with torques that may jump; for a faster motion, {gap.advice}"
     )
     return [line]
 

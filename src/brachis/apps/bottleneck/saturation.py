@@ -163,6 +163,8 @@ class Saturation(Summary):
         Part of the time, 0 to 1, during which the limit is active.
     peak : float
         Largest ratio to the limit.
+    change : float
+        Difference between the largest and the smallest ratio.
     active : tuple of ActiveInterval
         When, in the order of time.
     """
@@ -170,12 +172,13 @@ class Saturation(Summary):
     label: Label
     share: float
     peak: float
+    change: float
     active: tuple[ActiveInterval, ...]
 
     @property
-    def is_half_used(self) -> bool:
-        """Whether the motion ever uses more than half of the limit; others are not drawn."""
-        return self.peak > 0.5
+    def is_drawn(self) -> bool:
+        """Whether timelines show it: more than half of the limit is used, by a ratio that changes or is active."""
+        return self.peak > 0.5 and (self.change > 0.05 or bool(self.active))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -216,7 +219,8 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
         duration = sum(interval.end - interval.begin for interval in active)
         share = float(duration / ratios.t[-1])
         peak = float(np.abs(column).max())
-        entries.append(Saturation(label, share, peak, tuple(active)))
+        change = float(np.ptp(column))
+        entries.append(Saturation(label, share, peak, change, tuple(active)))
     return tuple(sorted(entries, key=lambda entry: (-entry.share, -entry.peak)))
 
 

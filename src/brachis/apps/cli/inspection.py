@@ -23,7 +23,13 @@ from brachis.apps.cli.app import (
     task_space_of,
     urdf_of,
 )
-from brachis.apps.cli.output import print_json, print_lines, print_table, write_posture
+from brachis.apps.cli.output import (
+    print_json,
+    print_lines,
+    print_segments,
+    print_table,
+    write_posture,
+)
 from brachis.common.files import is_task_file
 from brachis.common.words import write_count
 from brachis.errors import InputError, check_names
@@ -275,7 +281,7 @@ def _print_robot(
     guarantees = data["guarantees"]
     for text in dict.fromkeys(guarantees.values()):
         names = [name for name in guarantees if guarantees[name] == text]
-        print_lines(f"{', '.join(names)} limit: {text}")
+        print_lines(f"limits on {', '.join(names)}: {text}")
     pairs = data["collisions"]["pairs"]
     if pairs:
         listed = (
@@ -294,6 +300,8 @@ def _print_robot(
         long = "" if length is None else f", {length:.4g} m long"
         named = ", ".join(dict.fromkeys(kinds))
         print_lines(f"path: {write_count(len(kinds), 'segment')} ({named}){long}")
+        if len(kinds) > 1:
+            print_segments(problem.path)
         for fit in task.fits:
             _print_fit(fit)
     redundancy = data["degree_of_redundancy"]

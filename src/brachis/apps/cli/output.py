@@ -23,6 +23,7 @@ from brachis.common import interrupts
 from brachis.errors import BrachisWarning, InputError
 
 if TYPE_CHECKING:
+    from brachis.path import Path as ToolPath
     from brachis.verify import Verification
 
 _BEGAN = time.perf_counter()
@@ -126,6 +127,21 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
     print_lines(
         *(f"{margin.name}: {margin.in_words()}" for margin in verification.margins)
     )
+
+
+def print_segments(path: ToolPath) -> None:
+    """Print at which path coordinates the segments end, and after how many mm."""
+    last = {
+        span.segment: end
+        for span, end in zip(path.spans, path.breaks[1:].tolist(), strict=True)
+        if span.segment is not None
+    }
+    ends = []
+    for segment, s in last.items():
+        length = 1e3 * path.between(0.0, s).length if path.positions else 0.0
+        after = f" ({length:.4g} mm)" if length else ""
+        ends.append(f"path[{segment}] at s = {s:.4g}{after}")
+    print_lines(f"ends of the segments: {', '.join(ends)}")
 
 
 def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:

@@ -34,6 +34,7 @@ from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
     print_json,
     print_lines,
+    print_segments,
     print_table,
     print_verification,
     show_progress,
@@ -126,7 +127,6 @@ def _plan_task(
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
-    from brachis.search.stages import describe_coordinates
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
@@ -135,8 +135,7 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     least_motion = result.least_motion
     rows = {
         **result.summary(),
-        "redundant joints": describe_coordinates(trajectory),
-        "family": result.family,
+        **({} if result.family == trajectory.branch else {"family": result.family}),
         "start posture": write_posture(data, "start_posture", degrees=degrees),
         "end posture": write_posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
@@ -151,6 +150,11 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     print_table("plan", ("", ""), rows.items())
     if len(trajectory.phases) > 1:
         print_table("phases", PHASE_COLUMNS, phase_rows(trajectory.phases))
+        print_segments(candidate.problem.path)
+    if any(phase.leads for phase in trajectory.phases):
+        print_lines(
+            "for this speed on the whole part, put short lines without speed before and after: a run-in and a run-out"
+        )
     print_lines(*(f"path from {fit}" for fit in result.fits))
     tried = len(result.candidates)
     if tried > 1:
@@ -197,7 +201,6 @@ def bottleneck(
     brachis bottleneck task.yaml --set search.effort=single
     """
     from brachis.search.planned import describe_motion
-    from brachis.search.stages import describe_coordinates
 
     result = None
     with output_folder(out, _BOTTLENECK, (task, urdf)), show_progress() as listener:
@@ -216,8 +219,7 @@ def bottleneck(
             result or trajectory, check=check, reference=reference, listener=listener
         )
     data["bottleneck"] = report.to_dict()
-    redundant = describe_coordinates(trajectory)
-    head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
+    head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {trajectory.redundancy}"
     drawings: dict[str, Drawing] = {
         "timeline.png": lambda: brachis.plots.plot_timeline(trajectory)
     }

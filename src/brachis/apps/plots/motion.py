@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -174,7 +175,9 @@ def draw_holding(
     style.mark_end(axes[0], trajectory.t_end)
     if len(axes) > 2:
         for ax in axes:
-            label = ax.get_ylabel().replace(" / ", " /\n")
+            label = ax.get_ylabel()
+            if "$" not in label:
+                label = textwrap.fill(label, 16)
             ax.set_ylabel(label, fontsize=style.LABEL_SIZE)
     figure.align_ylabels(axes)
     return axes
@@ -237,7 +240,7 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
         for place, curve in enumerate(curves):
             look = {**style.joint_style(curve.style), **style.LIMIT}
             look["linestyle"] = style.limit_dashes(place, len(curves))
-            ax.plot(panel.t, limit, **look)
+            ax.plot(panel.t, limit, label="limit", **look)
     if panel.is_ratio:
         ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(ends)
@@ -276,9 +279,9 @@ def plot_timeline(
     Returns
     -------
     Figure
-        Two columns wide; a row for each value of a limit of which the motion ever uses more than half. The
-        deeper the blue the nearer to the limit; orange where the limit is active, from 99 % of it on, ripple down to
-        95 % included. The faint ticks are the knots of the splines.
+        Two columns wide, with a row for each limited value that ever uses more than half of its limit. Rows that hardly
+        change are left out. A deeper blue is closer to the limit. Orange: the limit is active, from 99 % of it on,
+        including ripple down to 95 %. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -292,7 +295,7 @@ def plot_timeline(
 
     ratios = limit_ratios(trajectory, limits)
     used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
-    entries = [entry for entry in saturations(ratios) if entry.is_half_used]
+    entries = [entry for entry in saturations(ratios) if entry.is_drawn]
     entries.sort(key=lambda entry: ratios.labels.index(entry.label))
     rows = max(len(entries), 1)
     figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * rows)
@@ -324,12 +327,17 @@ def plot_timeline(
     )
     ax.tick_params(axis="y", length=0.0)
     if not entries:
-        style.write(ax, 0.5, 0.5, "no limit is used by 50 % or more", ha="center")
+        style.write(
+            ax,
+            0.5,
+            0.5,
+            "no limit is more than half used by a ratio that changes",
+            ha="center",
+        )
     blue = ScalarMappable(Normalize(0.0, 1.0), "Blues")
     bar = figure.colorbar(blue, ax=ax, pad=0.01, fraction=0.03)
     style.dress(bar.ax, "", "part of the limit")
     words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"
     style.legend_above(ax, style.PAGE_WIDTH - 20.0, {words: Patch(facecolor=orange)})
-    end = style.end_text(trajectory.t_end)
-    style.write(ax, 1.0, 1.02, end, ha="right", va="bottom")
+    ax.set_xlabel(f"{ax.get_xlabel()}, {style.end_text(trajectory.t_end)}")
     return figure

@@ -110,7 +110,7 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
     ratios = at_distinct_times(motion.ratios)
     used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
-    entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
+    entries = [entry for entry in motion.saturations if entry.is_drawn][::-1]
     shares = np.array([used[entry.label] for entry in entries])
     colours = shares.copy()
     for row, entry in zip(colours, entries, strict=True):

@@ -18,7 +18,6 @@ from brachis.apps.plots.panels import Panel, PanelCurve, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
 from brachis.robot.from_task import in_use
-from brachis.search.stages import describe_coordinates
 from brachis.task import Task
 from brachis.trajectory import phase_rows
 
@@ -47,7 +46,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
         "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
         "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
         "largest distance from the path": f"{verification.path_error:.1e} m or rad",
-        "redundant joints": describe_coordinates(trajectory),
+        "redundant joints": trajectory.redundancy,
         **named,
         **motion.planned,
     }

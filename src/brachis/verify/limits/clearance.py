@@ -40,6 +40,7 @@ def worst_clearance(motion: CheckedMotion) -> Worst | None:
     least = search.least
     remark = f"smallest distance {1e3 * least:.2f} mm"
     subject = scene.names(search.pair)
+    remark += search.describe_nearest_body()
     if least >= clearance + _LOOK:
         remark = f"nothing is closer than {1e3 * least:.0f} mm"
         subject = "scene"
@@ -73,6 +74,7 @@ class _Search:
         self.least = clearance + _LOOK
         self.time = motion.states.t[0]
         self.pair = 0
+        self._distances = np.full(len(scene.pairs), self.least)
         self.proven = np.inf
         self._halved = 0
 
@@ -81,6 +83,18 @@ class _Search:
         states = self._motion.states
         for first in range(0, max(len(states.t) - 1, 1), _STATES):
             self._search(states.only(slice(first, first + _STATES + 1)))
+
+    def describe_nearest_body(self) -> str:
+        """Say how close the robot comes to a body of its scene, at the instants that were looked at."""
+        scene = self._scene
+        is_body = scene.joints == 0
+        is_body[: scene.robot_count] = False
+        distances = np.where(is_body[scene.pairs].any(axis=1), self._distances, np.inf)
+        pair = int(distances.argmin())
+        if pair == self.pair or distances[pair] >= self._clearance + _LOOK:
+            return ""
+        nearest = f"{1e3 * distances[pair]:.2f} mm ({scene.names(pair)})"
+        return f", to a body of the scene {nearest}"
 
     def _search(self, states: MotionStates) -> None:
         """Search the states, and between them."""
@@ -144,7 +158,8 @@ class _Search:
         return max(near, self.least - _FINE)
 
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
-        """Keep the smallest distance."""
+        """Keep the smallest distance of all, and of each pair."""
+        np.minimum.at(self._distances, pair, distance)
         if distance.min(initial=np.inf) < self.least:
             best = np.argmin(distance)
             self.least = distance[best]
