@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from brachis.apps.cli.app import (
     urdf_of,
 )
 from brachis.apps.cli.output import (
+    print_fit,
     print_json,
     print_lines,
     print_segments,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from brachis import ik
     from brachis.problem.problem import Problem
     from brachis.robot import Robot
-    from brachis.task import FitReport, Task
+    from brachis.task import Task
 
 _NONE = "none"
 """What a table shows for a missing limit or mass, and for a joint without friction."""
@@ -303,7 +303,7 @@ def _print_robot(
         if len(kinds) > 1:
             print_segments(problem.path)
         for fit in task.fits:
-            _print_fit(fit)
+            print_fit(fit)
     redundancy = data["degree_of_redundancy"]
     space = ", ".join(data["task_space"])
     print_lines(f"task space [{space}]: degree of redundancy {redundancy}")
@@ -372,27 +372,6 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
             row[key] = f"{value:.4g} {UNITS[key][unit]}" if value else _NONE
         rows.append(row)
     return rows
-
-
-def _print_fit(fit: FitReport) -> None:
-    """Print what was read from a file of points, how near the fitted path is to it, and its corners."""
-    print_lines(f"path from {fit}")
-    if fit.corners:
-        is_blended = any(corner.blend for corner in fit.corners)
-        what = (
-            "rounded within the tolerance" if is_blended else "at which the tool stops"
-        )
-        columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
-        rows = [
-            (
-                corner.row,
-                f"{math.degrees(corner.angle):.4g}",
-                f"{1e3 * corner.distance:.6g}",
-                f"{1e3 * corner.blend:.4g}",
-            )
-            for corner in fit.corners
-        ]
-        print_table(f"corners, {what}", columns, rows, numbers=columns)
 
 
 def _robot_of_urdf(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import time
@@ -24,6 +25,7 @@ from brachis.errors import BrachisWarning, InputError
 
 if TYPE_CHECKING:
     from brachis.path import Path as ToolPath
+    from brachis.task import FitReport
     from brachis.verify import Verification
 
 _BEGAN = time.perf_counter()
@@ -142,6 +144,27 @@ def print_segments(path: ToolPath) -> None:
         after = f" ({length:.4g} mm)" if length else ""
         ends.append(f"path[{segment}] at s = {s:.4g}{after}")
     print_lines(f"ends of the segments: {', '.join(ends)}")
+
+
+def print_fit(fit: FitReport) -> None:
+    """Print what was read from a file of points, how near the fitted path is to it, and its corners."""
+    print_lines(f"path from {fit}")
+    if fit.corners:
+        is_blended = any(corner.blend for corner in fit.corners)
+        what = (
+            "rounded within the tolerance" if is_blended else "at which the tool stops"
+        )
+        columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
+        rows = [
+            (
+                corner.row,
+                f"{math.degrees(corner.angle):.4g}",
+                f"{1e3 * corner.distance:.6g}",
+                f"{1e3 * corner.blend:.4g}",
+            )
+            for corner in fit.corners
+        ]
+        print_table(f"corners, {what}", columns, rows, numbers=columns)
 
 
 def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
