@@ -273,7 +273,7 @@ class ProcessSpeed(Model):
         ),
     ]
     """[begin, end]: path coordinates between which the speed is held. At stops, and at ends of the path that are not
-    passed at this speed, the part is shorter by a lead: the way of the tool in 0.1 s at the higher speed. In a lead
+    passed at this speed, the part is shorter by a lead, the distance travelled in 0.1 s at the higher speed. In a lead
     the tool is no faster than this speed, unless the speed on its other side is higher."""
     segment: Count | None = None
     """Index of the speed's segment; written by brachis."""

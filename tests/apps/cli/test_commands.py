@@ -38,7 +38,9 @@ def test_plan_for_people(run, task, write):
     outcome = run(f"plan {write(task)}")
     for words in ("end time", "2.47", "verification: passed", "torque ratio"):
         assert words in outcome.out
-    assert outcome.out.endswith("nothing was saved; --out FOLDER saves the motion\n")
+    assert outcome.out.endswith(
+        "nothing was saved; use --out FOLDER to save the motion\n"
+    )
     # No progress display in a pipe.
     assert outcome.err.startswith(
         "brachis: warning: spline.intervals: the same joint path"
@@ -98,7 +100,7 @@ def test_without_matplotlib_the_result_is_written_and_the_figures_are_not(
     figure_class.cache_clear()
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert (
-        "its figures are not: a figure needs Matplotlib"
+        "but its figures were not: a figure needs Matplotlib"
         in run(f"plan {write(task)} --out {tmp_path / 'out'}").err
     )
     assert names_in(tmp_path / "out") == RESULT
@@ -118,7 +120,7 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(
 
     monkeypatch.setattr(plots, "save_figure", save_some)
     outcome = run(f"plan {write(task)} --out {out} --json", code=3)
-    assert "the result is written, its figures are not: " in outcome.err
+    assert "the result was written, but its figures were not: " in outcome.err
     assert f"{out / 'overview.png'}: the file cannot be written; found" in outcome.err
     data = outcome.data
     assert data["verified"] is True
@@ -156,7 +158,7 @@ def test_a_plan_without_a_motion_says_which_files_are_of_an_earlier_one(
     outcome = run("plan", path, *far, "--out", out, code=2)
     remark, error = outcome.err.splitlines()
     assert remark == (
-        f"brachis: files of an earlier run stay in {out}: result.npz, result.json, overview.png, candidates.png"
+        f"brachis: files of an earlier run remain in {out}: result.npz, result.json, overview.png, candidates.png"
     )
     assert "out of reach" in error
     assert "earlier" not in outcome.out
@@ -275,7 +277,7 @@ def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
     assert data["interrupted"]
     reason = "the search that search.effort requires was not completed"
     assert data["undone"][-1] == reason
-    assert "brachis: the search was ended early" in outcome.err
+    assert "brachis: the search ended early" in outcome.err
     for step in data["undone"]:
         assert f"brachis: not completed: {step}\n" in outcome.err
 

@@ -1,6 +1,6 @@
-"""A saved motion, planned again from itself: for files that do not say what limits cost, and for checks.
+"""Planning a saved motion again from itself, for files without sensitivities and for checks.
 
-The start is an optimum already, so that this takes one search without others beside it, and ends at the same optimum.
+The initial guess is already an optimum, so a single search from it is enough, and it ends at the same optimum.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from brachis.search.stages import FinishedCandidate
 from brachis.trajectory import Trajectory
 
 _SAME = 1e-3
-"""Part of the time by which end times of the same optimum differ, no more."""
+"""Largest relative difference between end times of the same optimum."""
 
 
 def plan_again(
@@ -30,16 +30,16 @@ def plan_again(
     families: Sequence[Family] = (),
     own_limits: Sequence[LimitModel] = (),
 ) -> FinishedCandidate:
-    """Plan a saved motion again, with its redundant joints and branch, from where it ended.
+    """Plan a saved motion again, with its redundant joints and branch, starting from the motion itself.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As `brachis.plan` made it, or loaded, without idle joints (`narrow_motion`).
+        A planned or loaded motion, without idle joints (`narrow_motion`).
     listener : callable, optional
-        Is told of every iteration.
+        Called with a text about every iteration.
     families, own_limits : sequence, optional
-        Those with which the motion was planned, as of `brachis.plan`: they are not saved with it.
+        The ones with which the motion was planned, as passed to `brachis.plan`. They are not saved with it.
 
     Returns
     -------
@@ -48,10 +48,10 @@ def plan_again(
     Raises
     ------
     InputError
-        The closed form or the branch is not known here; see `brachis.plan`.
+        The closed form or the branch is unknown; see `brachis.plan`.
     PlanningError
-        The motion is not an optimum of its problem: the plan ended at another one; or the task's time limit was too
-        short for that.
+        The motion is not an optimum of its problem, so that the plan ended at another one; or the task's time limit was
+        too short.
     """
     task = trajectory.task
     changes: dict[str, object] = {}
@@ -66,8 +66,8 @@ def plan_again(
         planned = search_from(trajectory, problem, families, deadline, listener)
     except (DecompositionError, UnknownNameError) as error:
         raise DecompositionError(
-            "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
-            "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
+            "the motion was planned with a closed form that is unknown here; pass it as "
+            "brachis.bottleneck.report(motion, families=[...]), or install the package that provides it",
             redundant_joints=task.redundant_joints,
             found=f"{error}",
         ) from error
@@ -77,7 +77,7 @@ def plan_again(
     hint = "Plan the task again, with a larger search.time_limit"
     if trajectory.own_limits and not own_limits:
         hint = (
-            "Pass the limits of your own, which are not saved with the motion, as in "
+            "Pass your own limits, which are not saved with the motion: "
             "brachis.bottleneck.report(motion, own_limits=[...])"
         )
     raise PlanningError(
@@ -95,7 +95,7 @@ def search_from(
     deadline: Deadline,
     listener: Listener,
 ) -> FinishedCandidate:
-    """Search for the fastest motion of a problem from one of a similar problem; raise PlanningError without any."""
+    """Search for the fastest motion of a problem, from a motion of a similar one; PlanningError if none is found."""
     search = Search(problem, Decompositions(problem, families), deadline, listener)
     with use_one_thread(), search.end_early():
         search.run(motion)

@@ -1,4 +1,4 @@
-"""``brachis plan | bottleneck | sweep``: plan a task, say what holds the motion back, plan a task many times."""
+"""``brachis plan | bottleneck | sweep``: plan a task, find what slows the motion down, plan a task many times."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ def plan(
     task : path
         Task file (YAML).
     out : path, optional
-        Folder for result.npz, result.json, overview.png and candidates.png, and fit.png if the path was fitted to
-        points. If the verification fails, the names begin with unverified.
+        Folder for result.npz, result.json, overview.png and candidates.png, and for fit.png if the path was fitted to
+        points. If the verification fails, the file names begin with unverified.
     view : bool, optional
-        Show the motion in the browser, until Ctrl-C.
+        Show the motion in the browser until Ctrl-C is pressed.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def _plan_task(
 
     keys = read_changes(changes, strict=strict)
     changed = load_changed_task(task, keys)
-    # With a URDF of its own, the robot is not that of the task file.
+    # If a URDF is given, the robot is not the one of the task file.
     with name_task_file(None if urdf else task, keys):
         return brachis.plan(urdf and str(urdf), changed, listener=listener)
 
@@ -181,20 +181,20 @@ def bottleneck(
 ) -> None:
     """Report which limits cost time.
 
-    For each limit: how much time it costs, and when it is active. A task is planned first; a saved motion is used as it
-    is.
+    The report says how much time each limit costs, and when it is active. A task is planned first; a saved motion is
+    used as it is.
 
     Parameters
     ----------
     task : path
         Task file (YAML), or result file (npz) of a saved motion.
     check : bool, optional
-        Solve again with each limit raised by 1 %, and compare.
+        Solve again with each limit raised by 1 %, and compare the result with the prediction.
     reference : bool, optional
-        Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best known value,
-        not a proven bound, and takes seconds.
+        Compare with a reference: the same problem on a fine mesh, with torque that may jump. The reference is the best
+        known value, not a proven bound. This takes some seconds.
     out : path, optional
-        Folder for bottleneck.json and timeline.png. If the verification fails, the names begin with unverified_.
+        Folder for bottleneck.json and timeline.png. If the verification fails, the file names begin with unverified_.
 
     Examples
     --------
@@ -254,14 +254,15 @@ def sweep(
     source : path
         Sweep file (YAML).
     out : path, optional
-        Folder for plans, table.parquet, table.csv and sweep.png. Default: a folder in the current one with the name of
-        the file. An interrupted sweep continues there with the missing plans.
+        Folder for the plans, table.parquet, table.csv and sweep.png. Default: a folder with the name of the sweep file
+        in the current folder. An interrupted sweep continues there with the missing plans.
     jobs : int, optional
         Number of processes. Default and maximum: the number of processors.
     part : str, optional
-        Plan only part i of n, for example 2/8: one job of a cluster's array, all with the same folder.
+        Plan only part i of n, for example 2/8. On a cluster, each job of an array plans one part; all jobs use the same
+        folder.
     merge : bool, optional
-        Plan nothing: put the plans of all parts together in table.parquet and table.csv; an error if any is missing.
+        Plan nothing, but collect the plans of all parts in table.parquet and table.csv. A missing plan is an error.
     retry : bool, optional
         Plan failed plans again.
 
@@ -300,7 +301,7 @@ def sweep(
 
 
 def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
-    """Print the sweep for a person."""
+    """Print the result of a sweep for a person."""
     from brachis.common.summary import show_value
 
     summary = result.summary()
