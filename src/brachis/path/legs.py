@@ -114,10 +114,9 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
                 _lead(speed, speeds.get(s, speed))
                 for s, speeds in zip(ends, (before, after), strict=True)
             ]
-            leads = [
-                length / _tool_slope(task_map, between, s)
-                for s, length in zip(ends, lengths, strict=True)
-            ]
+            leads = np.divide(
+                lengths, [_tool_slope(task_map, between, s) for s in ends]
+            ).tolist()
             # The planner knows whether less is enough.
             share = min(
                 1.0, 0.5 * (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -78,7 +78,7 @@ class TimingGap(Summary):
     places: int
     left_out: tuple[str, ...]
     s_interval: tuple[float, float]
-    advice: str = "raise search.time_limit"
+    advice: str
 
     @property
     def gap(self) -> float:
@@ -165,10 +165,10 @@ def find_timing_gap(
         lost.append(np.diff(motion_times) - np.diff(times))
     left_out = sorted({limit.name for limit in limits if is_left_out(limit)})
     interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
-    gap = TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)
-    if trajectory.task.spline.intervals == "auto":
-        return gap
-    return replace(gap, advice="set spline.intervals: auto, or a larger number")
+    advice = "raise search.time_limit"
+    if trajectory.task.spline.intervals != "auto":
+        advice = "set spline.intervals: auto, or a larger number"
+    return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval, advice)
 
 
 def _time_phase(

@@ -132,7 +132,7 @@ def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
         speed = speeds.get(phase.kind, f"{phase.speed} m/s")
         if phase.leads:
             held = 1e3 * phase.duration * (phase.speed or 0.0)
-            speed += f" on {held:.4g} of {held + 1e3 * phase.leads:.4g} mm"
+            speed += f" on {held:.4g} of {held + 1e3 * phase.leads:.4g} mm (on all with run-in and run-out lines)"
         rows.append((f"{number} {phase.kind}", s, time, speed))
     return rows
 

@@ -134,11 +134,12 @@ class Trajectory(Summary):
     @property
     def redundancy(self) -> str:
         """The redundant joints in words; for a chart, its coordinates of the self-motion."""
-        count = len(self.control_points) - 1
-        if self.redundant_joints or not (count and self.chart_rows.size):
+        if self.redundant_joints or not self.chart_rows.size:
             return ", ".join(self.redundant_joints) or "none"
-        coordinates = write_count(count, "coordinate")
-        return f"none chosen; the self-motion of all joints has {coordinates} (a chart)"
+        return (
+            "none chosen; the self-motion of all joints has "
+            f"{write_count(self.chart_rows.shape[1], 'coordinate')} (a chart)"
+        )
 
     @cached_property
     def pieces(self) -> Pieces:
@@ -206,7 +207,7 @@ class Trajectory(Summary):
             matching = (
                 (section.speed, is_dwell, section.lead_length)
                 for section in speeds
-                if not is_dwell and np.allclose(s, section.s, 0.0, 1e-9)
+                if np.allclose(s, section.s, 0.0, 1e-9)
             )
             kind = next(matching, (None, is_dwell))
             phases.append(MotionPhase(begin, end, *s, *kind))

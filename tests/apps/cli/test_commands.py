@@ -242,7 +242,7 @@ def test_a_chart_is_one_row_of_the_summary(planned):
     words = "none chosen; the self-motion of all joints has 1 coordinate (a chart)"
     assert in_chart.summary()["redundant joints"] == words
     assert "branch" not in in_chart.summary()
-    only_s = replace(in_chart, control_points=trajectory.control_points[:1])
+    only_s = replace(in_chart, chart_rows=np.ones((1, 0, 4)))
     assert only_s.redundancy == "none"
 
 

@@ -163,8 +163,8 @@ class Saturation(Summary):
         Fraction of the time, 0 to 1, during which the limit is active.
     peak : float
         Largest ratio to the limit.
-    change : float
-        Difference between the largest and the smallest ratio.
+    is_drawn : bool
+        Whether timelines show this value: it uses more than half of its limit, and changes or is active.
     active : tuple of ActiveInterval
         Intervals in which the limit is active, in the order of time.
     """
@@ -172,13 +172,8 @@ class Saturation(Summary):
     label: Label
     share: float
     peak: float
-    change: float
+    is_drawn: bool
     active: tuple[ActiveInterval, ...]
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether timelines show this value: it uses more than half of its limit, and changes or is active."""
-        return self.peak > 0.5 and (self.change > 0.05 or bool(self.active))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -219,8 +214,8 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
         duration = sum(interval.end - interval.begin for interval in active)
         share = float(duration / ratios.t[-1])
         peak = float(np.abs(column).max())
-        change = float(np.ptp(column))
-        entries.append(Saturation(label, share, peak, change, tuple(active)))
+        is_drawn = peak > 0.5 and bool(active or np.ptp(column) > 0.05)
+        entries.append(Saturation(label, share, peak, is_drawn, tuple(active)))
     return tuple(sorted(entries, key=lambda entry: (-entry.share, -entry.peak)))
 
 

@@ -301,8 +301,7 @@ def _print_robot(
         long = "" if length is None else f", {length:.4g} m long"
         named = ", ".join(dict.fromkeys(kinds))
         print_lines(f"path: {write_count(len(kinds), 'segment')} ({named}){long}")
-        if len(kinds) > 1:
-            print_segments(problem.path)
+        print_segments(problem.path)
         for fit in task.fits:
             print_fit(fit)
     redundancy = data["degree_of_redundancy"]

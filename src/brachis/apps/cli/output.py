@@ -133,18 +133,14 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
 
 
 def print_segments(path: ToolPath) -> None:
-    """Print the path coordinate at which each segment ends, and its distance from the start of the path in mm."""
-    last = {
-        span.segment: end
-        for span, end in zip(path.spans, path.breaks[1:].tolist(), strict=True)
-        if span.segment is not None
+    """Print s and the distance from the path's start at which each of several segments ends, for a path of the tool."""
+    ends = {
+        span.segment: f"path[{span.segment}] at s = {s:.4g} ({1e3 * path.between(0.0, s).length:.4g} mm)"
+        for span, s in zip(path.spans, path.breaks[1:], strict=True)
+        if span.segment is not None and path.positions
     }
-    ends = []
-    for segment, s in last.items():
-        length = 1e3 * path.between(0.0, s).length if path.positions else 0.0
-        after = f" ({length:.4g} mm)" if length else ""
-        ends.append(f"path[{segment}] at s = {s:.4g}{after}")
-    print_lines(f"ends of the segments: {', '.join(ends)}")
+    if len(ends) > 1:
+        print_lines(f"ends of the segments: {', '.join(ends.values())}")
 
 
 def print_fit(fit: FitReport) -> None:

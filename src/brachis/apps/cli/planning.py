@@ -151,10 +151,6 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     if len(trajectory.phases) > 1:
         print_table("phases", PHASE_COLUMNS, phase_rows(trajectory.phases))
         print_segments(candidate.problem.path)
-    if any(phase.leads for phase in trajectory.phases):
-        print_lines(
-            "for this speed on the whole part, put short lines without speed before and after: a run-in and a run-out"
-        )
     print_lines(*(f"path from {fit}" for fit in result.fits))
     tried = len(result.candidates)
     if tried > 1:

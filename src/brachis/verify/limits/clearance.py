@@ -41,7 +41,11 @@ def worst_clearance(motion: CheckedMotion) -> Worst | None:
     least = search.least
     remark = f"smallest distance {1e3 * least:.2f} mm"
     subject = scene.names(search.pair)
-    remark += search.describe_nearest_body()
+    stands = (scene.pairs >= scene.robot_count) & (scene.joints[scene.pairs] == 0)
+    to_bodies = np.where(stands.any(axis=1), search.distances, np.inf)
+    nearest = int(to_bodies.argmin())
+    if nearest != search.pair and to_bodies[nearest] < clearance + _LOOK:
+        remark += f", to a body of the scene {1e3 * to_bodies[nearest]:.2f} mm ({scene.names(nearest)})"
     if least >= clearance + _LOOK:
         remark = f"nothing is closer than {1e3 * least:.0f} mm"
         subject = "scene"
@@ -60,6 +64,8 @@ class _Search:
     ----------
     least, time, pair : float, float, int
         Smallest distance found, m, with its time, s, and pair.
+    distances : (P,) ndarray
+        Smallest distance of each pair at the instants that were checked, m.
     proven : float
         No distance is smaller than this and `least`, apart from the allowed gaps, m.
     """
@@ -75,7 +81,7 @@ class _Search:
         self.least = clearance + _LOOK
         self.time = motion.states.t[0]
         self.pair = 0
-        self._distances = np.full(len(scene.pairs), self.least)
+        self.distances = np.full(len(scene.pairs), self.least)
         self.proven = np.inf
         self._halved = 0
 
@@ -84,18 +90,6 @@ class _Search:
         states = self._motion.states
         for first in range(0, max(len(states.t) - 1, 1), _STATES):
             self._search(states.only(slice(first, first + _STATES + 1)))
-
-    def describe_nearest_body(self) -> str:
-        """Say how close the robot comes to a body of its scene, at the instants that were checked."""
-        scene = self._scene
-        is_body = scene.joints == 0
-        is_body[: scene.robot_count] = False
-        distances = np.where(is_body[scene.pairs].any(axis=1), self._distances, np.inf)
-        pair = int(distances.argmin())
-        if pair == self.pair or distances[pair] >= self._clearance + _LOOK:
-            return ""
-        nearest = f"{1e3 * distances[pair]:.2f} mm ({scene.names(pair)})"
-        return f", to a body of the scene {nearest}"
 
     def _search(self, states: MotionStates) -> None:
         """Search at the states and between them."""
@@ -160,7 +154,7 @@ class _Search:
 
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
         """Store the smallest distance of all pairs and of each pair."""
-        np.minimum.at(self._distances, pair, distance)
+        np.minimum.at(self.distances, pair, distance)
         if distance.min(initial=np.inf) < self.least:
             best = np.argmin(distance)
             self.least = distance[best]
