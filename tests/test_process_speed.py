@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 import brachis
 from brachis.robot import dynamics
 from brachis.task import task_with
+from brachis.trajectory import phase_rows
 from support.checks import check_of
 from support.effort import QUICK
 
@@ -114,6 +115,9 @@ def test_a_segment_has_a_speed_but_for_its_leads(speed):
     assert speeds[is_behind].max() < speed * (1.0 + 1e-3), "faster in a lead"
     assert is_held.sum() * 2.0 * t[1] > 0.5 * 0.5 / speed
     assert check_of(result.verification, "process speed").passed
+    texts = [row[-1] for row in phase_rows(result.trajectory.phases)]
+    held = 300.0 - 200.0 * speed
+    assert any(f"{speed} m/s on {held:.4g} of 300 mm" in text for text in texts)
 
 
 def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():

@@ -180,8 +180,7 @@ def plan(
             if not deadline.passed:
                 gap = find_timing_gap(motion.trajectory, problem.limits)
             if gap is not None and not end_time:
-                is_fixed = loaded_task.spline.intervals != "auto"
-                slow = gap.issues(has_fixed_intervals=is_fixed)
+                slow = gap.issues()
                 for issue in slow:
                     warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
                 remarks += slow

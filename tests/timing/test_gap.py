@@ -1,10 +1,13 @@
 """The timing gap of plans: never much below zero, whatever limits there are, and small with ``intervals: auto``."""
 
+import dataclasses
+
 import pytest
 import yaml
 
 import brachis
-from brachis.timing import TimingGap
+from brachis.limits import limits_of
+from brachis.timing import TimingGap, find_timing_gap
 from support.effort import QUICK
 
 LIMITS = yaml.safe_load("""
@@ -55,7 +58,6 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
     assert -1e-3 < result.timing_gap.gap < 1e-3
 
 
-@pytest.mark.parametrize("has_fixed_intervals", [True, False])
 @pytest.mark.parametrize(
     ("part", "where"),
     [
@@ -63,12 +65,25 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
         ((0.0, 1.0), "along the whole path;"),
     ],
 )
-def test_the_warning_says_where_time_is_lost(part, where, has_fixed_intervals):
-    gap = TimingGap(2.0, 1.8, 100, (), part)
-    (issue,) = gap.issues(has_fixed_intervals=has_fixed_intervals)
+def test_the_warning_says_where_time_is_lost(part, where):
+    (issue,) = TimingGap(2.0, 1.8, 100, (), part, "think anew").issues()
     assert where in issue.message
-    advice = "spline.intervals: auto" if has_fixed_intervals else "search.time_limit"
-    assert advice in issue.message
+    assert issue.message.endswith("think anew")
+
+
+@pytest.mark.parametrize(
+    ("intervals", "advice"),
+    [(8, "set spline.intervals: auto"), ("auto", "raise search.time_limit")],
+)
+def test_automatic_intervals_are_not_advised_where_they_are_set(intervals, advice):
+    trajectory = plan(intervals=8).trajectory
+    spline = trajectory.task.spline.model_copy(update={"intervals": intervals})
+    task = trajectory.task.model_copy(update={"spline": spline})
+    motion = dataclasses.replace(trajectory, task=task)
+    gap = find_timing_gap(motion, limits_of(motion.robot, task))
+    assert advice in gap.advice
+    report = brachis.bottleneck.report(motion, solve=False)
+    assert advice in str(report)
 
 
 @pytest.mark.parametrize(

@@ -127,3 +127,5 @@ def test_a_table_says_what_the_phases_are(motion):
     assert rows[1] == ("2 dwell", "0.4", "0.5000 s (1.0000 to 1.5000 s)", "at rest")
     assert rows[3][1:] == ("0.55 to 0.85", "1.0000 s (2.5000 to 3.5000 s)", "0.3 m/s")
     assert {len(row) for row in rows} == {len(PHASE_COLUMNS)}
+    (row,) = phase_rows([replace(motion.phases[3], leads=0.06)])
+    assert row[3].startswith("0.3 m/s on 300 of 360 mm (on all with run-in")

@@ -200,7 +200,7 @@ def test_a_motion_of_one_piece(planned):
 def test_a_motion_that_takes_too_long_to_look_at_is_an_error(planned):
     fast = replace(planned, q=1e6 * planned.q, qdot=1e6 * planned.qdot)
     with pytest.raises(
-        InputError, match=r"found \d+ instants to look at; allowed: 2000000"
+        InputError, match=r"found \d+ instants to check; allowed: 2000000"
     ):
         verify_trajectory(fast)
 

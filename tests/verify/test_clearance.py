@@ -74,6 +74,14 @@ def test_a_motion_through_a_thin_pin_is_an_error(elbow):
     assert dense(result) < 0.0
 
 
+def test_the_scene_s_nearest_body_is_named_beside_a_closer_pair_of_links(elbow):
+    guard = {"name": "guard", "sphere": 0.06, "link": "link3", "position": [0, 0, 0.1]}
+    bodies = [*post(elbow + np.array([0.05, 0.05, 0.0]), 0.01), guard]
+    remark = check_of(planned(bodies, mode="check", clearance=0.0)).remark
+    assert "to a body of the scene 23.3" in remark
+    assert "(link2 and post)" in remark
+
+
 def test_a_motion_goes_round_a_post_and_keeps_the_clearance():
     at = [1.2, -0.45, 0.0]
     result = planned(post(at))

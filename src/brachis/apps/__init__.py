@@ -1,1 +1,1 @@
-"""What is done with a motion: figures, reports, exports, comparisons, sweeps, and the command line."""
+"""Applications that use a motion: figures, reports, exports, comparisons, sweeps, and the command line."""

@@ -1,6 +1,6 @@
-"""A first task for a robot: a posture far from limits and singularities, a straight line from it, and a plan of it.
+"""A first task for a robot: a posture far from limits and singularities, and a straight line that starts there.
 
-Limits that a plan needs and the URDF does not state get placeholders, which the task file marks as such.
+If the URDF does not state limits that a plan needs, placeholders are used, and the task file marks them as such.
 """
 
 from __future__ import annotations
@@ -40,28 +40,28 @@ from brachis.task.yaml_reader import read_yaml
 from brachis.timing import SlowTimingWarning
 
 _LENGTHS = (1.0, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01)
-"""Lengths of lines, m."""
+"""Lengths of the lines that are tried, m."""
 _QUICK = {
     "search.effort": "single",
     "search.time_limit": 20.0,
     "spline.intervals": 10,
     "search.least_motion": False,
 }
-"""Keys of the plan by which a task is tried."""
+"""Keys of the quick plan with which a task is tested."""
 _LEAST_REACH = 1e-6
-"""Reach below which a tool does not move, m: what rounding makes of a frame on a joint's axis is far smaller."""
+"""Reach below which a tool counts as not moving, m. For a frame on a joint's axis, rounding gives far less."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A first motion.
+    """A first motion along a straight line.
 
     Attributes
     ----------
     posture : (n,) ndarray
-        Where it begins, rad or m.
+        Start posture, rad or m.
     displacement : (len(axes),) ndarray
-        Where it leads, m, in the position rows of the task space.
+        Displacement of the tool in the position rows of the task space, m.
     """
 
     posture: np.ndarray
@@ -69,10 +69,10 @@ class Choice:
 
 
 def choices(task_map: TaskMap) -> Iterator[Choice]:
-    """Find first motions one by one, the most promising first.
+    """Yield first motions, beginning with the most promising.
 
-    Postures whose tool stays above the robot's base come first. Nothing is found if the robot cannot move its tool in
-    all directions of the task space. The same robot gets the same answer: the random draws have a fixed seed.
+    Postures with the tool above the robot's base come first. Nothing is found if the robot cannot move its tool in all
+    directions of the task space. The random draws have a fixed seed, so the same robot always gives the same result.
     """
     robot = task_map.robot
     postures = _draw_postures(robot)
@@ -80,22 +80,22 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
     for lowest in (0.1 * reach, -np.inf):
         quality = _quality(task_map, postures, reach, lowest)
         for k in np.argsort(-quality)[:4]:
-            if quality[k] > 1e-3:  # too near a singularity otherwise
+            if quality[k] > 1e-3:  # otherwise it is too close to a singularity
                 line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
                 if line is not None:
                     yield Choice(postures[k], line)
 
 
 def _measure_reach(robot: Robot, postures: np.ndarray) -> float:
-    """Measure how far the tool gets from the middle in postures (K, n), m."""
+    """Measure how far the tool moves from the middle of its positions in postures (K, n), m."""
     positions, _ = robot.tool_placements(postures)
     return float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
 
 
 def _draw_postures(robot: Robot) -> np.ndarray:
-    """Draw 400 postures in the inner part of all ranges, within 2 rad or m of zero if possible, with two digits."""
+    """Draw 400 postures in the inner part of all ranges, with two decimals, within 2 rad or m of zero if possible."""
     lower, upper = robot.limits.both_ways("position")
-    # No motion begins in the outer parts of a range, 15 % at each end.
+    # No motion begins in the outer 15 % at each end of a range.
     inner = 0.15 * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
     ends = np.array([lower + inner, upper - inner])
     near = np.clip([[-2.0], [2.0]], *ends)
@@ -108,17 +108,19 @@ def _draw_postures(robot: Robot) -> np.ndarray:
 def _quality(
     task_map: TaskMap, postures: np.ndarray, reach: float, lowest: float
 ) -> np.ndarray:
-    """Rate postures (K, n): least singular value of the task Jacobian without units, with and without the rail.
+    """Rate postures (K, n) by the least singular value of the scaled task Jacobian, with and without the rail.
 
-    Positions are divided by the arm's length, and so are prismatic joints. Postures count nothing where holding takes
-    much, or where the tool is lower than `lowest` above the base, m.
+    Positions and prismatic joints are divided by the arm's length. The rating is 0 if a joint needs much of its torque
+    to hold the posture, or if the tool is lower than `lowest` above the base, m.
     """
     robot = task_map.robot
     rows = np.where([unit == "m" for unit in task_map.units], 1.0 / reach, 1.0)
     columns = np.where(robot.revolute, 1.0, reach)
     jacobian = rows[:, None] * task_map.jacobian(task_map.twists(postures)) * columns
     quality = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
-    rail = int(np.argmax(robot.revolute))  # slides before the first joint that turns
+    rail = int(
+        np.argmax(robot.revolute)
+    )  # prismatic joints before the first revolute one
     if 0 < rail <= robot.n - task_map.m:
         alone = np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1]
         quality = np.minimum(quality, alone)
@@ -135,7 +137,7 @@ def _quality(
 def _line(
     task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float
 ) -> np.ndarray | None:
-    """Find the longest line along an axis on which the arm keeps 0.4 of its dexterity; None if it finds no line."""
+    """Find the longest line along an axis on which the arm keeps 40 % of its dexterity; None if there is none."""
     count = len(task_map.axes)
     for length in _LENGTHS:
         if length > 0.25 * reach:
@@ -159,7 +161,7 @@ def _line(
 def _follow(
     task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray
 ) -> np.ndarray | None:
-    """Follow a line in 10 steps of least joint motion; None if a joint leaves its range or the line is lost."""
+    """Follow a line in 10 steps of least joint motion; None if a joint leaves its range or a step fails."""
     lower, upper = task_map.robot.limits.both_ways("position")
     position, rotation = task_map.robot.tool_placements(posture[None])
     step = np.zeros(3)
@@ -169,7 +171,7 @@ def _follow(
     for k in range(1, 11):
         target = task_map.of_placements(position + k * step, rotation)
         reached = newton.nearest(target, postures[-1:])
-        if not ((reached > lower) & (reached < upper)).all():  # NaN is not within
+        if not ((reached > lower) & (reached < upper)).all():  # NaN is outside
             return None
         postures = np.concatenate([postures, reached])
     return postures
@@ -178,18 +180,16 @@ def _follow(
 def placeholders(
     names: Sequence[str], stated: Sequence[UrdfLimit], *, has_masses: bool
 ) -> LimitSpec:
-    """Return limits for the joints of which a URDF states no usable ones; what it states stays.
+    """Return limits for the joints for which a URDF states no usable ones. Stated limits are kept.
 
-    Torques without masses are not usable.
-
-    Limits of zero, and a range from zero to zero, are what exporters write for a missing limit. Without a torque a
-    joint gets a limit of acceleration, since its time would go to zero otherwise.
+    Torque limits without masses are not usable. Exporters write a limit of zero, or a range from zero to zero, if a
+    limit is missing. A joint without a torque limit gets an acceleration limit; otherwise its time would go to zero.
     """
     limits: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     for name, limit in zip(names, stated, strict=True):
         if not (limit.effort and has_masses):
             limits["torque"][name] = None
-            limits["acceleration"][name] = 1.0  # rad/s^2 or m/s^2: a careful machine
+            limits["acceleration"][name] = 1.0  # rad/s^2 or m/s^2: a cautious value
         if not limit.velocity:
             limits["velocity"][name] = None
         is_empty = limit.lower is not None and limit.lower == limit.upper
@@ -199,15 +199,15 @@ def placeholders(
 
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:
-    """Give what a robot might prescribe, the most natural first, then ever fewer rows of its tool's position."""
+    """Yield task spaces that may suit a robot: the most natural first, then fewer and fewer position rows."""
     yield default_task_space(robot)
     for count in range(min(robot.n, len(AXES)), 0, -1):
         yield from map(list, combinations(AXES, count))
 
 
 _TEXT = """\
-# A first task for {name}, written by brachis new: it plans and verifies as it is. Change it step by step.
-# SI units: m, rad, s, kg, N, Nm. All keys: docs/task_files.md; for completion in an editor: brachis schema.
+# A first task for {name}, written by brachis new. It can be planned as it is. Change it step by step.
+# SI units: m, rad, s, kg, N, Nm. All keys: docs/task_files.md. For completion in an editor: brachis schema.
 brachis: 1
 
 robot:
@@ -217,29 +217,29 @@ robot:
   # payload: {{mass: 0.5, com: [0, 0, 0.05]}}    # kg, m in the tool frame; needs the masses of the URDF
   # mounting: ceiling    # or floor, wall, {{xyz: [0, 0, 1], rpy_deg: [0, 90, 0]}}
 
-start:    # or start: free, with path_start, the place where the path begins
+start:    # or start: free, with path_start, the point where the path begins
   joints:
 {joints}
-end: free    # or {{joints: ...}}, in which the tool is at the path's end
+end: free    # or {{joints: ...}}, a posture with the tool at the end of the path
 
 task_space: {space}    # what the path prescribes; {degree}
 
-path:    # segments from the start posture's tool on, in the world frame
+path:    # segments in the world frame, beginning where the tool is in the start posture
   - line: {{by: {by}}}    # m{units}
-  # For a second segment put "blend: 0.01" (m, to round the corner) or "stop: true" below the line before it.
-  # Others: arc, circle, spline, csv, ...: docs/task_files.md
+  # Before a second segment, write "blend: 0.01" (m, to round the corner) or "stop: true" below the first line.
+  # Other segments, such as arc, circle, spline and csv: docs/task_files.md
 
-redundant_joints: auto    # or a list of joints; brachis inspect shows which have a closed form
+redundant_joints: auto    # or a list of joints; brachis inspect shows which choices have a closed form
 search: {{effort: fast}}    # single, fast, thorough or exhaustive
-# spline: {{intervals: 20}}    # plans sooner; the default, auto, gives faster motions
-# boundary: {{start_speed: 0.1}}    # m/s along the path; without it the motion begins and ends at rest
+# spline: {{intervals: 20}}    # shorter planning; the default, auto, gives faster motions
+# boundary: {{start_speed: 0.1}}    # m/s along the path; by default the motion begins and ends at rest
 # tool_limits: {{speed: 0.5}}    # m/s
 """
 _OWN_LIMITS = """\
-  # Limits of torque, velocity and position are the URDF's; brachis inspect shows them. To change some:
-  # limits: {{torque: {{{joint}: {torque}}}, scale: {{velocity: 0.5}}}}    # {unit}, as the URDF; half of all speeds"""
+  # Torque, velocity and position limits come from the URDF; brachis inspect shows them. To change some:
+  # limits: {{torque: {{{joint}: {torque}}}, scale: {{velocity: 0.5}}}}    # {unit}, as the URDF; halves all speeds"""
 _PLACEHOLDERS = """\
-  limits:    # the URDF states no usable ones for these joints: PUT THE MAKER'S FIGURES HERE (null: none)"""
+  limits:    # the URDF has no usable ones for these joints: ENTER THE MANUFACTURER'S DATA HERE (null: none)"""
 
 
 def task_text(
@@ -255,19 +255,19 @@ def task_text(
     ----------
     robot : Robot
     space : str or list of str
-        What the path prescribes.
+        Task space: what the path prescribes.
     choice : Choice
     limits : LimitSpec
-        Placeholders for limits that the URDF leaves open.
+        Placeholders for limits that the URDF does not state.
     folder : Path
-        Where the file will be.
+        Folder in which the task file will be.
     """
     source = Path(robot.source)
     redundant = robot.n - (6 if space == "pose" else len(space))
     turning = 0 if space == "pose" else len(space) - len(choice.displacement)
     base = f"\n  base_frame: {_inline(robot.base_frame)}"
     name = source.parent.name if source.name == "robot.urdf" else source.name
-    # Relative, if the URDF is in a folder near the task file.
+    # The name is relative if the URDF is in a folder close to the task file.
     urdf = os.path.relpath(source.absolute(), folder.absolute())
     if locate_urdf(name, folder) == str(source.absolute()):
         urdf = name  # an included robot
@@ -288,13 +288,13 @@ def task_text(
 
 
 def _inline(value: object) -> str:
-    """Write a value as YAML on one line, with quotes where it needs them."""
+    """Write a value as YAML on one line, with quotes where they are needed."""
     text = yaml.safe_dump(value, default_flow_style=True, width=10_000)
     return text.removesuffix("...\n").strip()
 
 
 def _joint(robot: Robot, i: int, position: float) -> str:
-    """Write a joint's position, with its unit and range as a comment."""
+    """Write the position of a joint, with its unit and range as a comment."""
     low, high = robot.limits.both_ways("position")[:, i]
     unit = robot.position_units[i]
     allowed = f", {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else ""
@@ -302,7 +302,7 @@ def _joint(robot: Robot, i: int, position: float) -> str:
 
 
 def _limits(robot: Robot, limits: LimitSpec) -> str:
-    """Write the placeholders, or how to change limits if none are needed."""
+    """Write the placeholders, or a comment on changing limits if no placeholders are needed."""
     lines = []
     for kind, values in vars(limits).items():
         if isinstance(values, dict):
@@ -323,10 +323,10 @@ class Starter:
     Attributes
     ----------
     text : str
-        The task file.
+        Text of the task file.
     robot : Robot
     result : Result
-        A quick plan of it, verified.
+        Verified result of a quick plan of the task.
     """
 
     text: str
@@ -342,15 +342,15 @@ def starter_task(
     base_frame: str | None = None,
     listener: Callable[[str], None] | None = None,
 ) -> Starter:
-    """Write a commented task for a robot: a short line from a good posture, everything else left open.
+    """Write a commented task for a robot: a short line from a good posture, with everything else left open.
 
     Parameters
     ----------
     urdf : path
     folder : path, optional
-        Where the task file will be; the URDF's path in it is relative to it where that is near.
+        Folder in which the task file will be. The path of the URDF in the task is relative to it if it is close.
     tool_frame, base_frame : str, optional
-        As in a task. By default the ends of the chain of most joints, as `default_chain` finds them.
+        As in a task. Default: the ends of the chain with the most joints, as `default_chain` finds them.
     listener : callable, optional
         Called with a text about each step.
 
@@ -359,9 +359,9 @@ def starter_task(
     UrdfError, UnknownNameError
         As `Robot.from_urdf`.
     InputError
-        The tool frame does not move, or only turns on the spot.
+        The tool frame does not move, or only rotates on the spot.
     PlanningError
-        No posture and line were found from which a plan was verified.
+        No posture and line were found for which a plan was verified.
 
     Examples
     --------
@@ -387,12 +387,12 @@ def starter_task(
     )
     if _measure_reach(robot, _draw_postures(robot)) < _LEAST_REACH:
         raise InputError(
-            "this tool frame does not move, or only turns on the spot",
+            "this tool frame does not move, or only rotates on the spot",
             where=str(path),
             found=f"{robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}",
-            hint="Name another tool frame, farther along the chain",
+            hint="Choose another tool frame, farther along the chain",
         )
-    deadline = Deadline.after(90.0)  # s; then no further task space is tried
+    deadline = Deadline.after(90.0)  # s; after that no further task space is tried
     changes = {**_QUICK, "robot.urdf": str(path.absolute())}
     for space in spaces(robot):
         words = space if isinstance(space, str) else ", ".join(space)
@@ -403,7 +403,7 @@ def starter_task(
             content: Any = read_yaml(written, "starter task")
             task = load_task(content, changes=changes)
             with suppress(PlanningError), warnings.catch_warnings():
-                # This plan has few intervals; the task has as many as it needs.
+                # This plan has few intervals; the task itself gets as many as it needs.
                 warnings.simplefilter("ignore", SlowTimingWarning)
                 result = planner.plan(task, listener=tell, check_advice=False)
                 if result.verified:
@@ -413,5 +413,5 @@ def starter_task(
         "no first motion was found",
         where=str(path),
         found=f"chain {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}",
-        hint="Name another tool frame; brachis inspect shows limits and closed forms",
+        hint="Choose another tool frame; brachis inspect shows limits and closed forms",
     )

@@ -37,13 +37,13 @@ _LARGEST_INSET = 0.1
 
 
 class Guarantee(Enum):
-    """Where a limit holds; each value is the sentence that a user reads."""
+    """Where a limit is met; each value is the text that a user reads."""
 
-    AT_ALL_INSTANTS = "It holds at all instants of a verified motion."
+    AT_ALL_INSTANTS = "met at all instants of a verified motion, to 1e-4"
     AT_COLLOCATION_POINTS = (
-        "It holds at the collocation points of the optimiser, and is not verified."
+        "met at the collocation points of the optimiser, but not verified"
     )
-    AS_MEAN = "It holds as a mean over the whole motion."
+    AS_MEAN = "met as a mean over the whole motion"
     """The values have to be squares f^2: the optimiser derives their curvature from that (`brachis.optimise.means`)."""
 
     @property

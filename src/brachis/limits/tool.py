@@ -230,6 +230,7 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
                     "m/s",
                     f"tool_limits.{key}",
                     active_text=active,
+                    share="tool speed / limit",
                     cause=cause,
                 )
             )

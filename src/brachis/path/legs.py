@@ -110,16 +110,19 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
         first, last = (_snap(s, path.stops) for s in section.s)
         for ends in pairwise(cut(path.stops, first, last).tolist()):
             between = path.between(*ends)
-            leads = [
-                _lead(speed, speeds.get(s, speed)) / _tool_slope(task_map, between, s)
+            lengths = [
+                _lead(speed, speeds.get(s, speed))
                 for s, speeds in zip(ends, (before, after), strict=True)
             ]
+            leads = np.divide(
+                lengths, [_tool_slope(task_map, between, s) for s in ends]
+            ).tolist()
             # The planner knows whether less is enough.
             share = min(
                 1.0, 0.5 * (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
             )
             s = (ends[0] + share * leads[0], ends[1] - share * leads[1])
-            changes: dict[str, object] = {"s": s}
+            changes: dict[str, object] = {"s": s, "lead_length": share * sum(lengths)}
             if any(leads):
                 changes["within"] = (
                     ends[0] if before.get(ends[0], 0.0) <= speed else s[0],

@@ -95,7 +95,7 @@ class PlannedMotion(Summary):
             "path error": f"{self.verification.path_error:.1e} m or rad",
             "solver": f"{report.solver}, {report.status.name.lower()}",
             "candidates": f"{len(self.candidates)}, {verified} verified",
-            "wall time": f"{self.timing.get('total', 0.0):.2f} s",
+            "planning time": f"{self.timing.get('total', 0.0):.2f} s (without imports)",
             "timing": "" if self.timing_gap is None else str(self.timing_gap),
             "not completed": "; ".join(self.not_completed),
             "warnings": "; ".join(remark.message for remark in self.warnings),

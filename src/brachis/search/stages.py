@@ -15,7 +15,6 @@ import numpy as np
 
 from brachis.common.arrays import cut, interpolate_columns
 from brachis.common.summary import Summary
-from brachis.common.words import write_count
 from brachis.errors import UnreachableError
 from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointMap, JointSpaceMap
 from brachis.optimise.backends import SolverReport
@@ -41,17 +40,6 @@ SearchMap = ClosedFormMap | ChartMap | JointSpaceMap
 def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
     """Name the coordinates, besides s, in which a motion is planned: redundant joints, those of a chart, or none."""
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
-
-
-def describe_coordinates(trajectory: Trajectory) -> str:
-    """Say in which coordinates, besides s, a motion is planned; the words explain what a chart is."""
-    joints = trajectory.redundant_joints
-    count = len(trajectory.control_points) - 1
-    if joints or trajectory.branch != CHART:
-        return coordinates(joints, trajectory.branch)
-    if count == 0:
-        return "none"
-    return f"no joint is chosen; a chart measures the self-motion of all joints by {write_count(count, 'coordinate')}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

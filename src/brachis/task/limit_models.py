@@ -273,12 +273,14 @@ class ProcessSpeed(Model):
         ),
     ]
     """[begin, end]: path coordinates between which the speed is held. At stops, and at ends of the path that the tool
-    does not pass at this speed, the section is shorter by what the tool moves in 0.1 s at the higher speed. There the
-    tool does not exceed this speed, unless the speed before or after is higher."""
+    does not pass at this speed, the section is shorter by a lead, the distance travelled in 0.1 s at the higher speed.
+    In a lead the tool is no faster than this speed, unless the speed on its other side is higher."""
     segment: Count | None = None
     """Index of the segment that states the speed; written by brachis."""
     within: tuple[Number, Number] | None = None
     """[begin, end] between which the tool does not exceed the speed; written by brachis."""
+    lead_length: Number = 0.0
+    """Length by which leads make the part shorter, m; written by brachis."""
 
     @property
     def leads(self) -> list[SpeedTable]:

@@ -370,7 +370,8 @@ class MovingSegment(SegmentModel):
     Null: as a spline's orientations or the posture say, otherwise fixed."""
     speed: Positive | None = None
     """Process speed: constant speed of the tool along the segment except its blends, m/s, as in
-    tool_limits.process_speed. It replaces feed rates of points."""
+    tool_limits.process_speed. It replaces feed rates of points. For this speed on the whole segment, put a short line
+    without it before and after: a run-in and a run-out."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()

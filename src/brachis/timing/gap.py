@@ -70,6 +70,8 @@ class TimingGap(Summary):
         Kinds of the limits that the least time leaves out. If there are any, the least time is only a lower bound.
     s_interval : tuple of float
         Shortest interval of the path in which four fifths of the difference are lost.
+    advice : str
+        What may give a faster motion.
     """
 
     t_end: float
@@ -77,6 +79,7 @@ class TimingGap(Summary):
     places: int
     left_out: tuple[str, ...]
     s_interval: tuple[float, float]
+    advice: str
 
     @property
     def gap(self) -> float:
@@ -95,7 +98,7 @@ class TimingGap(Summary):
             f"(on a grid of {self.places} places)"
         )
 
-    def issues(self, *, has_fixed_intervals: bool) -> tuple[Issue, ...]:
+    def issues(self) -> tuple[Issue, ...]:
         """Say where time is lost and what would help; return nothing if the gap is small, or is only a bound."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
@@ -104,12 +107,9 @@ class TimingGap(Summary):
         where = "along the whole path"
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
-        advice = "raise search.time_limit"
-        if has_fixed_intervals:
-            advice = "set spline.intervals: auto, or a larger number"
         message = (
             f"the same joint path can be passed in {self.least_time:.4g} s, which is {saved:.1f} % faster; the motion "
-            f"loses this time {where}; for a faster motion, {advice}"
+            f"loses this time {where}; for a faster motion, {self.advice}"
         )
         motion_text = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
@@ -166,7 +166,10 @@ def find_timing_gap(
         lost.append(np.diff(motion_times) - np.diff(times))
     left_out = sorted({limit.name for limit in limits if is_left_out(limit)})
     interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
-    return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)
+    advice = "raise search.time_limit"
+    if trajectory.task.spline.intervals != "auto":
+        advice = "set spline.intervals: auto, or a larger number"
+    return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval, advice)
 
 
 def _time_phase(

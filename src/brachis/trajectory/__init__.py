@@ -1,4 +1,4 @@
-"""The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
+"""The trajectory: immutable, evaluated at any time, and saved with all data that a new verification needs."""
 
 from brachis.trajectory.phases import (
     PHASE_COLUMNS,

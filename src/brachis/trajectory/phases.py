@@ -1,9 +1,9 @@
-"""The phases of a motion: their curves, how these are joined to one spline, and what each phase is.
+"""The phases of a motion: what each phase is, its curves, and how the curves are joined into one spline.
 
-A motion is a list of phases. One ends where the tool stops, where a wait is over, and where a given speed begins or
-ends. In each phase the curves are B-splines over its own normalised time. One spline over the time of the whole motion
-has their knots, and those where phases meet degree + 1 times: the pieces on both sides share no control point. At
-such a knot it has the value after it.
+A motion is a list of phases. A phase ends where the tool stops, where a wait is over, and where a given speed begins or
+ends. In each phase the curves are B-splines over its own normalised time. One joined spline over the time of the whole
+motion has all their knots. Where phases meet, it has a knot degree + 1 times, so that the pieces on both sides share no
+control point. At such a knot the spline has the value after it.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class PhaseSpline(Summary):
     t_end : float
         Duration, s.
     knots : (N + 2 d + 1,) ndarray
-        Clamped, in normalised time from 0 to 1.
+        Clamped knots in normalised time from 0 to 1.
     degree : int
-        d.
+        Degree d of the splines.
     control_points : (1 + r, N + d) ndarray
-        Of s, then of each redundant joint in chain order, or of the chart's sigma.
+        Control points of s, then of each redundant joint in chain order, or of the chart's sigma.
     """
 
     t_end: float
@@ -41,9 +41,9 @@ class PhaseSpline(Summary):
     control_points: np.ndarray
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), s.
+        """Return the values of the curves and three time derivatives, (K, c) each, at times t, (K,), s.
 
-        At knots those just after them.
+        At a knot they are the values just after it.
         """
         t_norm = np.clip(t / self.t_end, 0.0, 1.0)
         return tuple(
@@ -56,12 +56,12 @@ class PhaseSpline(Summary):
         return Spline(self.knots, self.control_points.T, self.degree)
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
-        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
+        """Return the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
         end = np.full(len(s), self.t_end)
         return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
     def wait(self, duration: float) -> PhaseSpline:
-        """Return curves that stay where these end, for a duration, s."""
+        """Return constant curves that stay at the end of these for a duration, s."""
         knots = np.repeat([0.0, 1.0], self.degree + 1)
         points = np.repeat(self.control_points[:, -1:], self.degree + 1, axis=1)
         return PhaseSpline(duration, knots, self.degree, points)
@@ -74,13 +74,15 @@ class MotionPhase:
     Attributes
     ----------
     begin, end : float
-        Times, s.
+        Times at which it begins and ends, s.
     s_begin, s_end : float
-        Path coordinates.
+        Path coordinates at these times.
     speed : float or None
-        Given speed of the tool, m/s; None: as fast as the limits allow.
+        Given speed of the tool, m/s. None means as fast as the limits allow.
     is_dwell : bool
         Whether the arm waits at rest.
+    leads : float
+        Length of the leads, in which the tool reaches and leaves the given speed, m. They are in the adjacent phases.
     """
 
     begin: float
@@ -89,21 +91,22 @@ class MotionPhase:
     s_end: float
     speed: float | None
     is_dwell: bool
+    leads: float = 0.0
 
     @property
     def duration(self) -> float:
-        """Time that it takes, s."""
+        """Duration of the phase, s."""
         return self.end - self.begin
 
     @property
     def kind(self) -> str:
-        """``dwell``, ``given speed`` or ``move``."""
+        """Kind of the phase: ``dwell``, ``given speed`` or ``move``."""
         if self.is_dwell:
             return "dwell"
         return "move" if self.speed is None else "given speed"
 
     def to_dict(self) -> dict[str, object]:
-        """Return plain data for JSON; times in s, the speed in m/s."""
+        """Return the phase as plain data for JSON, with times in s and the speed in m/s."""
         return {
             "kind": self.kind,
             "begin": self.begin,
@@ -114,11 +117,11 @@ class MotionPhase:
 
 
 PHASE_COLUMNS = ("phase", "s", "time", "speed")
-"""Headings of `phase_rows`."""
+"""Headings of the columns of `phase_rows`."""
 
 
 def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
-    """Write phases as the rows of a table, with their units."""
+    """Write phases as rows of a table, with units."""
     speeds = {"dwell": "at rest", "move": "as fast as the limits allow"}
     rows: list[tuple[str, ...]] = []
     for number, phase in enumerate(phases, start=1):
@@ -127,22 +130,25 @@ def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
             s += f" to {_write_s(phase.s_end)}"
         time = f"{phase.duration:.4f} s ({phase.begin:.4f} to {phase.end:.4f} s)"
         speed = speeds.get(phase.kind, f"{phase.speed} m/s")
+        if phase.leads:
+            held = 1e3 * phase.duration * (phase.speed or 0.0)
+            speed += f" on {held:.4g} of {held + 1e3 * phase.leads:.4g} mm (on all with run-in and run-out lines)"
         rows.append((f"{number} {phase.kind}", s, time, speed))
     return rows
 
 
 def _write_s(s: float) -> str:
-    """Write a path coordinate; rounding about zero is written as 0."""
+    """Write a path coordinate. Rounding errors around zero are written as 0."""
     return f"{round(s, 12):.4g}"
 
 
 def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray]:
-    """Write the curves of phases as one spline over the whole motion's normalised time.
+    """Join the curves of phases into one spline over the normalised time of the whole motion.
 
     Returns
     -------
     knots : ndarray
-        From 0 to 1; those where phases meet degree + 1 times.
+        Knots from 0 to 1. Where phases meet, the knot occurs degree + 1 times.
     control_points : (1 + r, ...) ndarray
     """
     ends = np.cumsum([spline.t_end for spline in splines])
@@ -158,6 +164,6 @@ def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray
 
 
 def find_phase_knots(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Find the numbers, (P + 1,), of the first of each degree + 1 equal knots in a joined knot vector."""
+    """Find the index, (P + 1,), of the first of each degree + 1 equal knots in a joined knot vector."""
     same = knots[degree:] == knots[: len(knots) - degree]
     return np.flatnonzero(same)

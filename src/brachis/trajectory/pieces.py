@@ -1,10 +1,10 @@
 """Joint motion as polynomials between nodes.
 
-Quintic Hermite pieces in Bernstein form, each relative to its first node, and their jerk.
+The polynomials are quintic Hermite pieces in Bernstein form, each relative to its first node. Their jerk is stored too.
 
-Positions are of the order of 1 rad, and the second differences of the coefficients are divided by h^2. Were the node's
-own position part of the coefficients, its rounding alone would be an error of 1e-16 / h^2 in the acceleration, which is
-visible for motions of milliseconds.
+Positions are of the order of 1 rad, and the second differences of the coefficients are divided by h^2. If the node's
+position were part of the coefficients, its rounding alone would cause an error of 1e-16 / h^2 in the acceleration,
+which is visible in motions of milliseconds.
 
 With x = 2 u - 1, from -1 to 1 over a piece of length h, the jerk is j(x) = m + a x + b (3 x^2 - 1) / 2 with
 
@@ -12,10 +12,10 @@ With x = 2 u - 1, from -1 to 1 over a piece of length h, the jerk is j(x) = m + 
     a = 3 (qddot0 + qddot1) / h - 6 (qdot1 - qdot0) / h^2
     b = 60 miss / h^3,   miss = q1 - q0 - h / 2 (qdot0 + qdot1) + h^2 / 12 (qddot1 - qddot0)
 
-Positions enter b alone. They are numbers of 64 bits: a piece's travel q1 - q0 is known to eps |q| and no better, which
-over 0.1 ms is a jerk of 0.02 rad/s^3, over 1 us one of 20,000. A piece therefore travels what has the least |b| within
-this rounding: what the positions do not say is not read into them, and all that they do say counts. This is the
-definition of the motion, for all who evaluate it, the verification included.
+Positions affect only b. They are 64-bit numbers, so the travel q1 - q0 of a piece is known to eps |q| at best. Over
+0.1 ms this is a jerk of 0.02 rad/s^3, and over 1 us a jerk of 20,000 rad/s^3. A piece therefore gets the travel of the
+least |b| within this rounding: rounding errors are not read as jerk, and larger differences are used fully. This is the
+definition of the motion for everything that evaluates it, including the verification.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from brachis.kernel import bernstein
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Polynomials of degree m over L pieces of time; SciPy's ``BPoly(pieces.c, pieces.x)`` is the same.
+    """Polynomials of degree m over L pieces of time, equal to SciPy's ``BPoly(pieces.c, pieces.x)``.
 
     Attributes
     ----------
     c : (m + 1, L, n) ndarray
         Bernstein coefficients.
     x : (L + 1,) ndarray
-        Where pieces begin and end, s.
+        Times at which the pieces begin and end, s.
     """
 
     c: np.ndarray
@@ -49,7 +49,7 @@ class Pieces:
         self.c.setflags(write=False)
 
     def __call__(self, t: ArrayLike, nu: int = 0) -> np.ndarray:
-        """Values, or derivatives of the order `nu`, (..., n), at times t, (...), s; at a node those behind it."""
+        """Return values or derivatives of order `nu`, (..., n), at times t, (...), s; at a node the ones after it."""
         if nu > 0:
             return self.derivative(t, nu - 1)
         t = np.asarray(t, dtype=float)
@@ -62,7 +62,7 @@ class Pieces:
 
     @cached_property
     def derivative(self) -> Pieces:
-        """The derivatives of the polynomials by time."""
+        """The derivatives of the polynomials with respect to time."""
         degree = len(self.c) - 1
         if degree == 0:
             return Pieces(np.zeros_like(self.c), self.x)
@@ -78,27 +78,27 @@ def piece_coefficients(
     after: np.ndarray,
     before: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bernstein coefficients of ``q(t) - q[i]`` and of the jerk on every piece i between nodes i and i + 1.
+    """Return Bernstein coefficients of ``q(t) - q[i]`` and of the jerk on every piece i between nodes i and i + 1.
 
     A Bezier curve of degree 5 and length h begins with q = c0, qdot = 5 (c1 - c0) / h and
-    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise. The jerk comes from the nodes themselves: third differences
-    of the coefficients of the positions would multiply their rounding.
+    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise. The jerk is computed from the nodes, because third
+    differences of the position coefficients would amplify their rounding errors.
 
     Parameters
     ----------
     times : (L + 1,) ndarray
-        Nodes, s.
+        Times of the nodes, s.
     q, qdot : (L + 1, n) ndarray
-        Motion at the nodes.
+        Positions and velocities at the nodes.
     after, before : (L + 1, n) ndarray
         Acceleration just after and just before the nodes.
 
     Returns
     -------
     positions : (6, L, n) ndarray
-        rad or m.
+        Coefficients of the positions, rad or m.
     jerks : (3, L, n) ndarray
-        rad/s^3 or m/s^3.
+        Coefficients of the jerk, rad/s^3 or m/s^3.
     """
     h = np.diff(times)[:, None]
     v0 = qdot[:-1]

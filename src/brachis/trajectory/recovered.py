@@ -1,4 +1,4 @@
-"""Where a motion comes from that was not planned here, and how well its path is known."""
+"""Origin of a motion that was not planned here, and the accuracy of its path."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from brachis.errors import InputError
 from brachis.task.fields import Model
 
 SMALLEST = 2e-7
-"""m and rad: paths are not fitted to a smaller tolerance."""
+"""Smallest tolerance of a path, m and rad. Paths are not fitted more closely."""
 LARGEST = 1e-3
-"""m and rad: a path known to a larger tolerance says nothing."""
+"""Largest tolerance of a path, m and rad. A path with a larger one is of no use."""
 
 
 def check_tolerance(tolerance: float) -> float:
-    """Return a tolerance, m and rad; refuse one outside [`SMALLEST`, `LARGEST`].
+    """Return a tolerance, m and rad, if it is within [`SMALLEST`, `LARGEST`].
 
     Raises
     ------
@@ -37,7 +37,7 @@ def check_tolerance(tolerance: float) -> float:
 
 
 class StoredRecovery(Model, extra="ignore", strict=True):
-    """What a result file says of a motion that was not planned."""
+    """Entries of a result file for a motion that was not planned."""
 
     source: str
     tolerance: float
@@ -48,20 +48,20 @@ class StoredRecovery(Model, extra="ignore", strict=True):
 
 @dataclass(frozen=True, eq=False)
 class Recovered:
-    """Where a motion comes from that was not planned, and how its path was found.
+    """Origin of a motion that was not planned, and how its path was found.
 
     Attributes
     ----------
     source : str
-        The file.
+        Name of the file.
     tolerance : float
-        How far the tool may be from the recovered path, m and rad.
+        Largest distance of the tool from the recovered path, m and rad.
     told : tuple of str
-        What is known, and what is not, in plain words.
+        Sentences that say what is known and what is unknown.
     rows : (K, 1 + n) ndarray
-        Times, s, and joint positions, rad or m, as the file has them. Read-only.
+        Times, s, and joint positions, rad or m, as in the file. Read-only.
     error : (n,) ndarray
-        How far these positions may be off, rad or m. Read-only.
+        Largest error of these positions, rad or m. Read-only.
     """
 
     source: str
@@ -81,7 +81,7 @@ class Recovered:
         freeze(self, "rows", "error")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is known as plain data for JSON, without the rows."""
+        """Return plain data for JSON, without the rows."""
         return {
             "source": self.source,
             "tolerance": self.tolerance,
@@ -89,13 +89,13 @@ class Recovered:
         }
 
     def to_file(self) -> dict[str, Any]:
-        """Return all as plain data for JSON."""
+        """Return plain data for JSON, including the rows."""
         arrays = {"rows": self.rows.tolist(), "error": self.error.tolist()}
         return {**self.to_dict(), **arrays}
 
     @classmethod
     def of_file(cls, stored: StoredRecovery, n: int) -> Recovered:
-        """Take what `to_file` wrote of a motion of `n` joints.
+        """Read the data that `to_file` wrote for a motion of `n` joints.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The result file: one npz archive with a trajectory's arrays, its task and its URDF."""
+"""The result file, an npz archive with the arrays, the task and the URDF of a trajectory."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ ARRAYS = (
     "chart_rows",
     "chart_knots",
 )
-"""Names of the arrays in the file; as in `Trajectory`."""
+"""Names of the arrays in the file, as in `Trajectory`."""
 _MOST_BYTES = 128_000_000
-"""Largest size of a result file, and of what it holds unpacked."""
+"""Largest size of a result file and of its unpacked content, bytes."""
 _MOST_NODES = 500_000
-"""Largest number of nodes of a motion: they bound the time that its verification takes."""
+"""Largest number of nodes of a motion. It bounds the time that the verification takes."""
 _HIGHEST_DEGREE = 7
-"""Highest degree of splines, as in tasks."""
+"""Highest degree of splines, the same as in tasks."""
 _BROKEN = (
     OSError,
     ValueError,
@@ -68,11 +68,11 @@ _BROKEN = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What archives, headers of arrays and JSON raise when they are broken."""
+"""Errors that broken archives, array headers and JSON raise."""
 
 
 class _Meta(Model, extra="ignore", strict=True):
-    """What a result file says besides its arrays."""
+    """Content of a result file besides its arrays."""
 
     task: dict[str, Any]
     urdf: str
@@ -90,13 +90,13 @@ def write_result(
     meta: Mapping[str, object],
     arrays: Mapping[str, np.ndarray],
 ) -> None:
-    """Write a result file whole or not at all.
+    """Write a result file completely or not at all.
 
     Raises
     ------
     InputError
-        The suffix is another than npz, the folder does not exist or cannot be written, the file exists and is not a
-        result, or there are too many nodes.
+        The suffix is not npz, the folder does not exist or cannot be written, the file exists and is not a result, or
+        there are too many nodes.
     """
     check_suffix(
         path, ".npz", "brachis.export.write writes tables and formats of controllers"
@@ -116,7 +116,7 @@ def read_result(path: Path) -> dict[str, Any]:
     Raises
     ------
     ResultFileError
-        The file is missing, broken or of another schema version, or its parts do not fit each other.
+        The file is missing, broken or has another schema version, or its parts do not fit each other.
     """
     check_kind(path, Kind.RESULT, ResultFileError)
     where = str(path)
@@ -154,7 +154,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
 
 def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Read the metadata and the arrays, unchecked but for their types."""
+    """Read the metadata and the arrays, and check only their types."""
     if not zipfile.is_zipfile(stream):
         raise ValueError("the file is not an npz archive")
     with zipfile.ZipFile(stream) as archive:
@@ -175,13 +175,13 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
         ours = meta.get("schema") == SCHEMA
         arrays = {name: archive[name] for name in ARRAYS if ours}
     for name, array in arrays.items():
-        if not isinstance(array, np.ndarray):  # of a member without the suffix .npy
+        if not isinstance(array, np.ndarray):  # a member without the suffix .npy
             raise TypeError(f"{name} is not an array")
     return meta, arrays
 
 
 def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Check that the parts fit each other; return the arguments of a `Trajectory`."""
+    """Check that the parts fit each other, and return the arguments of a `Trajectory`."""
     task = load_task(meta.task)
     robot = robot_from_settings(task.robot, urdf_text=meta.urdf)
     robot, _ = bind(robot, task.task_space, task.tolerances)
@@ -243,12 +243,14 @@ def _refuse_unless(
 
 
 def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
-    """Degree of redundancy, from a checked chart or else from the joints that are named."""
+    """Return the degree of redundancy, from a checked chart or else from the number of named joints."""
     if rows.shape[:1] == (0,) and not knots.size:
         return named
     degree = 5
     fits = rows.ndim == 3 and rows.shape[2] == n + 1
-    if fits:  # the chart's reference begins at s = 0 and ends at 1 to rounding
+    if (
+        fits
+    ):  # the chart's reference begins at s = 0 and ends at s = 1, except for rounding
         count = len(rows) + degree + 1 if len(rows) != 1 else 0
         rounded = np.round(knots, 9)
         fits = knots.shape == (count,) and (not count or _are_knots(rounded, degree))
@@ -279,7 +281,7 @@ def _are_knots(knots: np.ndarray, degree: int) -> bool:
 
 
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
-    """Check shapes and order; pieces and intervals that are too short are lost in rounding."""
+    """Check shapes and order. Pieces and intervals that are too short would be lost in rounding."""
     times = arrays["times"]
     knots = arrays["knots"]
     shortest = tolerances.TIME
@@ -297,7 +299,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
         "knots",
         f"not the knots of a spline of degree {degree}",
         knots,
-        f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_HIGHEST_DEGREE}",
+        f"ascending numbers from 0 to 1, each end degree + 1 times; degrees up to {_HIGHEST_DEGREE}",
     )
     inner = knots[degree : len(knots) - degree]
     ends = knots[find_phase_knots(knots, degree)]
@@ -328,7 +330,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
 
 
 def _check_nodes(times: np.ndarray) -> None:
-    """Refuse motions of so many nodes that they are not verified."""
+    """Raise an error for a motion with more nodes than can be verified."""
     _refuse_unless(
         times.size <= _MOST_NODES,
         "times",

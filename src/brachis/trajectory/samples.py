@@ -1,4 +1,4 @@
-"""A trajectory at given times."""
+"""Samples of a trajectory at given times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
-"""Prefixes of a table's columns, and the quantities behind them."""
+"""Prefixes of the columns of a table, and the quantities that they stand for."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,7 +28,7 @@ class Samples(Summary):
     Attributes
     ----------
     t : (K,) ndarray
-        s.
+        Times, s.
     s : (K,) ndarray
         Path coordinate, dimensionless.
     q, qdot, qddot : (K, n) ndarray
@@ -36,11 +36,11 @@ class Samples(Summary):
     tau : (K, n) ndarray or None
         Torque (Nm or N); None if the URDF has no masses.
     tool_position : (K, 3) ndarray
-        Of the tool frame in the world, m.
+        Position of the tool frame in the world, m.
     tool_quaternion : (K, 4) ndarray
-        Its orientation, w, x, y, z, with signs such that neighbours are close.
+        Orientation of the tool frame, w, x, y, z, with signs chosen so that neighbours are close.
     tool_speed : (K,) ndarray
-        m/s.
+        Speed of the tool frame's origin, m/s.
 
     Examples
     --------
@@ -67,7 +67,7 @@ class Samples(Summary):
 
     @property
     def columns(self) -> dict[str, str]:
-        """Those of `COLUMNS` that are known."""
+        """Entries of `COLUMNS` whose quantities are known."""
         return {
             prefix: quantity
             for prefix, quantity in COLUMNS.items()
@@ -79,7 +79,7 @@ class Samples(Summary):
         return len(self.t)
 
     def joint_columns(self, joint_names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint.
+        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_`` and ``tau_`` with every joint's name.
 
         Torques are left out if they are unknown.
         """
@@ -90,7 +90,7 @@ class Samples(Summary):
         return columns
 
     def to_dataframe(self, joint_names: tuple[str, ...]) -> pd.DataFrame:
-        """Return a pandas table, a row for each time; see `Trajectory.to_dataframe`.
+        """Return a pandas table with a row for each time; see `Trajectory.to_dataframe`.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Samples(Summary):
         return pd.DataFrame({**columns, "tool_speed": self.tool_speed})
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown: the shapes."""
+        """Return the range of times and the shapes, for display."""
         return {
             "t": f"{self.t[0]:.4g} to {self.t[-1]:.4g} s" if len(self) else "none",
             "K": len(self),
@@ -119,7 +119,7 @@ class Samples(Summary):
 def tool_motion(
     robot: Robot, q: np.ndarray, qdot: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose and speed of the tool frame in the world; virtual joints do not move it.
+    """Return pose and speed of the tool frame in the world. Virtual joints do not move it.
 
     Parameters
     ----------
@@ -129,11 +129,11 @@ def tool_motion(
     Returns
     -------
     position : (K, 3) ndarray
-        m.
+        Positions, m.
     quaternion : (K, 4) ndarray
-        w, x, y, z, of length 1, with signs such that neighbours are close.
+        Unit quaternions w, x, y, z, with signs chosen so that neighbours are close.
     speed : (K,) ndarray
-        m/s.
+        Speeds of the frame's origin, m/s.
     """
     q = robot.of_real_joints(q)
     qdot = robot.of_real_joints(qdot)

@@ -1,4 +1,4 @@
-"""What holds a motion back, as plain data that is saved with it: what limits, speeds and stops cost."""
+"""Sensitivities of a motion, saved with it as plain data: the time that limits, speeds and stops cost."""
 
 from __future__ import annotations
 
@@ -10,31 +10,32 @@ from brachis.common.labels import Label
 from brachis.common.summary import Summary
 
 TIMINGS = "timings"
-"""Source of sensitivities that come from timings of the joint path, without multipliers."""
+"""Source of sensitivities that come from timings of the joint path instead of multipliers."""
 Accuracy = Literal["exact", "estimate", "least", "bound"]
-"""How near a saving is to what the motion would gain; see `TaskSaving`."""
-_STATIONARY = 1e-3
-"""Part of the gradient that may be unbalanced at an optimum."""
+"""Accuracy of a predicted saving; see `TaskSaving`."""
+STATIONARY = 1e-3
+"""Largest fraction of the gradient that may be unbalanced at an optimum."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one figure of a limit, or of the task, costs.
+    """The time that one figure of a limit or of the task costs.
 
     Attributes
     ----------
     label : Label
-        What is limited, and the figure's unit.
+        What is limited, and the unit of the figure.
     side : {"lower", "upper"} or None
         End of a range; None for a figure that bounds both sides.
     figure : float
-        In the label's unit.
+        Value of the limit in the label's unit.
     full_scale : float
-        What a change by 100 % means: of most limits the figure itself, of a position the width of its range.
+        Change of the figure by 100 %: for most limits the figure itself, for a position the width of its range.
     derivative : float
-        Derivative of t_E with respect to the figure, s per unit; <= 0 except at a lower end, which is raised by it.
+        Derivative of t_E with respect to the figure, s per unit. It is <= 0, except at a lower end, where a larger
+        figure leaves less room.
     s : tuple of (float, float)
-        Path coordinates between which the figure counts; empty for all of the path.
+        Intervals of the path coordinate in which the figure applies; empty for the whole path.
     """
 
     label: Label
@@ -50,7 +51,7 @@ class Sensitivity:
         return -1.0 if self.side == "lower" else 1.0
 
     def change(self, fraction: float) -> float:
-        """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
+        """Predict the change of t_E, s, if the limit is relaxed by a fraction of its full scale; 0.01 is 1 %."""
         return self.outwards * self.derivative * self.full_scale * fraction
 
     def to_dict(self) -> dict[str, Any]:
@@ -71,16 +72,17 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class TaskSaving:
-    """What the motion would gain if the task asked for something else, such as no dwell or no stop.
+    """Time that the motion would gain from a change of the task, such as no dwell or no stop.
 
     Attributes
     ----------
     change : str
-        In words, for example ``without the dwell at s = 0.3``.
+        The change in words, for example ``without the dwell at s = 0.3``.
     saved : float
-        By how much the motion gets shorter, s.
+        Time saved, s.
     accuracy : {"exact", "estimate", "least", "bound"}
-        Whether it saves that; about that; at least about that; or along the same joint path no more than that.
+        Whether `saved` is exact, an estimate, the least that is saved (estimated), or the most that is saved along the
+        same joint path.
     """
 
     change: str
@@ -90,16 +92,16 @@ class TaskSaving:
 
 @dataclass(frozen=True)
 class BranchBoundary:
-    """What the branch's boundary costs; it limits the choice of redundant joints, not the robot.
+    """The time that the boundary of the branch costs. It comes from the choice of redundant joints, not from the robot.
 
     Attributes
     ----------
     label : str
-        Of the margin.
+        Name of the branch margin.
     margin : float
-        Least branch margin in force, dimensionless.
+        Smallest branch margin that the program allows, dimensionless.
     derivative : float
-        Derivative of t_E with respect to it, s.
+        Derivative of t_E with respect to the margin, s.
     """
 
     label: str
@@ -117,22 +119,22 @@ class BranchBoundary:
 
 @dataclass(frozen=True, repr=False)
 class Sensitivities(Summary):
-    """What limits, speeds and stops cost.
+    """The time that limits, speeds and stops cost.
 
     Attributes
     ----------
     limits : tuple of Sensitivity
-        All figures of all limits but safeguards, process speeds and blends, the costliest first.
+        All figures of limits (without safeguards), process speeds and blends. The costliest come first.
     boundaries : tuple of BranchBoundary
-        Branch margins that hold the motion back.
+        Branch margins that slow the motion down.
     source : str
-        Origin of the multipliers: ``"solver"`` or ``"least squares"``; or ``"timings"`` in place of multipliers.
+        Origin of the multipliers, ``"solver"`` or ``"least squares"``; or ``"timings"`` if there are no multipliers.
     residual : float
-        Part of the gradient of t_E that they do not balance; an optimum has 0.
+        Fraction of the gradient of t_E that the multipliers do not balance. It is 0 at an optimum.
     unique : bool
-        False if the multipliers are not unique: the derivatives then hold for more room only, not for less.
+        False if the multipliers are not unique. The derivatives are then valid only for more room, not for less.
     task : tuple of TaskSaving
-        What changes of the task save, those that save most first.
+        Savings from changes of the task. The largest come first.
     """
 
     limits: tuple[Sensitivity, ...]
@@ -144,11 +146,11 @@ class Sensitivities(Summary):
 
     @property
     def reliable(self) -> bool:
-        """Whether the answer is an optimum, judged by the multipliers; otherwise they are rough."""
-        return self.residual <= _STATIONARY
+        """Whether the multipliers show that the solution is an optimum; otherwise they are only approximate."""
+        return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
-        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
+        """Return the sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
         key = (subject, kind, end)
         for entry in self.limits:
             if (entry.label.subject, entry.label.kind, entry.side) == key:
@@ -168,17 +170,17 @@ class Sensitivities(Summary):
         }
 
     def to_file(self) -> dict[str, Any]:
-        """Return all as plain data for JSON, from which `of_file` makes it again."""
+        """Return all data in plain form for JSON. `of_file` is the inverse."""
         return asdict(self)
 
     @classmethod
     def of_file(cls, stored: Mapping[str, Any]) -> Sensitivities:
-        """Take what `to_file` wrote.
+        """Read the data that `to_file` wrote.
 
         Raises
         ------
         ValidationError
-            Of pydantic: it is something else.
+            The data are not valid. The error is that of pydantic.
         """
         from pydantic import TypeAdapter
 

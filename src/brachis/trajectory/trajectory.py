@@ -1,4 +1,4 @@
-"""Joint motion along a path, evaluated at any time; also as an argument: a trajectory, what has one, or its file."""
+"""Joint motion along a path, evaluated at any time; and reading it from a trajectory, a result, or a file."""
 
 from __future__ import annotations
 
@@ -35,51 +35,53 @@ if TYPE_CHECKING:
 
 
 CONTINUOUS_TORQUE = 3
-"""Least B-spline degree that gives continuous acceleration, and so torque."""
+"""Lowest B-spline degree with continuous acceleration, and hence continuous torque."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Summary):
     """Joint motion along a path.
 
-    Joint positions are quintic polynomials between nodes, which meet the closed form to 1e-11 rad or m and join with
-    continuous position, velocity and (from degree 3 on) acceleration. The path coordinate and the redundant joints are
-    also kept as the B-splines that the optimiser found; in a chart, its measure sigma of self-motion in their place.
+    Joint positions are quintic polynomials between nodes. They agree with the closed form to within 1e-11 rad or m, and
+    join with continuous position, velocity and (from degree 3 on) acceleration. The path coordinate and the redundant
+    joints are also stored as the B-splines that the optimiser found. In a chart, its measure sigma of the self-motion
+    takes the place of the redundant joints.
 
     Attributes
     ----------
     task : Task
     urdf : str
-        Text of the URDF at planning time.
+        Text of the URDF at the time of planning.
     robot : Robot
     redundant_joints : tuple of str
     branch : str
-        Label of the closed form's branch.
+        Label of the branch of the closed form.
     times : (L + 1,) ndarray
-        Nodes, from 0 to t_end, s.
+        Times of the nodes, from 0 to t_end, s.
     q, qdot, qddot : (L + 1, n) ndarray
         Joint motion at the nodes.
     qddot_before : (L + 1, n) ndarray
-        Acceleration just before the nodes; differs from `qddot` at knots of splines of degree 2.
+        Acceleration just before the nodes. It differs from `qddot` at knots of splines of degree 2.
     knots : ndarray
-        B-spline knots in normalised time, N + 2 d + 1 of one phase; those where phases meet d + 1 times.
+        B-spline knots in normalised time; N + 2 d + 1 for a single phase. A knot where phases meet occurs d + 1 times.
     degree : int
         B-spline degree d.
     control_points : (1 + r, N + d) ndarray
-        Of s (dimensionless), then of each redundant joint (rad or m) in chain order, or of the chart's sigma.
+        Control points of s (dimensionless), then of each redundant joint (rad or m) in chain order, or of the chart's
+        sigma.
     phase_ends : (P,) ndarray
-        Times at which the phases end, ascending, s; the last one is t_end. Most motions have one phase.
+        Ascending times at which the phases end, s. The last one is t_end. Most motions have one phase.
     chart_rows : (B, r, n + 1) ndarray
-        Coefficients of the chart in which the motion was planned, see `brachis.kinematics.ChartRows`; B = 0 where a
-        closed form took its place.
+        Coefficients of the chart in which the motion was planned, see `brachis.kinematics.ChartRows`. B = 0 if a closed
+        form was used instead.
     chart_knots : ndarray
-        Knots of its splines; none where the rows are constant (B = 1).
+        Knots of the chart's splines; empty if the rows are constant (B = 1).
     recovered : Recovered or None
-        Where the motion comes from, if it was not planned; its path is then known to a tolerance.
+        Origin of the motion, if it was not planned. Its path is then known only to a tolerance.
     own_limits : tuple of str
-        Names of limits of the user's own that were no part of the task. The limits themselves are not saved.
+        Names of the user's own limits that were not part of the task. The limits themselves are not saved.
     sensitivities : Sensitivities or None
-        What limits, speeds and stops cost, where that is known from the plan.
+        The time that limits, speeds and stops cost, if known from the plan.
 
     Examples
     --------
@@ -121,22 +123,32 @@ class Trajectory(Summary):
 
     @property
     def node_accelerations(self) -> np.ndarray:
-        """Accelerations on both sides of all nodes, (2 L + 2, n), rad/s^2 or m/s^2."""
+        """Accelerations just before and just after all nodes, (2 L + 2, n), rad/s^2 or m/s^2."""
         return np.concatenate([self.qddot_before, self.qddot])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Joints in chain order."""
+        """Names of the joints in chain order."""
         return self.robot.joint_names
+
+    @property
+    def redundancy(self) -> str:
+        """The redundant joints in words; for a chart, its coordinates of the self-motion."""
+        if self.redundant_joints or not self.chart_rows.size:
+            return ", ".join(self.redundant_joints) or "none"
+        return (
+            "none chosen; the self-motion of all joints has "
+            f"{write_count(self.chart_rows.shape[1], 'coordinate')} (a chart)"
+        )
 
     @cached_property
     def pieces(self) -> Pieces:
-        """Joint positions less those of the node before; see `position`."""
+        """Joint positions relative to the previous node; see `position`."""
         return self._polynomials[0]
 
     @cached_property
     def jerk_pieces(self) -> Pieces:
-        """Joint jerks: the third derivative of `pieces`, to rounding."""
+        """Joint jerks, which are the third derivative of `pieces` except for rounding."""
         return self._polynomials[1]
 
     @cached_property
@@ -147,16 +159,16 @@ class Trajectory(Summary):
 
     @cached_property
     def path_spline(self) -> Spline:
-        """s(t), over time in seconds."""
+        """The path coordinate s(t), over time in seconds."""
         return self._spline(self.control_points[0])
 
     @cached_property
     def redundant_spline(self) -> Spline:
-        """Positions of the r redundant joints, or sigma of the chart, over time in seconds."""
+        """Positions of the r redundant joints, or the chart's sigma, over time in seconds."""
         return self._spline(self.control_points[1:].T)
 
     def _spline(self, control_points: np.ndarray) -> Spline:
-        """Put control points on knots in s; those where phases meet are exactly the ends of the phases."""
+        """Make a spline over time in seconds. Its knots where phases meet are exactly the ends of the phases."""
         times = self.knots * self.phase_ends[-1]
         first = find_phase_knots(self.knots, self.degree)[1:]
         times[first[:, None] + np.arange(self.degree + 1)] = self.phase_ends[:, None]
@@ -164,7 +176,7 @@ class Trajectory(Summary):
 
     @cached_property
     def phase_splines(self) -> tuple[PhaseSpline, ...]:
-        """Curves of each phase: s, then the redundant joints or sigma. `join_splines` undone, to rounding."""
+        """Curves of each phase: s, then the redundant joints or sigma. This undoes `join_splines`, up to rounding."""
         outer = self.degree + 1
         numbers = find_phase_knots(self.knots, self.degree)
         ends = np.append(0.0, self.phase_ends)
@@ -182,7 +194,7 @@ class Trajectory(Summary):
 
     @cached_property
     def phases(self) -> tuple[MotionPhase, ...]:
-        """What each phase is: its times, its part of the path, and its given speed."""
+        """The phases of the motion, each with its times, its part of the path, and its given speed."""
         ends = [0.0, *self.phase_ends.tolist()]
         speeds = self.task.tool_limits.process_speed
         phases = []
@@ -190,25 +202,25 @@ class Trajectory(Summary):
         for (begin, end), spline in zip(times, self.phase_splines, strict=True):
             s_begin, s_end = spline.control_points[0, [0, -1]].tolist()
             is_dwell = s_begin == s_end
-            # The phases of a recorded motion are between its stops, and longer than the parts.
+            # A recorded motion has phases only between its stops, which are longer than the parts with a speed.
             s = (s_begin, s_end)
             matching = (
-                section.speed
+                (section.speed, is_dwell, section.lead_length)
                 for section in speeds
                 if np.allclose(s, section.s, 0.0, 1e-9)
             )
-            speed = None if is_dwell else next(matching, None)
-            phases.append(MotionPhase(begin, end, *s, speed, is_dwell))
+            kind = next(matching, (None, is_dwell))
+            phases.append(MotionPhase(begin, end, *s, *kind))
         return tuple(phases)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
-        """Path coordinate s at times `t`, same shape."""
+        """Return the path coordinate s at times `t`, in the same shape."""
         times = self._check_times(t)
-        end = self.control_points[0, -1]  # without the spline's rounding
+        end = self.control_points[0, -1]  # avoids rounding of the spline
         return np.where(times == self.t_end, end, self.path_spline(times))
 
     def position(self, t: ArrayLike) -> np.ndarray:
-        """Joint positions at times `t`: (n,) for a number, (K, n) for (K,); rad or m.
+        """Return joint positions at times `t`, rad or m: (n,) for a number, (K, n) for (K,) times.
 
         Raises
         ------
@@ -220,32 +232,32 @@ class Trajectory(Summary):
         return self.q[node] + self.pieces(times)
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
-        """Joint velocities, as `position`; rad/s or m/s."""
+        """Return joint velocities, rad/s or m/s, in the shape of `position`."""
         return self.pieces(self._check_times(t), nu=1)
 
     def acceleration(self, t: ArrayLike) -> np.ndarray:
-        """Joint accelerations, as `position`; rad/s^2 or m/s^2."""
+        """Return joint accelerations, rad/s^2 or m/s^2, in the shape of `position`."""
         return self.pieces(self._check_times(t), nu=2)
 
     def jerk(self, t: ArrayLike) -> np.ndarray:
-        """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
+        """Return joint jerks, rad/s^3 or m/s^3, in the shape of `position`. At a node it is the value after it."""
         return self.jerk_pieces(self._check_times(t))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
-        """Joint torques, as `position`; Nm or N. Raises UrdfError if the URDF has no masses."""
+        """Return joint torques, Nm or N, in the shape of `position`; UrdfError if the URDF has no masses."""
         motion = self.at(t)
         tau = dynamics.torque(self.robot, motion.q, motion.qdot, motion.qddot)
         return tau if np.ndim(t) else tau[0]
 
     def at(self, t: ArrayLike) -> Samples:
-        """All quantities at times `t`, (K,), s; of a number K = 1."""
+        """Return all quantities at times `t`, (K,), s. For a number, K = 1."""
         times = np.atleast_1d(numbers(t, "t", "s"))
         return self._samples(times, self._check_times(times))
 
     def _samples(
         self, t: np.ndarray, within: np.ndarray, *, stops: bool = False
     ) -> Samples:
-        """Evaluate the motion at times within it, to be shown at times t; with `stops` the last posture is at rest."""
+        """Evaluate the motion at times `within`, labelled with times t; with `stops` the last sample is at rest."""
         q = self.position(within)
         qdot = self.velocity(within)
         qddot = self.acceleration(within)
@@ -265,22 +277,22 @@ class Trajectory(Summary):
         dt : float
             Period, s.
         last : {"exact", "hold"}, optional
-            What follows the last multiple of `dt` before t_end. ``exact``: one sample at t_end itself, so that the last
-            period may be shorter. ``hold``: one at the next multiple of `dt`, at or after t_end, where the end posture
-            is held at rest: velocity and acceleration are zero, and the torque is what holds the posture.
+            The last sample. ``exact``: it is at t_end, so that the last period may be shorter. ``hold``: it is at the
+            first multiple of `dt` at or after t_end, with the end posture held at rest. Velocity and acceleration are
+            then zero, and the torque is the holding torque.
 
         Returns
         -------
         Samples
-            At 0, dt, 2 dt, ... and the last one.
+            Samples at 0, dt, 2 dt, ... and the last one.
 
         Raises
         ------
         InputError
-            `dt` is not positive, or so small that there would be more than ten million samples; or a motion that does
-            not end at rest is to be held.
+            `dt` is not positive, or so small that there would be more than ten million samples; or `last` is ``hold``
+            and the motion does not end at rest.
         UnknownNameError
-            `last` is neither.
+            `last` has another value.
         """
         if last not in ("exact", "hold"):
             raise UnknownNameError("ending", last, ("exact", "hold"), where="last")
@@ -307,11 +319,11 @@ class Trajectory(Summary):
         return self._samples(t, np.minimum(t, self.t_end), stops=True)
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
-        """Return a pandas table, a row every `dt` seconds; see `sample`.
+        """Return a pandas table with a row every `dt` seconds; see `sample`.
 
-        Columns: ``t`` (s), ``s``; for every joint ``q_<joint>`` (rad or m), ``qd_``, ``qdd_`` and ``tau_`` (Nm or N, if
-        known); ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed`` (m/s). Needs
-        the extra ``pandas``.
+        The columns are ``t`` (s) and ``s``; for every joint ``q_<joint>`` (rad or m), ``qd_``, ``qdd_`` and ``tau_``
+        (Nm or N, if known); ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed``
+        (m/s). This needs the extra ``pandas``.
 
         Raises
         ------
@@ -321,16 +333,15 @@ class Trajectory(Summary):
         return self.sample(dt).to_dataframe(self.joint_names)
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
-        none = "none by name: a chart" if self.chart_rows.size else "none"
+        """Return the entries shown to the user."""
         source = Path(self.robot.source)
         intervals = write_count(len(np.unique(self.knots)) - 1, "interval")
         return {
             "end time": f"{self.t_end:.4f} s",
-            "robot": f"{source.parent.name}/{source.name}",
+            "robot": Path(*source.parts[-2:]).as_posix(),
             "joints": ", ".join(self.joint_names),
-            "redundant joints": ", ".join(self.redundant_joints) or none,
-            "branch": self.branch or "none",
+            "redundant joints": self.redundancy,
+            **({} if len(self.chart_rows) else {"branch": self.branch or "none"}),
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
             **({"recovered from": self.recovered.source} if self.recovered else {}),
@@ -338,16 +349,16 @@ class Trajectory(Summary):
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write one npz file with all that is needed to load and verify the trajectory.
+        """Write one npz file with all the data needed to load and verify the trajectory.
 
-        The file is written under a temporary name and renamed, so that a broken write leaves nothing behind. An older
-        result of this name is replaced.
+        The file is written under a temporary name and then renamed, so that an interrupted write leaves nothing behind.
+        An older result of the same name is replaced.
 
         Raises
         ------
         InputError
-            The suffix is another than npz, the folder does not exist or cannot be written, or the file exists and is
-            not a result.
+            The suffix is not npz, the folder does not exist or cannot be written, or the file exists and is not a
+            result.
         """
         meta = {
             "task": self.task.to_dict(),
@@ -369,12 +380,12 @@ class Trajectory(Summary):
         Raises
         ------
         ResultFileError
-            The file is missing, broken or of another schema version, or its parts do not fit each other.
+            The file is missing, broken or has another schema version, or its parts do not fit each other.
         """
         return cls(**read_result(file_name(path, "path")))
 
     def _check_times(self, t: ArrayLike) -> np.ndarray:
-        """Refuse times outside the trajectory; rounding at the ends is forgiven."""
+        """Raise an error for times outside the trajectory, except for rounding at its ends."""
         times = numbers(t, "t", "s")
         if times.ndim > 1:
             raise InputError(
@@ -398,25 +409,25 @@ _R = TypeVar("_R")
 
 
 class HasMotion(Protocol):
-    """A result of a plan."""
+    """An object with a trajectory, such as the result of a plan."""
 
     @property
     def trajectory(self) -> Trajectory:
-        """Return the motion."""
+        """Return the trajectory."""
 
 
 MotionSource = Trajectory | HasMotion | str | os.PathLike[str]
 
 
 def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
-    """Return the trajectory that is given, as the argument `where` of a public function.
+    """Return the trajectory of `source`, which is the argument `where` of a public function.
 
     Raises
     ------
     ResultFileError
-        A file is not that of a motion.
+        The file is not a result file.
     InputError
-        It is something else.
+        `source` is neither a trajectory, a result nor a file.
     """
     if isinstance(source, Trajectory):
         return source
@@ -436,11 +447,11 @@ def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
 def of_motion(
     function: Callable[Concatenate[Trajectory, _P], _R],
 ) -> Callable[Concatenate[MotionSource, _P], _R]:
-    """Let a function of a trajectory take all that `motion_of` does."""
+    """Let a function of a trajectory accept everything that `motion_of` accepts."""
 
     @wraps(function)
     def taking(trajectory: MotionSource, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        """Call the function with the trajectory of what is given."""
+        """Call the function with the trajectory of the given source."""
         return function(motion_of(trajectory), *args, **kwargs)
 
     return taking  # type: ignore[return-value]  # mypy fears a second `trajectory` among the keywords

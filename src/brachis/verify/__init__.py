@@ -1,4 +1,4 @@
-"""Independent verification of a trajectory from URDF, path and limits alone."""
+"""Independent verification of a trajectory, based only on URDF, path and limits."""
 
 from brachis.verify.report import POSITION_SCALE, Check, Verification, VerifyOptions
 from brachis.verify.verify import verify_trajectory

@@ -1,6 +1,6 @@
-"""What is checked besides the path and the limits.
+"""Checks of everything except the path and the limits.
 
-Progress, ends, stops and dwells, given speeds of the tool, splines and continuity.
+These are progress, ends, stops and dwells, given speeds of the tool, splines, and continuity.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from brachis.verify.motion import CheckedMotion, MotionStates, turns
 from brachis.verify.report import Check
 
 _DWELL = 1e-9
-"""Largest deviation of a dwell from the time asked for, by rounding, s."""
+"""Largest deviation of a dwell from the requested time, due to rounding, s."""
 _SPEED = 1e-6
-"""Largest relative deviation from a given speed: by rounding, and by interpolation between nodes."""
+"""Largest relative deviation from a given speed, due to rounding and to interpolation between nodes."""
 _RESOLUTION = 1e-3
-"""Deviations are searched in this unit: `worst_between` tells values apart that differ by 5e-6 units."""
+"""Unit in which deviations are searched. `worst_between` distinguishes values that differ by 5e-6 units."""
 
 
 def check_progress(motion: CheckedMotion) -> list[Check]:
     """Check that the path is travelled once, forwards, from its beginning to its end.
 
-    ds/dt is a polynomial between knots: it is checked at both ends of each, and where it turns.
+    Between knots ds/dt is a polynomial, which is checked at both ends and at its extrema.
     """
     trajectory = motion.trajectory
     allowed = motion.options.progress_tolerance
@@ -60,7 +60,7 @@ def check_progress(motion: CheckedMotion) -> list[Check]:
 
 
 def _bernstein_coefficients(spline: Spline, breaks: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients, (d + 1, F), of the polynomials of a spline between its knots, (F + 1,)."""
+    """Return Bernstein coefficients, (d + 1, F), of a spline's polynomials between its knots, (F + 1,)."""
     begins = breaks[:-1]
     ends = breaks[1:]
     index = np.searchsorted(spline.knots, begins, side="right") - 1
@@ -71,7 +71,7 @@ def _bernstein_coefficients(spline: Spline, breaks: np.ndarray) -> np.ndarray:
 
 
 def check_ends(motion: CheckedMotion) -> list[Check]:
-    """Check that the motion begins and ends as the task says."""
+    """Check that the motion begins and ends as the task requires."""
     task = motion.task
     boundary = task.boundary
     states = motion.states
@@ -101,7 +101,7 @@ def check_ends(motion: CheckedMotion) -> list[Check]:
 def _check_speed(
     motion: CheckedMotion, name: str, task_speed: float, state: MotionStates
 ) -> list[Check]:
-    """Check that an end is passed at the speed that the task asks for; with full rest it is constant there."""
+    """Check that an end is passed at the speed that the task requires; with full rest it is constant there."""
     task_map = motion.task_map
     spline = motion.trajectory.path_spline
     time = state.t[0]
@@ -131,7 +131,7 @@ def _check_speed(
 def _move_onto(
     posture: np.ndarray, task_map: TaskMap, target: np.ndarray
 ) -> np.ndarray:
-    """Return the posture nearest to a given one, (n,), whose tool is at the target, (1, c), within rounding of it."""
+    """Return the posture with the tool at the target, (1, c), that is closest to a given posture, (n,)."""
     miss = task_map.difference(target, task_map.values(posture[None]))[0]
     if np.abs(miss).max(initial=0.0) > tolerances.WRITTEN:
         return posture
@@ -140,7 +140,7 @@ def _move_onto(
 
 
 def check_stops(motion: CheckedMotion) -> list[Check]:
-    """Check that the arm is at rest at every stop, where a phase ends, and that it waits there as long as asked."""
+    """Check that a phase ends at every stop, and that the arm is at rest there for the requested time."""
     stops = [leg for leg in motion.legs if leg.stops]
     if not stops:
         return []
@@ -176,7 +176,7 @@ def check_stops(motion: CheckedMotion) -> list[Check]:
 
 
 def check_rest(motion: CheckedMotion, title: str, states: MotionStates) -> list[Check]:
-    """Check the derivatives that vanish where the arm rests; `title` has a gap for their names."""
+    """Check the derivatives that vanish where the arm is at rest; `title` has a placeholder for their names."""
     options = motion.options
     jerks = states.qdddot / (1.0 + np.abs(motion.pieces.jerk[[0, -1]]).max())
     derivatives = (
@@ -204,9 +204,9 @@ def times_of_stops(motion: CheckedMotion) -> np.ndarray:
 
 
 def check_process_speed(motion: CheckedMotion) -> list[Check]:
-    """Check that the tool has the given speed wherever it has one, and that a phase passes each such part.
+    """Check that the tool has every given speed, and that each part with a given speed is a phase of the motion.
 
-    The phases of a recorded motion are only those between its stops.
+    For a recorded motion only the speed is checked, because its phases are only those between its stops.
     """
     legs = [leg for leg in motion.legs if leg.speed is not None]
     if not legs:
@@ -227,7 +227,7 @@ def check_process_speed(motion: CheckedMotion) -> list[Check]:
 
 
 def _worst_deviation(motion: CheckedMotion, leg: Leg) -> Worst:
-    """Find the largest relative deviation from the speed that a leg gives."""
+    """Find the largest relative deviation from the given speed of a leg."""
 
     def deviations(states: MotionStates) -> np.ndarray:
         """Return relative deviations from the speed, (K, 1), in units of `_RESOLUTION`."""
@@ -244,7 +244,7 @@ def _worst_deviation(motion: CheckedMotion, leg: Leg) -> Worst:
 
 
 def _rows_within(motion: CheckedMotion, leg: Leg) -> tuple[float, float]:
-    """Return the times of the first and the last row of a recorded motion that lie in a leg, s."""
+    """Return the times of the first and the last row of a recorded motion within a leg, s."""
     times = motion.pieces.times
     index, u = motion.pieces.place_on_path(np.array([leg.begin, leg.end]))
     begin, end = times[index] + u * motion.pieces.lengths[index]
@@ -255,12 +255,12 @@ def _rows_within(motion: CheckedMotion, leg: Leg) -> tuple[float, float]:
 
 
 def _nearest_phase(motion: CheckedMotion, leg: Leg) -> MotionPhase:
-    """Return the phase that passes a leg, or nearly so."""
+    """Return the phase whose ends are closest to those of a leg."""
     return min(motion.trajectory.phases, key=lambda phase: _distance(phase, leg))
 
 
 def _distance(phase: MotionPhase, leg: Leg) -> float:
-    """Return how far the ends of a phase are from those of a leg, in s."""
+    """Return how far the ends of a phase are from those of a leg, as a difference of s."""
     return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
 
 
@@ -274,7 +274,7 @@ def _phases_up_to(motion: CheckedMotion, leg: Leg) -> list[MotionPhase]:
 def _check_worst(
     name: str, misses: list[float], allowed: float, unit: str, subjects: list[str]
 ) -> Check:
-    """Check what misses most."""
+    """Check the largest of several deviations."""
     worst = np.argmax(misses)
     return Check(name, misses[worst], allowed, unit, subjects[worst])
 
@@ -287,7 +287,7 @@ def check_joints(
     kind: str,
     allowed: float,
 ) -> Check:
-    """Check the joint and the time at which values, (K, n), are largest.
+    """Check the largest size of values, (K, n), and name its joint and time.
 
     `kind` is a key of `UNITS`, or the unit of all joints.
     """
@@ -303,7 +303,7 @@ def check_joints(
 
 
 def check_splines(motion: CheckedMotion) -> list[Check]:
-    """Check that the splines of the redundant joints are their motion."""
+    """Check that the splines of the redundant joints agree with the joints' motion."""
     trajectory = motion.trajectory
     states = motion.states
     names = motion.robot.joint_names
@@ -318,9 +318,9 @@ def check_splines(motion: CheckedMotion) -> list[Check]:
 
 
 def check_continuity(motion: CheckedMotion) -> list[Check]:
-    """Check jumps where polynomial pieces join, and where a periodic motion goes on from its end to its beginning.
+    """Check for jumps where polynomial pieces join, and at the seam between end and beginning of a periodic motion.
 
-    Acceleration and torque may jump at stops, unless rest means that the acceleration vanishes. Over the seam a joint
+    Acceleration and torque may jump at stops, unless rest means that the acceleration vanishes. At the seam, a joint
     without a range may have made whole turns.
     """
     pieces = motion.pieces
@@ -335,7 +335,9 @@ def check_continuity(motion: CheckedMotion) -> list[Check]:
     ranges = motion.robot.limits.both_ways("position")
     turns_freely = motion.robot.revolute & np.isinf(ranges).all(axis=0)
     names = {"position": "q", "velocity": "qdot"}
-    if motion.trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
+    if (
+        motion.trajectory.degree >= CONTINUOUS_TORQUE
+    ):  # with a lower degree they may jump
         names |= {"acceleration": "qddot"}
         names |= {"torque": "tau"} if motion.robot.has_masses else {}
     checks = []

@@ -1,18 +1,21 @@
-"""Kinematics and torques from what the URDF's text states, by Newton's and Euler's equations, joint by joint.
+"""Kinematics and torques from the text of the URDF, by Newton's and Euler's equations, joint by joint.
 
-Each joint's frame is placed in the one before; vectors are in the joint's own frame. From the base outwards, with x the
-way from the last origin, z the joint's axis, angular velocity w, angular acceleration e, acceleration a:
+The frame of each joint is placed in the frame of the previous joint. Vectors are in the joint's own frame. From the
+base outwards, with x the vector from the previous origin, z the joint's axis, angular velocity w, angular acceleration
+e and acceleration a:
 
     a' = a + e x x + w x (w x x)
     revolute     e' = e + z qddot + w x z qdot,  w' = w + z qdot
     prismatic    a' = a' + 2 w x z qdot + z qddot
 
-beginning with a = -gravity, and back again with the forces F = m a_com and the moments I e + w x I w of all bodies; the
-payload is a body of its own beside those of the URDF. The torque is the moment, or force, along z, and
+The recursion begins with a = -gravity. It then returns to the base with the forces F = m a_com and the moments
+I e + w x I w of all bodies. The payload is an additional body beside those of the URDF. The torque is the sum of the
+moment, or force, along z and of
 
     armature qddot + viscous qdot + coulomb tanh(qdot / v_eps).
 
-Its rate is taken by differences along the motion, that of the last three terms by their derivatives.
+The rate of the torque is computed by differences along the motion, and that of the last three terms by their
+derivatives.
 """
 
 from __future__ import annotations
@@ -36,10 +39,10 @@ _AXES = np.eye(3)
 def tool_placements(
     robot: Robot, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n).
+    """Return positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n).
 
-    Positions of virtual joints say how far the tool is from the path; the place on the path is returned then. `joints`
-    are the `joint_placements`.
+    If there are virtual joints, their positions are the deviation of the tool from the path, and the point on the path
+    is returned. `joints` are the `joint_placements`.
     """
     origin, rotation = real_tool_placements(robot, *joints)
     count = len(robot.urdf_joints)
@@ -64,16 +67,16 @@ def tool_placements(
 def real_tool_placements(
     robot: Robot, rotations: np.ndarray, origins: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame by `joint_placements`, without virtual joints."""
+    """Return positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, without virtual joints."""
     tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
     last = rotations[:, -1]
     return origins[:, -1] + last @ tool[:3, 3], last @ tool[:3, :3]
 
 
 def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and of all joints in postures, (K, n).
+    """Return rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and all joints.
 
-    Virtual joints of the tool have no part in it.
+    The postures q are (K, n). Virtual joints of the tool are ignored.
     """
     bodies = robot.urdf_dynamics.bodies
     base = placement_matrix(robot.settings.mounting)
@@ -97,7 +100,7 @@ def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def torques(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
-    """Joint torques (K, n) from states (K, n), Nm or N; those of virtual joints are zero. No columns without masses."""
+    """Return joint torques (K, n), Nm or N, with zero for virtual joints; there are no columns without masses."""
     if not robot.has_masses:
         return q[:, :0]
     f = robot.friction
@@ -112,15 +115,15 @@ def torques(
 def torque_rates(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
 ) -> np.ndarray:
-    """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s."""
+    """Return rates of the joint torques (K, n), Nm/s or N/s, by differences along the motion."""
 
     def rigid(*states: np.ndarray) -> tuple[np.ndarray]:
-        """Return the torques without friction at moments nearby, (2 K, n)."""
+        """Return the torques without friction at neighbouring instants, (2 K, n)."""
         return (_rigid(robot, *states[:3]),)
 
     (rate,) = rates(rigid, (q, qdot, qddot, qdddot))
     f = robot.friction
-    widths = np.clip(qdot / f.v_eps, -300.0, 300.0)  # farther the slope is zero
+    widths = np.clip(qdot / f.v_eps, -300.0, 300.0)  # beyond this the slope is zero
     slope = f.viscous + f.coulomb / f.v_eps * np.cosh(widths) ** -2
     return rate + f.armature * qdddot + slope * qddot
 
@@ -128,7 +131,7 @@ def torque_rates(
 def _rigid(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
-    """Torques (K, n) without armature and friction."""
+    """Return torques (K, n) without armature and friction."""
     tau = np.zeros_like(q)
     bodies = robot.urdf_dynamics.bodies
     base = placement_matrix(robot.settings.mounting)[:3, :3]
@@ -161,9 +164,9 @@ def _rigid(
 def tool_accelerations(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Acceleration, m/s^2, and angular acceleration, rad/s^2, of the tool frame in axes of its own, (3, K) each.
+    """Return acceleration, m/s^2, and angular acceleration, rad/s^2, of the tool frame in its own axes, (3, K) each.
 
-    Virtual joints do not move the tool. From rest, with qdot = 0, accelerations depend on qddot as velocities on qdot.
+    Virtual joints do not move the tool. With qdot = 0, accelerations depend on qddot as velocities depend on qdot.
     """
     motion = _motions(robot, q, qdot, qddot, np.zeros(3))[-1]
     tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
@@ -177,7 +180,7 @@ def _motions(
     qddot: np.ndarray,
     of_base: np.ndarray,
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Angular velocity, angular acceleration, and acceleration of every joint's frame, (3, K) each.
+    """Return angular velocity, angular acceleration and acceleration of every joint's frame, (3, K) each.
 
     `of_base`, (3,), is the acceleration of the base in its own axes.
     """
@@ -209,7 +212,7 @@ def _motions(
 
 
 def _weights(robot: Robot, joint: int) -> list[Body]:
-    """List what a joint carries: its own body and, at the end of the chain, the payload."""
+    """List the bodies that a joint carries: its own and, at the end of the chain, the payload."""
     bodies = robot.urdf_dynamics.bodies
     body = bodies[joint]
     payload = robot.settings.payload
@@ -228,7 +231,7 @@ def _weights(robot: Robot, joint: int) -> list[Body]:
 def _accelerate(
     point: np.ndarray, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
 ) -> np.ndarray:
-    """Acceleration, (3, K), of points fixed in a frame that moves with w, e and a."""
+    """Return the acceleration, (3, K), of points fixed in a frame that moves with w, e and a."""
     return acceleration + cross(gain, point) + cross(spin, cross(spin, point))
 
 

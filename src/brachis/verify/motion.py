@@ -1,13 +1,13 @@
-"""The motion of a trajectory file, evaluated by polynomial piece and place in it.
+"""The motion of a trajectory file, evaluated by polynomial piece and by the place u within the piece.
 
 A piece of a microsecond is evaluated as exactly as any other. Roots of the polynomials, in Bernstein form, show where a
-motion turns, peaks or crosses a value.
+motion reverses, peaks or crosses a value.
 
-Where a motion is checked: in every piece, every knot interval, every piece of the path, and where joints reverse.
+A motion is checked in every piece, in every knot interval, in every piece of the path, and where joints reverse.
 
-A time that is not checked can hide anything. Every quintic piece is checked within, however short it is, and the more
-often the further it moves a joint. Coulomb friction is checked within its own width wherever a joint reverses or nearly
-does.
+Between checked instants anything could be hidden. Every quintic piece is therefore checked inside, however short it is,
+and more densely if it moves a joint further. Coulomb friction is checked within its own width wherever a joint reverses
+or nearly does.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from brachis.verify.mechanics import joint_placements, torques
 from brachis.verify.report import VerifyOptions
 
 _HALVINGS = 30
-"""After so many halves no two roots are in one part, unless they are nearer than `SAME_PLACE`."""
+"""Number of halvings after which no part contains two roots, unless they are closer than `SAME_PLACE`."""
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the places in (0, 1) at which polynomials change their sign; perhaps some at which they only touch zero.
+    """Find the places in (0, 1) at which polynomials change sign, and perhaps some at which they only touch zero.
 
     Parameters
     ----------
@@ -45,16 +45,16 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     column : (Z,) int ndarray
-        Polynomial of every root, ascending.
+        Polynomial of each root, ascending.
     u : (Z,) ndarray
-        Root; ascending within a polynomial.
+        Roots, ascending within a polynomial.
     """
     column = np.arange(coefficients.shape[1])
     low = np.zeros(len(column))
     width = 1.0
     root_arrays = [(column[:0], low[:0])]
     for _ in range(_HALVINGS):
-        # Coefficients that do not change their sign have no root.
+        # Coefficients without a change of sign have no root.
         changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
         coefficients = coefficients[:, changing]
         column = np.tile(column[changing], 2)
@@ -77,7 +77,7 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _halve(coefficients: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients, (m + 1, 2 F), of the lower and then of the upper halves of F polynomials."""
+    """Return Bernstein coefficients, (m + 1, 2 F), of the lower and then of the upper halves of F polynomials."""
     lower = [coefficients[0]]
     upper = [coefficients[-1]]
     while len(coefficients) > 1:
@@ -88,7 +88,7 @@ def _halve(coefficients: np.ndarray) -> np.ndarray:
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find where polynomials, (m + 1, F), turn within (0, 1).
+    """Find the extrema of polynomials, (m + 1, F), within (0, 1).
 
     Returns
     -------
@@ -100,7 +100,7 @@ def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 SAME_PLACE = 1e-9
-"""Places in a piece that are nearer to each other, as parts of the piece, are the same."""
+"""Places in a piece that are closer to each other than this fraction of the piece count as the same."""
 
 
 class MotionPieces:
@@ -110,18 +110,18 @@ class MotionPieces:
     ----------
     trajectory : Trajectory
     robot : Robot
-        That is verified.
+        Robot that is verified.
 
     Attributes
     ----------
     times : (L + 1,) ndarray
-        s.
+        Times of the nodes, s.
     lengths : (L,) ndarray
-        s.
+        Lengths of the pieces, s.
     nodes : (L, n) ndarray
-        Positions where the pieces begin, rad or m.
+        Positions at the beginning of the pieces, rad or m.
     position : (6, L, n) ndarray
-        Coefficients relative to `nodes`.
+        Coefficients of the positions relative to `nodes`.
     velocity : (5, L, n) ndarray
     acceleration : (4, L, n) ndarray
     jerk : (3, L, n) ndarray
@@ -144,35 +144,35 @@ class MotionPieces:
         self.robot = robot
 
     def time(self, index: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the times of places, s."""
+        """Return the times of places u in pieces, s."""
         return self.times[index] + u * self.lengths[index]
 
     def positions(self, index: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Joint positions at places, (K, n)."""
+        """Return the joint positions at places, (K, n)."""
         return self.nodes[index] + bernstein(self.position, index, u)
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
+        """Return the piece and the place in it for times t, (K,), s. At a node this is the piece that begins there."""
         index = np.searchsorted(self.times, t, side="right") - 1
         index = np.clip(index, 0, len(self.lengths) - 1)
         return index, np.clip((t - self.times[index]) / self.lengths[index], 0.0, 1.0)
 
     def place_on_path(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pieces and places in them at which path coordinates, (P,), are reached; s(t) does not decrease."""
+        """Return pieces and places at which path coordinates, (P,), are reached; s(t) does not decrease."""
         end = np.full(len(s), self.times[-1])
         return self.place(bisect(lambda t: self.path_coordinate(t) < s, end))
 
 
 @dataclass(frozen=True, eq=False)
 class MotionStates:
-    """The motion at K places, ascending in time; where pieces join, both sides. Only what is asked for is evaluated.
+    """The motion at K places, ascending in time, with both sides where pieces join. It is evaluated on demand.
 
     Attributes
     ----------
     pieces : MotionPieces
     index : (K,) int ndarray
     u, t, s : (K,) ndarray
-        Place in the piece of this index; time, s; path coordinate.
+        Place in the piece with this index; time, s; path coordinate.
     q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
@@ -182,25 +182,25 @@ class MotionStates:
 
     @classmethod
     def at(cls, pieces: MotionPieces, index: np.ndarray, u: np.ndarray) -> MotionStates:
-        """Take pieces at places, in any order; each place once."""
+        """Evaluate pieces at places given in any order. Each place occurs only once in the result."""
         order = np.lexsort((u, index))
         index = index[order]
         u = u[order]
         near = (index[1:] == index[:-1]) & (u[1:] - u[:-1] <= SAME_PLACE)
-        again = near & ((u[1:] < 1.0) | (u[:-1] == 1.0))  # an end stays
+        again = near & ((u[1:] < 1.0) | (u[:-1] == 1.0))  # an end is kept
         first = np.append(True, ~again)[: len(index)]
         return cls(pieces, index[first], u[first])
 
     @classmethod
     def join(cls, chunks: list[MotionStates]) -> MotionStates:
-        """Put states one after the other."""
+        """Concatenate states."""
         index = np.concatenate([states.index for states in chunks])
         return cls(
             chunks[0].pieces, index, np.concatenate([states.u for states in chunks])
         )
 
     def split(self) -> Iterator[MotionStates]:
-        """Yield the states in parts that take little memory."""
+        """Yield the states in parts that need little memory."""
         for begin in range(0, max(len(self.u), 1), _AT_ONCE):
             yield self.only(slice(begin, begin + _AT_ONCE))
 
@@ -236,7 +236,7 @@ class MotionStates:
 
     @cached_property
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
-        """The `joint_placements`."""
+        """The `joint_placements` of the states."""
         return joint_placements(self.pieces.robot, self.q)
 
     @cached_property
@@ -251,16 +251,16 @@ class MotionStates:
         )
 
     def torque(self, robot: Robot) -> np.ndarray:
-        """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
+        """Return torques of the verified robot, (K, n). The user's own limits call this."""
         robot.check_masses("torques")
         return self.tau
 
     def only(self, chosen: np.ndarray | slice | list[int]) -> MotionStates:
-        """Return some of the states, in the order that is chosen."""
+        """Return some of the states, in the chosen order."""
         return MotionStates(self.pieces, self.index[chosen], self.u[chosen])
 
     def merge(self, added: MotionStates) -> tuple[MotionStates, np.ndarray]:
-        """Return these states and others, ascending, and where each one was among those put one after the other."""
+        """Return these states merged with others, ascending, and their order among the concatenated states."""
         both = self.join([self, added])
         order = np.lexsort((both.u, both.index))
         return both.only(order), order
@@ -268,7 +268,7 @@ class MotionStates:
 
 @dataclass(frozen=True, eq=False)
 class CheckedMotion:
-    """What is verified, and against what.
+    """A motion that is verified, with the data that it is verified against.
 
     Attributes
     ----------
@@ -287,7 +287,7 @@ class CheckedMotion:
 
     @property
     def task(self) -> Task:
-        """Task of the trajectory."""
+        """The task of the trajectory."""
         return self.trajectory.task
 
     @cached_property
@@ -297,17 +297,17 @@ class CheckedMotion:
 
     @cached_property
     def states(self) -> MotionStates:
-        """The motion at all times at which it is checked."""
+        """The motion at all instants at which it is checked."""
         return MotionStates.at(self.pieces, *_all_places(self))
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
-        """Legs of the path, found anew from the task."""
+        """Legs of the path, derived again from the task."""
         task = with_held_speeds(self.task, self.task_map, self.path)
         return legs_of(task, self.task_map, self.path)
 
     def during(self, phase: MotionPhase) -> MotionStates:
-        """Return the states of the pieces of which a part lies in a phase."""
+        """Return the states of all pieces that overlap a phase."""
         times = self.pieces.times
         rounding = tolerances.TIME * times[-1]
         first = np.searchsorted(times, phase.begin + rounding, side="right") - 1
@@ -317,20 +317,20 @@ class CheckedMotion:
 
 
 MOST_INSTANTS = 2_000_000
-"""Instants at which a motion is checked before limits ask for more: some ten seconds' work, and 3 GB."""
+"""Largest number of instants at which a motion is checked, not counting those that limits add: about 10 s and 3 GB."""
 _USUAL_INSTANTS = 200_000
-"""Instants in the knot intervals, unless each has the fewest."""
+"""Target for the number of instants in all knot intervals, unless each already has the minimum number."""
 _AT_ONCE = 5000
-"""Instants that are evaluated at once: they stay in the processor's cache."""
+"""Number of instants that are evaluated at once, so that they stay in the processor's cache."""
 _FEWEST = 8
-"""Steps in a knot interval, no fewer, however many intervals there are; accelerations are polynomials within it."""
+"""Minimum number of steps in a knot interval, however many intervals there are."""
 _LEAST_STEPS = 3
-"""Steps in every piece: their ends tell a cubic acceleration from any other."""
+"""Minimum number of steps in each piece. Their ends determine a cubic acceleration."""
 _TRAVEL = 0.05
-"""No joint moves further in a step, rad or m."""
+"""Largest travel of a joint in a step, rad or m."""
 
 Places = tuple[np.ndarray, np.ndarray]
-"""Pieces (K,) and places u in them (K,)."""
+"""Numbers of pieces, (K,), and places u in them, (K,)."""
 
 
 def _all_places(motion: CheckedMotion) -> Places:
@@ -339,7 +339,7 @@ def _all_places(motion: CheckedMotion) -> Places:
     Raises
     ------
     InputError
-        They are more than `MOST_INSTANTS`.
+        There are more than `MOST_INSTANTS` places.
     """
     pieces = motion.pieces
     places = (
@@ -354,7 +354,7 @@ def _all_places(motion: CheckedMotion) -> Places:
 
 
 def _spread(motion: CheckedMotion) -> Places:
-    """Both ends of every piece and places between, no two of them further apart than a knot interval allows."""
+    """Spread places over every piece, both ends included, as densely as knot intervals and joint travel require."""
     pieces = motion.pieces
     trajectory = motion.trajectory
     knots = np.unique(trajectory.knots) * trajectory.t_end
@@ -380,7 +380,7 @@ def _spread(motion: CheckedMotion) -> Places:
 
 
 def list_speed_tables(task: Task) -> list[SpeedTable]:
-    """List the tool's largest speeds that depend on s: the task's, feed rates of points, those of leads to speeds."""
+    """List the tool's speed limits that depend on s: those of the task, of feed rates, and of process-speed leads."""
     limits = task.tool_limits
     tables = [limits.speed] if isinstance(limits.speed, SpeedTable) else []
     leads = [lead for section in limits.process_speed for lead in section.leads]
@@ -388,12 +388,12 @@ def list_speed_tables(task: Task) -> list[SpeedTable]:
 
 
 def _check_count(count: int) -> None:
-    """Refuse to check a motion at more than `MOST_INSTANTS` instants."""
+    """Raise an error if a motion would be checked at more than `MOST_INSTANTS` instants."""
     if count > MOST_INSTANTS:
         raise InputError(
             "the motion is too long, too fast or too finely divided to be verified",
             where="trajectory",
-            found=f"{count} instants to look at",
+            found=f"{count} instants to check",
             allowed=f"{MOST_INSTANTS}: {_LEAST_STEPS + 1} in every piece between nodes, one for every {_TRAVEL:g} rad "
             f"or m that a joint travels, {_FEWEST} in every knot interval, 32 in every piece of the path",
             hint="Split the motion into parts",
@@ -401,7 +401,7 @@ def _check_count(count: int) -> None:
 
 
 def _path_coordinates(motion: CheckedMotion) -> np.ndarray:
-    """Spread s over every piece of the path, however short: no small blend is stepped over; and add that of tables."""
+    """Spread s over every piece of the path, so that no small blend is skipped, and add the s of speed tables."""
     breaks = motion.path.breaks
     fractions = np.linspace(0.0, 1.0, motion.options.points_per_interval)
     _check_count(len(breaks) * len(fractions))
@@ -410,30 +410,30 @@ def _path_coordinates(motion: CheckedMotion) -> np.ndarray:
 
 
 def _peaks(pieces: MotionPieces) -> Places:
-    """Find where the acceleration of a joint turns within a piece, beyond its values at the ends of the piece."""
+    """Find extrema of joint accelerations inside pieces that exceed the values at the ends of the piece."""
     ends = pieces.acceleration[[0, -1]]
     beyond = np.maximum(
         pieces.acceleration.max(axis=0) - ends.max(axis=0),
         ends.min(axis=0) - pieces.acceleration.min(axis=0),
     )
-    # Coefficients may leave the range between both ends by 1 % of the largest acceleration.
+    # Coefficients that leave the range of both ends by up to 1 % of the largest acceleration are ignored.
     index, joint = np.nonzero(beyond > 0.01 * np.abs(ends).max(axis=(0, 1)))
     turning, u, _ = turns(pieces.acceleration[:, index, joint])
     return index[turning], u
 
 
 def _reversals(pieces: MotionPieces) -> Places:
-    """Find where joints with Coulomb friction cross multiples of its width, or turn near zero velocity."""
-    # Between these speeds, in widths, friction rises from 29 % to all but 2e-6 of its torque.
+    """Find where velocities of joints with Coulomb friction cross multiples of its width or turn close to zero."""
+    # At these speeds, in widths, friction rises from 29 % of its torque to all of it except a fraction of 2e-6.
     speeds = np.array([0.3, 1.0, 2.0, 3.0, 4.5, 7.0])
     levels = np.concatenate([-speeds[::-1], [0.0], speeds])
-    near = 10.0  # widths; a turn at a lower speed is nearly a reversal
+    near = 10.0  # widths; an extremum at a lower speed is nearly a reversal
     friction = pieces.robot.friction
     rubbing = np.flatnonzero(friction.coulomb > 0.0)
     velocity = pieces.velocity[:, :, rubbing] / friction.v_eps[rubbing]
     lowest = velocity.min(axis=0)
     highest = velocity.max(axis=0)
-    # A joint that stands still crosses zero only by rounding.
+    # A joint at rest crosses zero only because of rounding.
     moving = np.maximum(highest, -lowest) > speeds[0]
     index, joint = np.nonzero(moving & (lowest < near) & (highest > -near))
     slow = velocity[:, index, joint]

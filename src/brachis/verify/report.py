@@ -1,4 +1,4 @@
-"""The outcome of a verification, as data, and what passes."""
+"""The outcome of a verification as data, and the tolerances."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from brachis.common.words import write_apart
 from brachis.robot.joints import shown_unit
 
 POSITION_SCALE = "0: the middle of the range, 1: an end"
-"""Remark of the check of the positions: what its ratio means."""
+"""Remark of the position check, which explains its ratio."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The smallest value of a margin at the instants that were looked at.
+    """The smallest value of a margin at the instants that were checked.
 
     Attributes
     ----------
     name : str
-        What it is.
+        Name of the margin.
     value : float
     unit : str
         ``-`` or ``%``.
     subject : str
-        Of what: a joint, or the arm.
+        The joint, or the arm, that has this margin.
     time : float
-        s.
+        Time at which it occurs, s.
     """
 
     name: str
@@ -38,21 +38,21 @@ class Margin:
     time: float
 
     def in_words(self) -> str:
-        """Say how large it is, of what, and when."""
+        """Write the margin with its subject and time."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         return f"{self.value:.3g}{unit}, {self.subject} at {self.time:.4g} s"
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was checked.
+    """The result of one check.
 
     Attributes
     ----------
     name : str
-        For example ``torque`` or ``path error``.
+        Name of the check, for example ``torque ratio`` or ``path error``.
     value : float
-        The worst value found: a ratio to the limit, or an error in `unit`.
+        Worst value found: a ratio to the limit, or an error in `unit`.
     allowed : float
         Largest value that passes.
     unit : str
@@ -60,15 +60,15 @@ class Check:
     passed : bool
         Whether the value is at most the allowed one.
     subject : str or None
-        The joint with the worst value, or the tool.
+        Joint with the worst value, or the tool.
     time : float or None
-        When, s.
+        Time of the worst value, s.
     remark : str
-        Note on the check itself; often empty.
+        Note on the check; often empty.
     of_limit : bool
-        Whether it compares the motion with a limit, so that `value` is a ratio.
+        Whether the check compares the motion with a limit, so that `value` is a ratio.
     is_kept : bool
-        Whether plans keep it; otherwise they are only checked.
+        Whether the planner takes this limit into account; otherwise motions are only checked against it.
     """
 
     name: str
@@ -83,16 +83,16 @@ class Check:
     is_kept: bool = True
 
     def __post_init__(self) -> None:
-        """Make plain numbers of NumPy's, and compare."""
+        """Convert NumPy numbers to plain ones, and compare the value with the allowed one."""
         object.__setattr__(self, "value", float(self.value))
         if self.time is not None:
             object.__setattr__(self, "time", float(self.time))
         object.__setattr__(self, "passed", bool(self.value <= self.allowed))
 
     def figures(self, *, degrees: bool) -> tuple[str, str, str]:
-        """Write what was found, what is allowed, and the unit of both; ratios to a limit with six decimals.
+        """Write the value found, the allowed value, and their unit. Ratios to a limit have six decimals.
 
-        With `degrees` angles are in deg; what is in rad or m, whichever is larger, stays.
+        With `degrees`, angles are in deg. A value that may be in rad or in m does not change.
         """
         ratio = self.of_limit or (self.unit == "-" and self.allowed > 1.0)
         unit, factor = shown_unit(self.unit, degrees=degrees)
@@ -104,7 +104,7 @@ class Check:
         )
 
     def in_words(self) -> str:
-        """Say what was found, and what is allowed."""
+        """Write the value found and the allowed value, with subject, time and remark."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         value, _ = write_apart(self.value, self.allowed)
         _, allowed, _ = self.figures(degrees=False)
@@ -123,13 +123,13 @@ class Verification(Summary):
     ----------
     checks : tuple of Check
     points : int
-        Number of times at which the trajectory was evaluated.
+        Number of instants at which the trajectory was evaluated.
     worst_ratio : float
         Largest ratio of any quantity to its limit.
     path_error : float
-        Largest distance from the path: m for position rows, rad for yaw, whichever is larger.
+        Largest error of the path: the larger of the distance in m and the angle in rad.
     margins : tuple of Margin
-        How near the motion comes to singular postures, and to the ends of joint ranges.
+        How close the motion comes to singular postures and to the ends of joint ranges.
 
     Examples
     --------
@@ -147,7 +147,7 @@ class Verification(Summary):
 
     @property
     def passed(self) -> bool:
-        """True where every check passed."""
+        """Whether every check passed."""
         return all(check.passed for check in self.checks)
 
     def to_dict(self) -> dict[str, Any]:
@@ -155,7 +155,7 @@ class Verification(Summary):
         return {"passed": self.passed, **asdict(self)}
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown: every check with its worst value."""
+        """Return the entries shown to the user: every check with its worst value."""
         return {
             "passed": "yes" if self.passed else "NO",
             "worst ratio": self.worst_ratio,
@@ -166,7 +166,7 @@ class Verification(Summary):
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """What passes.
+    """Tolerances of the verification.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class VerifyOptions:
     path_tolerance : float
         Largest distance from the path, m or rad.
     points_per_interval : int
-        Grid points per knot interval of the splines.
+        Number of grid points per knot interval of the splines.
     progress_tolerance : float
         Largest backward path velocity (1/s), and largest error of s at the ends (dimensionless).
     posture_tolerance : float
@@ -185,11 +185,11 @@ class VerifyOptions:
     rest_acceleration_tolerance : float
         Largest joint acceleration at the ends where the task asks for full rest, rad/s^2 or m/s^2.
     rest_jerk_tolerance : float
-        Largest joint jerk at the ends where the task asks for rest in jerk, as a fraction of one plus the largest one.
+        Largest joint jerk at the ends where the task asks for rest in jerk, as a fraction of 1 plus the largest jerk.
     jump_tolerance : float
-        Largest jump where polynomial pieces join, as a fraction of one plus the quantity's largest value.
+        Largest jump where polynomial pieces join, as a fraction of 1 plus the quantity's largest value.
     spline_tolerance : float
-        Largest difference at the nodes between the redundant joints' splines and the joint motion, rad or m.
+        Largest difference between the redundant joints' splines and their motion, rad or m.
     """
 
     ratio_tolerance: float = 1e-4

@@ -1,9 +1,9 @@
-"""Verification of a trajectory on a dense grid, which shares no code with the optimiser.
+"""Verification of a trajectory on a dense grid. It shares no code with the optimiser.
 
-Positions come from the saved joint polynomials and the kinematics of the URDF, and are compared with the path at the
-saved s(t). Torques come from Newton's and Euler's equations and the friction formula written out again, velocities and
-accelerations from differentiating the polynomials. So the file is verified that a controller would execute, not the
-optimiser's idea of it.
+Tool positions come from the saved joint polynomials and the kinematics of the URDF, and are compared with the path at
+the saved s(t). Torques come from Newton's and Euler's equations and from the friction formula, both implemented
+separately. Velocities and accelerations are derivatives of the polynomials. This verifies the motion that a controller
+would execute, not the optimiser's internal model of it.
 """
 
 from __future__ import annotations
@@ -43,36 +43,36 @@ def verify_trajectory(
     robot: Robot | None = None,
     own_limits: Sequence[LimitModel] = (),
 ) -> Verification:
-    """Check path, limits, progress, stops, given speeds, start and end, splines, and continuity of a trajectory.
+    """Check the path, limits, progress, stops, given speeds, ends, splines and continuity of a trajectory.
 
     Parameters
     ----------
     trajectory : Trajectory, Result or path
         A motion, or its file.
     options : VerifyOptions, optional
-        Unless given, limits may be exceeded by as much as the task's ``refinement.tolerance`` allows.
+        Tolerances. By default, limits may be exceeded by the task's ``refinement.tolerance``.
     robot : Robot, optional
-        Check against this robot and not the saved one, for example a newer URDF; its joints must have the same names
-        in the same order.
+        Robot to check against instead of the saved one, for example from a newer URDF. Its joints must have the same
+        names in the same order.
     own_limits : sequence of LimitModel, optional
-        Limits of the user's own with which the trajectory was planned, beside those that its task names.
+        The user's own limits with which the trajectory was planned, in addition to those that its task names.
 
     Returns
     -------
     Verification
-        Pass or fail is in it; nothing is raised for a trajectory that fails.
+        It says whether the trajectory passed. A trajectory that fails raises no error.
 
     Raises
     ------
     InputError
-        `robot` has other joints than the trajectory; or the trajectory's task does not fit the robot: its postures
-        (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`); or the motion would have to be
-        looked at at more than 2,000,000 instants.
+        `robot` has different joints than the trajectory; or the postures (`InputError`, `StartError`), the task space
+        (`InputError`) or the path (`PathError`) of the task do not fit the robot; or the motion would have to be
+        checked at more than 2,000,000 instants.
 
     Warns
     -----
     BrachisWarning
-        The motion was planned with a limit of the user's own, which is not among `own_limits`.
+        The motion was planned with one of the user's own limits that is not among `own_limits`.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def verify_trajectory(
     motion = CheckedMotion(
         trajectory, robot, task_map, path_of(task_map, task), options
     )
-    # Part by part, for placements of all joints take much memory.
+    # The motion is processed in parts, because the placements of all joints take much memory.
     surveys = [
         (
             path_errors(motion, states.q, states.s, states.joints),
@@ -113,7 +113,7 @@ def verify_trajectory(
     left_out = Counter(trajectory.own_limits) - names
     if left_out:
         warnings.warn(
-            f"limits of your own that are not checked: {', '.join(left_out)}; the motion was planned with them, but "
+            f"some of your own limits are not checked: {', '.join(left_out)}; the motion was planned with them, but "
             "they are not saved with it. Pass them as brachis.verify_trajectory(motion, own_limits=[...])",
             BrachisWarning,
             stacklevel=2,
@@ -144,13 +144,13 @@ def path_errors(
     s: np.ndarray,
     joints: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the tool's distance, m, or largest angle of an axis, rad, (K,), from the path at path coordinates.
+    """Return the larger of distance, m, and axis angle, rad, (K,), between the tool and the path at path coordinates.
 
     Parameters
     ----------
     motion : CheckedMotion
     q : (K, n) ndarray
-        rad or m.
+        Postures, rad or m.
     s : (K,) ndarray
     joints : tuple
         The `joint_placements` in these postures.
@@ -165,7 +165,7 @@ def path_errors(
     if not task_map.angles:
         return distances
     if isinstance(task_map, RowsAndAngle):
-        # In the plane, for axes of rounded URDFs are tilted a little.
+        # Compare in the plane, because the axes of rounded URDFs are slightly tilted.
         axis = task_map.world_axis
         pointers = np.delete(rotations, axis, axis=1)[:, :, [task_map.tool_axis]]
         turned = turns_about(np.eye(3)[axis], targets[:, -1])
@@ -178,7 +178,7 @@ def path_errors(
 
 
 def _check_path(motion: CheckedMotion, errors: np.ndarray) -> Check:
-    """Check the largest distance, (K,), of the tool from the path at the saved s(t)."""
+    """Check the largest of the tool's distances, (K,), from the path at the saved s(t)."""
     worst = np.argmax(errors)
     tolerance = motion.options.path_tolerance
     remark = ""

@@ -1,5 +1,7 @@
 """What limits cost, on problems whose answer is known by hand and against least squares."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,12 @@ def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     assert force.derivative * FORCE == change
     assert [entry.change(1.0) for entry in idle] == [0.0] * 7
     assert result.sensitivities.reliable
+    report = result.bottleneck()
+    assert "no other limit costs time" in str(report)
+    rough = replace(report, sensitivities=replace(report.sensitivities, residual=0.87))
+    assert "what other limits cost is unknown" in str(rough)
+    assert "no other limit" not in str(rough)
+    assert "residual 87 % of the gradient: reliable up to 0.1 %" in str(rough)
 
 
 def test_trapezoid(slide):

@@ -210,4 +210,4 @@ def test_new_and_robots(run, error_of, tmp_path, monkeypatch):
 
 def test_new_tells_how_long_the_motion_lasts(run, tmp_path):
     outcome = run(f"new gantry2 --out {tmp_path / 'task.yaml'}")
-    assert re.search(r"verified: the motion lasts \d+\.\d{4} s", outcome.out)
+    assert re.search(r"verified: the motion takes \d+\.\d{4} s", outcome.out)

@@ -17,7 +17,6 @@ from brachis.apps.cli import folder
 from brachis.apps.plots.style import figure_class
 from brachis.errors import InputError
 from brachis.search import pipeline, verified
-from brachis.search.stages import describe_coordinates
 from brachis.trajectory import Trajectory
 from support.scripts import output_of
 
@@ -41,7 +40,9 @@ def test_plan_for_people(run, task, write):
     outcome = run(f"plan {write(task)}")
     for words in ("end time", "2.47", "verification: passed", "torque ratio"):
         assert words in outcome.out
-    assert outcome.out.endswith("nothing was saved; --out FOLDER saves the motion\n")
+    assert outcome.out.endswith(
+        "nothing was saved; use --out FOLDER to save the motion\n"
+    )
     # No progress display in a pipe.
     assert outcome.err.startswith(
         "brachis: warning: spline.intervals: the same joint path"
@@ -100,8 +101,8 @@ def test_without_matplotlib_the_result_is_written_and_the_figures_are_not(
 ):
     figure_class.cache_clear()
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    told = run(f"plan {write(task)} --out {tmp_path / 'out'}").err
-    assert "its figures are not: a figure needs Matplotlib" in told
+    message = run(f"plan {write(task)} --out {tmp_path / 'out'}").err
+    assert "but its figures were not: a figure needs Matplotlib" in message
     assert names_in(tmp_path / "out") == RESULT
 
 
@@ -119,7 +120,7 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(
 
     monkeypatch.setattr(plots, "save_figure", save_some)
     outcome = run(f"plan {write(task)} --out {out} --json", code=3)
-    assert "the result is written, its figures are not: " in outcome.err
+    assert "the result was written, but its figures were not: " in outcome.err
     assert f"{out / 'overview.png'}: the file cannot be written; found" in outcome.err
     data = outcome.data
     assert data["verified"] is True
@@ -157,7 +158,7 @@ def test_a_plan_without_a_motion_says_which_files_are_of_an_earlier_one(
     outcome = run("plan", path, *far, "--out", out, code=2)
     remark, error = outcome.err.splitlines()
     assert remark == (
-        f"brachis: files of an earlier run stay in {out}: result.npz, result.json, overview.png, candidates.png"
+        f"brachis: files of an earlier run remain in {out}: result.npz, result.json, overview.png, candidates.png"
     )
     assert "out of reach" in error
     assert "earlier" not in outcome.out
@@ -224,15 +225,21 @@ def test_a_plan_lists_its_candidates(run, task, write, search, choices, name):
     assert f"{data['t_end']:.4f}" in text
 
 
-def test_coordinates_are_described_without_the_name_of_a_chart_alone(planned):
+def test_a_chart_is_one_row_of_the_summary(planned):
     trajectory = Trajectory.load(planned.out / "result.npz")
-    assert describe_coordinates(trajectory) == "j3"
-    in_chart = replace(trajectory, redundant_joints=(), branch="chart")
-    assert describe_coordinates(in_chart) == (
-        "no joint is chosen; a chart measures the self-motion of all joints by 1 coordinate"
-    )
-    only_s = replace(in_chart, control_points=trajectory.control_points[:1])
-    assert describe_coordinates(only_s) == "none"
+    assert trajectory.redundancy == "j3"
+    assert "branch" in trajectory.summary()
+    chart = {
+        "redundant_joints": (),
+        "branch": "chart",
+        "chart_rows": np.ones((1, 1, 4)),
+    }
+    in_chart = replace(trajectory, **chart)
+    words = "none chosen; the self-motion of all joints has 1 coordinate (a chart)"
+    assert in_chart.summary()["redundant joints"] == words
+    assert "branch" not in in_chart.summary()
+    only_s = replace(in_chart, chart_rows=np.ones((1, 0, 4)))
+    assert only_s.redundancy == "none"
 
 
 def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
@@ -266,7 +273,7 @@ def test_a_plan_says_what_its_time_limit_left_undone_in_its_json(
     assert data["interrupted"]
     reason = "the search that search.effort requires was not completed"
     assert data["undone"][-1] == reason
-    assert "brachis: the search was ended early" in outcome.err
+    assert "brachis: the search ended early" in outcome.err
     for step in data["undone"]:
         assert f"brachis: not completed: {step}\n" in outcome.err
 
@@ -317,12 +324,12 @@ def test_inspect_says_where_every_limit_holds(run, task, write):
     task["robot"]["limits"] = {"rms_torque": 9}
     task["tool_limits"] = {"speed": 2}
     path = write(task)
-    everywhere = "It holds at all instants of a verified motion."
+    everywhere = "met at all instants of a verified motion, to 1e-4"
     data = run(f"inspect {path} --json").data
     assert data["guarantees"]["torque"] == everywhere
     text = " ".join(run(f"inspect {path}").out.split())
-    assert f"tool speed limit: {everywhere}" in text
-    assert "rms torque limit: It holds as a mean over the whole motion." in text
+    assert f"tool speed: {everywhere}" in text
+    assert "limits on rms torque: met as a mean over the whole motion" in text
 
 
 def test_inspect_of_a_task_shows_what_is_in_use(run, error_of, task, write):
@@ -356,6 +363,7 @@ def test_inspect_of_a_task_shows_gravity_postures_and_path(run):
     assert "start posture: rail 0.0000 m, shoulder_pan_joint 0.4000 rad, " in shown
     assert "end posture: free\n" in shown
     assert "path: 2 segments (line), 0.7651 m long\n" in shown
+    assert "path[1] at s = 1 (765.1 mm)\n" in shown
     assert "shoulder_pan_joint 22.9183 deg" in run(f"inspect {WELD} --degrees").out
     data = run(f"inspect {WELD} --json").data
     assert data["start_posture"][:2] == [0.0, 0.4]

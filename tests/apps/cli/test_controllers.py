@@ -7,7 +7,9 @@ import yaml
 from .conftest import quick_task
 
 
-def test_from_a_plan_for_a_controller_to_the_run_that_came_back(run, error_of, tmp_path):
+def test_from_a_plan_for_a_controller_to_the_run_that_came_back(
+    run, error_of, tmp_path
+):
     task = quick_task() | {"spline": {"intervals": 8}}
     (tmp_path / "task.yaml").write_text(yaml.safe_dump(task))
     out = tmp_path / "out"
@@ -27,7 +29,9 @@ def test_from_a_plan_for_a_controller_to_the_run_that_came_back(run, error_of, t
     compare = f"compare {tmp_path / 'run.csv'} --plan {out} --profile kuka_rsi_4ms"
     assert "j1 (A1)" in run(compare).out
     assert run(f"{compare} --json").data["tool"] < 1e-6
-    assert "the robot or the plan is missing" in error_of(f"compare {tmp_path / 'run.csv'}")
+    assert "the robot or the plan is missing" in error_of(
+        f"compare {tmp_path / 'run.csv'}"
+    )
 
 
 def test_a_run_that_breaks_limits_is_written_and_ends_with_1(run, tmp_path):

@@ -106,7 +106,7 @@ def test_no_closed_form(run, task, write, tmp_path):
 def test_a_file_cannot_be_the_output_folder(name, run, task, write, tmp_path):
     (tmp_path / "file").write_text("mine")
     outcome = run(f"plan {write(task)} --out {tmp_path / name}", code=2)
-    assert "a folder, and this is the name of a file" in outcome.err
+    assert "a folder, but this is the name of a file" in outcome.err
     if name == "motion.npz":
         assert f"Write --out {tmp_path / 'motion'}" in outcome.err
     assert (tmp_path / "file").read_text() == "mine"

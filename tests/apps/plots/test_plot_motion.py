@@ -67,6 +67,7 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
     (limit,) = drawn_limits(ax)
     assert abs(limit.get_ydata()[0]) == velocity[fastest]
     assert ax.get_ylim()[0] < limit.get_ydata()[0] < ax.get_ylim()[1]
+    assert limit.get_label() == "limit"
 
 
 @pytest.mark.parametrize(
@@ -93,6 +94,21 @@ def test_the_overview_has_every_curve(line_trajectory):
     names = list(line_trajectory.joint_names)
     for label in ("$q$ (rad)", r"$\dot{q}$ (rad/s)", r"$\tau / \tau_\mathrm{max}$"):
         assert list(lines_by_label(by_label[label])) == names
+
+
+def test_labels_of_three_panels_are_wrapped_outside_formulas(
+    line_trajectory, with_limits
+):
+    motion = line_trajectory
+    kinds = {
+        "velocity": np.abs(motion.qdot).max(axis=0),
+        "acceleration": np.abs(motion.qddot).max(axis=0),
+    }
+    titles = {
+        ax.get_ylabel() for ax in plot_overview(with_limits(motion, **kinds)).axes
+    }
+    wrapped = {"velocity / limit", "acceleration /\nlimit"}
+    assert wrapped | {r"$\tau / \tau_\mathrm{max}$"} < titles
 
 
 def test_the_overview_shows_what_holds_the_motion(line_trajectory, with_limits):

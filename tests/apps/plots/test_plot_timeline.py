@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection, QuadMesh
@@ -37,6 +39,15 @@ def test_a_row_for_every_limit_that_comes_near(line_trajectory):
     assert {"j1 torque", "j2 torque"} <= expected
     assert set(rows(ax)) == expected
     assert len(meshes(ax)) == len(expected)
+    assert f"= {line_trajectory.t_end:.3f}" in ax.get_xlabel()
+
+
+def test_ratios_that_stay_the_same_have_no_row_unless_they_are_active(line_trajectory):
+    ratios = limit_ratios(line_trajectory)
+    values = np.full_like(ratios.values, 0.7)
+    values[:, 0] = 1.0
+    entries = saturations(replace(ratios, values=values))
+    assert [entry.label for entry in entries if entry.is_drawn] == [ratios.labels[0]]
 
 
 def test_colours_are_the_ratios(line_trajectory):

@@ -53,7 +53,7 @@ def test_columns_in_any_order_and_others_beside_them(table, write):
     found = read_recording(path, ROBOT, {})
     assert_array_equal(found.q, q)
     assert_array_equal(found.qdot, qdot)
-    assert "left out the columns j1_effort" in found.notes
+    assert "ignored columns: j1_effort" in found.notes
 
 
 def test_semicolons_and_decimal_commas(table, write):
@@ -98,7 +98,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
             r"line 1: the position of 'j3' is missing; found t, j1, j2, j4; allowed: t, then j1, j2, j3",
         ),
         ("x,j1,j2,j3", {}, "the time is missing"),
-        ("t,j1,j1,j3", {}, "the position of 'j1' is given twice"),
+        ("t,j1,j1,j3", {}, "the position of 'j1' occurs twice"),
         (
             "t,j1 [grad],j2,j3",
             {},

@@ -93,7 +93,7 @@ def test_bottlenecks_are_when_limits_are_active(imported):
     assert found.to_dict()["sensitivities"] is None
     text = str(found)
     assert text.startswith(
-        "what limits cost is unknown: the motion was not planned, or that is not stored with it\n"
+        "what limits cost is unknown: the motion was not planned, or was saved without its sensitivities\n"
     )
     assert "is at its torque limit for" in text
     with pytest.raises(InputError, match="the cost of its limits cannot be computed"):
@@ -182,7 +182,7 @@ def test_positions_with_noise_get_a_smoothing_spline(motion, write):
     )
     assert found.path_error < 1e-4
     assert found.worst_ratio == pytest.approx(1.0, abs=0.05)
-    with pytest.raises(PathError, match="set their noise, or raise the tolerance"):
+    with pytest.raises(PathError, match="set their noise or raise the tolerance"):
         import_motion(path, task=motion.task)
 
 

@@ -48,5 +48,5 @@ def test_it_is_saved_with_its_phases(robot, tmp_path):
 
 def test_a_corner_without_a_wait_is_an_error(robot, tmp_path):
     motion = gantry_motion((SPLINES[0], *SPLINES[2:]))
-    with pytest.raises(PathError, match="stops for less than five rows"):
+    with pytest.raises(PathError, match="stops for fewer than five rows"):
         record_and_import(motion, robot, tmp_path, 0.01)

@@ -38,7 +38,9 @@ def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page
     assert 'class="verified"' in header
     assert "<h1>VERIFIED</h1>" in header
     assert f"{planar.t_end:.4f} s" in header
-    assert re.search(r"At its limits longest: j\d torque \(\d+ % of the time\)", header)
+    assert re.search(
+        r"Limits that are active longest: j\d torque \(\d+ % of the time\)", header
+    )
     assert planar_page.verified
 
 
@@ -58,7 +60,7 @@ def test_it_is_said_where_every_limit_holds(planar, planar_page):
     for limit in planar.candidate.refined.program.limits:
         row = f"<tr><th>{limit.name}</th><td>{limit.guarantee.value}</td></tr>"
         assert (row in planar_page.html) == (limit.role is not Role.SAFEGUARD)
-    assert "It holds at all instants" in planar_page.html
+    assert "met at all instants" in planar_page.html
 
 
 def test_style_and_program_have_nothing_that_the_template_would_fill_in():
@@ -154,7 +156,7 @@ def test_an_unverified_motion_says_which_check_fails(weaker_page):
     assert {kind for kind, _ in rows[1:]} == {"passed"}
     assert 'class="beyond"' in weaker_page.html
     assert not weaker_page.verified
-    assert "What the limits cost is not known" in weaker_page.html
+    assert "What the limits cost is unknown" in weaker_page.html
 
 
 def test_text_is_no_markup(weaker_page):

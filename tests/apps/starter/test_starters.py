@@ -104,7 +104,7 @@ def test_names_that_yaml_would_misread(urdf, tmp_path):
 def test_the_task_marks_missing_limits(urdf, tmp_path):
     urdf.write_text(two_joints(effort=0.0))
     starter = starter_task(urdf, folder=tmp_path)
-    assert "PUT THE MAKER'S FIGURES HERE" in starter.text
+    assert "ENTER THE MANUFACTURER'S DATA HERE" in starter.text
     assert yaml.safe_load(starter.text)["robot"]["limits"] == {
         "torque": {"j1": None},
         "acceleration": {"j1": 1.0},
@@ -149,7 +149,7 @@ def test_a_warning_names_masses_in_g_without_a_motion(urdf):
     ("name", "frame"), [("iiwa14", "link_1"), ("iiwa14", "link_2"), ("scara3", "link1")]
 )
 def test_a_frame_that_only_turns_on_the_spot_is_an_error(name, frame):
-    with pytest.raises(InputError, match=r"only turns on the spot.*Name another"):
+    with pytest.raises(InputError, match=r"only rotates on the spot.*Choose another"):
         starter_task(brachis.robots.path_of(name), tool_frame=frame)
 
 

@@ -61,7 +61,7 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
     failures = [plan for plan in range(10) if facts[plan]["status"] == "failed"]
     assert failures == [4, 7]
     assert facts[4]["error"] == "BrokenExecutor"
-    assert "each worker process ended during this plan" in facts[4]["message"]
+    assert "every worker process ended during this plan" in facts[4]["message"]
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
 def test_what_no_worker_can_run_ends_the_sweep(failure):
     future = Future()
     future.set_exception(failure)
-    expected = f"workers failed to make plans; found {type(failure).__name__}: {failure}.*sweep continues"
+    expected = f"workers failed to make plans; found {type(failure).__name__}: {failure}.*same sweep again"
     with pytest.raises(ClusterError, match=expected):
         next(as_completed([0], lambda _plan: future, 1))
 

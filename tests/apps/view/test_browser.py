@@ -97,7 +97,7 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
         picture(page, "viewer", folder)
         text, apart = page.inner_text("body"), page.evaluate(LINES)
         cut = page.evaluate(CUT)
-        page.get_by_role("checkbox", name="again and again").uncheck()
+        page.get_by_role("checkbox", name="repeat").uncheck()
         with page.expect_download(timeout=PATIENCE) as download:
             page.get_by_role("button", name="Download the report").click()
         report = Path(download.value.path()).read_text(encoding="utf-8")

@@ -72,7 +72,7 @@ def test_a_missing_mesh_is_named_and_the_other_links_are_read(tmp_path):
     shapes, unread = link_shapes(text, tmp_path)
     assert list(shapes) == ["b"]
     assert unread == [
-        "missing mesh files: package://none/a.dae; ROS_PACKAGE_PATH may name the folder of a package"
+        "missing mesh files: package://none/a.dae; ROS_PACKAGE_PATH can name the folder of a package"
     ]
 
 

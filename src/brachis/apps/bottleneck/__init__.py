@@ -1,4 +1,4 @@
-"""What holds a motion back: what every limit costs, which limit is active when, and the distance to a reference.
+"""What slows a motion down: the cost of every limit, when each limit is active, and the distance to a reference.
 
 Examples
 --------

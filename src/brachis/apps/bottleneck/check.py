@@ -1,11 +1,12 @@
-"""Predictions of the multipliers, compared with solving again with one limit after the other raised.
+"""Check of the multipliers' predictions: each limit is raised in turn, and the program is solved again.
 
-Knots, collocation points and branch margins stay. Every solve begins at the answer and has a tighter tolerance. An
-answer is an optimum if least squares find multipliers for it, whatever status the solver reports. If a change is not as
-predicted, the unchanged problem is solved again from the new answer: the step may have led to another local optimum,
-which is not an effect of the limit.
+Knots, collocation points and branch margins do not change. Every solve begins at the solution and uses a tighter
+tolerance. A solution counts as an optimum if least squares find multipliers for it, whatever status the solver reports.
+If a change is not as predicted, the unchanged problem is solved again from the new solution: the step may have led to
+another local optimum, which is not an effect of the limit.
 
-Multipliers are derivatives: within a finite step other limits may take over, and take back part of what they promise.
+Multipliers are derivatives. Within a finite step other limits may become active, and the saving is then smaller than
+predicted.
 """
 
 from __future__ import annotations
@@ -32,27 +33,27 @@ from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 
 STEP = 0.01
-"""Fraction by which limits are raised, unless asked otherwise."""
+"""Default fraction by which limits are raised."""
 _FEASIBLE = 1e-7
-"""Largest violation of a row at an answer, dimensionless."""
+"""Largest violation of a row at a solution, dimensionless."""
 
 
 @dataclass(frozen=True)
 class CheckedSensitivity:
-    """A prediction, and the change that solving again gives.
+    """A predicted change of t_E, and the change found by solving again.
 
     Attributes
     ----------
     sensitivity : Sensitivity
     predicted : float
-        Change of t_E that the multipliers promise, s.
+        Change of t_E that the multipliers predict, s.
     re_solved : float
         Change found by solving again, s.
     other_optimum : float
-        How much longer the unchanged problem takes at another local optimum, s, if the solve ended there; `re_solved`
-        is then the change from there. 0 otherwise.
+        If the solve ended at another local optimum, the difference between the end time there without the change and
+        `t_end`, s; `re_solved` is then the change from that optimum. 0 otherwise.
     optimal : bool
-        False if the solve ended without an optimum, so that `re_solved` is rough.
+        False if the solve ended without an optimum, so that `re_solved` is only approximate.
     """
 
     sensitivity: Sensitivity
@@ -63,7 +64,7 @@ class CheckedSensitivity:
 
     @property
     def deviation(self) -> float:
-        """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 if neither changes."""
+        """Error of the prediction, as a fraction of the re-solved change; 0 if both changes are 0."""
         if self.predicted == self.re_solved:
             return 0.0
         off = abs(self.predicted - self.re_solved)
@@ -87,18 +88,18 @@ class CheckedSensitivity:
 
 @dataclass(frozen=True, repr=False)
 class SensitivityCheck(Summary):
-    """All predictions, and the changes that solving again gives.
+    """All predictions, and the changes found by solving again.
 
     Attributes
     ----------
     step : float
-        Fraction by which every limit left more room.
+        Fraction by which every limit was raised.
     t_end : float
-        Of the unchanged problem at the tighter tolerance, s.
+        End time of the unchanged problem at the tighter tolerance, s.
     entries : tuple of CheckedSensitivity
         In the order of the sensitivities.
     wall_time : float
-        s.
+        Wall time of the check, s.
     """
 
     step: float
@@ -107,12 +108,12 @@ class SensitivityCheck(Summary):
     wall_time: float
 
     def worst_deviation(self, above: float = 1e-4) -> float:
-        """Largest deviation among `larger` changes that were solved to an optimum; 0 without any."""
+        """Largest deviation among the `larger` changes that were solved to an optimum; 0 if there is none."""
         optimal = [entry for entry in self.larger(above) if entry.optimal]
         return max((entry.deviation for entry in optimal), default=0.0)
 
     def larger(self, above: float = 1e-4) -> tuple[CheckedSensitivity, ...]:
-        """Entries whose change, as predicted or as solved again, is larger than `above`, s."""
+        """Entries whose change, predicted or re-solved, is larger than `above`, s."""
         return tuple(
             entry
             for entry in self.entries
@@ -136,16 +137,16 @@ def check_sensitivities(
     *,
     step: float = STEP,
 ) -> SensitivityCheck:
-    """Solve the refined program again with every limit raised, and compare with what the multipliers predict.
+    """Solve the refined program again with every limit raised, and compare with the multipliers' predictions.
 
     Parameters
     ----------
     refined : SolvedProgram
         ``result.candidate.optimum``.
     predictions : Sensitivities
-        What is checked: ``result.sensitivities``.
+        Predictions to check: ``result.sensitivities``.
     step : float, optional
-        Fraction by which each limit leaves more room; less if it is negative.
+        Fraction by which each limit is relaxed; a negative one tightens it.
 
     Returns
     -------
@@ -168,8 +169,8 @@ def check_sensitivities(
         for entry in predictions.limits:
             bounds = figures.get((entry.label, entry.side))
             if bounds is None or entry.label.cause == PROCESS_SPEED:
-                continue  # s(t) follows from the speed: no row of the program stands for it
-            # If a limit changes nothing, the answer stays an optimum.
+                continue  # the speed determines s(t), so no row of the program represents it
+            # If a limit changes nothing, the solution remains an optimum.
             if abs(entry.change(step)) <= 1e-9 * t_end(base):
                 same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, optimal=True)
                 checked.append(same)
@@ -186,14 +187,14 @@ def _check_limit(
     base: np.ndarray,
     bounds: list[LimitBound],
 ) -> CheckedSensitivity:
-    """Solve with one limit raised, and back if the change may be one to another local optimum."""
+    """Solve with one limit raised; if the result may belong to another local optimum, solve without it from there."""
     predicted = entry.change(step)
     raised = program
     for limit, bound in bounds:
         raised = raised.relax(limit, bound, step * entry.full_scale)
     answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
-    same = 1e-6 * t_end(base)  # end times of one optimum differ by less
+    same = 1e-6 * t_end(base)  # end times of the same optimum differ by less
     before = base
     off = abs(predicted - (t_end(answer) - t_end(base)))
     if off > max(0.02 * abs(predicted), same):
@@ -211,18 +212,18 @@ def _check_limit(
 
 
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Solve to a tight tolerance from x with one backend after the other.
+    """Solve to a tight tolerance from x, trying one backend after the other.
 
     Returns
     -------
     x : (v,) ndarray
     optimal : bool
-        Whether it is an optimum.
+        Whether x is an optimum.
 
     Raises
     ------
     PlanningError
-        No backend found a feasible point, and x is not feasible either.
+        No backend found a feasible point, and the given x is not feasible either.
     """
     answers = []
     for solver in solvers_for("auto"):
@@ -243,7 +244,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _stationarity(program: Program, x: np.ndarray) -> float:
-    """Residual of the multipliers at x, (v,); infinite if a collocation point is out of the branch's reach."""
+    """Residual of the multipliers at x, (v,). It is infinite if the branch does not reach a collocation point."""
     try:
         return multipliers_of(program, x).residual
     except UnreachableError:

@@ -1,6 +1,6 @@
-"""A saved motion, planned again from itself: for files that do not say what limits cost, and for checks.
+"""Planning a saved motion again from itself, for files without sensitivities and for checks.
 
-The start is an optimum already, so that this takes one search without others beside it, and ends at the same optimum.
+The initial guess is already an optimum, so a single search from it is enough, and it ends at the same optimum.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from brachis.search.stages import FinishedCandidate
 from brachis.trajectory import Trajectory
 
 _SAME = 1e-3
-"""Part of the time by which end times of the same optimum differ, no more."""
+"""Largest relative difference between end times of the same optimum."""
 
 
 def plan_again(
@@ -30,16 +30,16 @@ def plan_again(
     families: Sequence[Family] = (),
     own_limits: Sequence[LimitModel] = (),
 ) -> FinishedCandidate:
-    """Plan a saved motion again, with its redundant joints and branch, from where it ended.
+    """Plan a saved motion again, with its redundant joints and branch, starting from the motion itself.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As `brachis.plan` made it, or loaded, without idle joints (`narrow_motion`).
+        A planned or loaded motion, without idle joints (`narrow_motion`).
     listener : callable, optional
-        Is told of every iteration.
+        Called with a text about every iteration.
     families, own_limits : sequence, optional
-        Those with which the motion was planned, as of `brachis.plan`: they are not saved with it.
+        The ones with which the motion was planned, as passed to `brachis.plan`. They are not saved with it.
 
     Returns
     -------
@@ -48,10 +48,10 @@ def plan_again(
     Raises
     ------
     InputError
-        The closed form or the branch is not known here; see `brachis.plan`.
+        The closed form or the branch is unknown; see `brachis.plan`.
     PlanningError
-        The motion is not an optimum of its problem: the plan ended at another one; or the task's time limit was too
-        short for that.
+        The motion is not an optimum of its problem, so that the plan ended at another one; or the task's time limit was
+        too short.
     """
     task = trajectory.task
     changes: dict[str, object] = {}
@@ -66,21 +66,25 @@ def plan_again(
         planned = search_from(trajectory, problem, families, deadline, listener)
     except (DecompositionError, UnknownNameError) as error:
         raise DecompositionError(
-            "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
-            "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
+            "the motion was planned with a closed form that is unknown here; pass it as "
+            "brachis.bottleneck.report(motion, families=[...]), or install the package that provides it",
             redundant_joints=task.redundant_joints,
             found=f"{error}",
         ) from error
     slower = trajectory.t_end / planned.t_end - 1.0
     if -_SAME <= slower <= task.search.slower + _SAME:
         return planned
+    hint = "Plan the task again, with a larger search.time_limit"
+    if trajectory.own_limits and not own_limits:
+        hint = (
+            "Pass your own limits, which are not saved with the motion: "
+            "brachis.bottleneck.report(motion, own_limits=[...])"
+        )
     raise PlanningError(
-        f"planning the saved motion (t_E = {trajectory.t_end:.6g} s) again found a different optimum: what its limits "
-        "cost is unknown",
+        f"a {'faster' if slower > 0.0 else 'slower'} motion was found by planning this one "
+        f"(t_E = {trajectory.t_end:.6g} s) again, so what its limits cost is unknown",
         found=f"t_E = {planned.t_end:.6g} s",
-        hint="If the motion was planned with own_limits, pass them here too: they are not saved with it, as in "
-        "brachis.bottleneck.report(motion, own_limits=[...]). Otherwise run brachis bottleneck on the task file: it "
-        "plans again",
+        hint=hint,
     )
 
 
@@ -91,7 +95,7 @@ def search_from(
     deadline: Deadline,
     listener: Listener,
 ) -> FinishedCandidate:
-    """Search for the fastest motion of a problem from one of a similar problem; raise PlanningError without any."""
+    """Search for the fastest motion of a problem, from a motion of a similar one; PlanningError if none is found."""
     search = Search(problem, Decompositions(problem, families), deadline, listener)
     with use_one_thread(), search.end_early():
         search.run(motion)

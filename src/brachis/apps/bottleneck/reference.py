@@ -1,8 +1,8 @@
-"""A comparison that shows what a motion loses: with the best value known.
+"""Comparison of a motion with the best value known, which shows how much time the motion loses.
 
-The reference is the same problem with discontinuous torque, planned from the motion: rest means zero velocity only, so
-that torques may leave their static values at once, and knots are where they switch. Limits on higher derivatives are
-left out. The result is a local optimum, not a proven bound.
+The reference solves the same problem with discontinuous torque, starting from the motion. Rest means zero velocity
+only, so that torques may leave their static values at once, and knots lie where torques switch. Limits on higher
+derivatives are left out. The result is a local optimum, not a proven bound.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from brachis.search.stages import FinishedCandidate
 
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _JUMPING = 2
-"""Highest derivative that is bounded if accelerations jump: limits on a higher one are left out."""
+"""Highest derivative that is bounded if accelerations jump. Limits on higher derivatives are left out."""
 _TIME_LIMIT = 8.0
-"""s of wall time for the reference."""
+"""Largest wall time for the reference, s."""
 _TOLERANCE = 1e-4
-"""Part of the time that the knots of the reference may lose."""
+"""Fraction of the motion time that the knots of the reference may cost."""
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,15 @@ class Reference:
     Attributes
     ----------
     t_end : float
-        s.
+        End time of the reference, s.
     distance : float
-        How much longer the motion takes, as a fraction of `t_end`.
+        How much longer the examined motion takes, as a fraction of `t_end`.
     intervals : int
-        Of the splines of this motion.
+        Number of intervals of the reference's splines.
     wall_time : float
-        s.
+        Wall time of the plan, s.
     candidate : FinishedCandidate
-        The motion.
+        The reference motion.
     """
 
     t_end: float
@@ -69,16 +69,16 @@ def find_reference(
     families: Sequence[Family] = (),
     listener: Listener = ignore,
 ) -> Reference | None:
-    """Plan again with rest: velocity and as many intervals as it takes, from the motion.
+    """Plan again from the motion, with ``rest: velocity`` and as many intervals as needed.
 
     Parameters
     ----------
     candidate : FinishedCandidate
         ``result.candidate``.
     families : sequence, optional
-        Those with which the motion was planned.
+        Families with which the motion was planned.
     listener : callable, optional
-        Is told of every iteration.
+        Called with a text about every iteration.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def find_reference(
     known = candidate.problem.limits
     limits = [limit for limit in known if limit.order <= _JUMPING]
     if len(limits) < len(known):
-        # The verification knows them yet: any motion will do.
+        # The verification still checks these limits, so the motion need not pass it.
         refinement = task.refinement.model_copy(update={"max_rounds": 0})
         changes["refinement"] = refinement
     problem = replace(

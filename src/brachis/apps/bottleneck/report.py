@@ -1,4 +1,4 @@
-"""The bottleneck report: what limits cost, when they are active, and the reference."""
+"""The bottleneck report: the cost of the limits, when they are active, and the reference."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ from brachis.robot.joints import shown_unit
 from brachis.search.given_motion import narrow_motion
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory, motion_of, phase_rows
+from brachis.trajectory.sensitivities import STATIONARY
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -42,26 +43,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class BottleneckReport:
-    """What holds a motion back.
+    """Report on what slows a motion down.
 
     Attributes
     ----------
     t_end : float
-        Of the motion, s.
+        End time of the motion, s.
     sensitivities : Sensitivities or None
-        What every limit costs; None if that is unknown.
+        Cost of every limit; None if unknown.
     saturations : tuple of Saturation
-        When every limit is active, those active longest first.
+        When every limit is active. Limits that are active longest come first.
     phases : tuple of PhaseLimits
-        Which limits are active in each phase.
+        Limits that are active in each phase.
     timing : TimingGap or None
-        The fastest timing of its joint path; None if that is not known.
+        Comparison with the fastest timing of the motion's joint path; None if unknown.
     check : SensitivityCheck or None
-        The predictions compared with solving again, if requested.
+        Comparison of the predictions with solving again, if requested.
     reference : Reference or None
-        The best value known, if requested and found.
+        Motion with the best value known, if requested and found.
     reference_sought : bool
-        Whether it was requested.
+        Whether the reference was requested.
 
     Examples
     --------
@@ -81,13 +82,13 @@ class BottleneckReport:
     reference_sought: bool = False
 
     def __str__(self) -> str:
-        """Say all in plain words."""
+        """Return the report as text."""
         return self.text()
 
     def text(self, *, degrees: bool = False) -> str:
-        """Say all in plain words, angles in degrees if requested."""
+        """Return the report as text, with angles in degrees if requested."""
         lines = [
-            "what limits cost is unknown: the motion was not planned, or that is not stored with it"
+            "what limits cost is unknown: the motion was not planned, or was saved without its sensitivities"
         ]
         if self.sensitivities is not None:
             lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
@@ -116,12 +117,12 @@ class BottleneckReport:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        """Say what there is room for on a screen."""
+        """Return as many lines of the text as a screen has room for."""
         lines = str(self).split("\n")
         return "\n".join([*lines[:LINES], "..."] if len(lines) > LINES else lines)
 
     def _repr_html_(self) -> str:
-        """Say all in plain words in a notebook."""
+        """Show the report as text in a notebook."""
         return f"<pre>{escape(str(self))}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
@@ -148,23 +149,23 @@ def report(
     own_limits: Sequence[LimitModel] = (),
     listener: Listener = ignore,
 ) -> BottleneckReport:
-    """Find out what holds a planned motion back.
+    """Find out what slows a planned motion down.
 
     Parameters
     ----------
     motion : Result, Trajectory or path
-        Of `brachis.plan`; or a trajectory, or its file. Without saved sensitivities, or with `check` or `reference`,
-        it is planned again from itself (`plan_again`).
+        A result of `brachis.plan`, a trajectory, or the file of one. A trajectory without saved sensitivities, or with
+        `check` or `reference`, is planned again from itself (`plan_again`).
     check : bool, optional
-        Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
+        Whether to solve again with every limit raised by 1 %, and compare with the multipliers' predictions.
     reference : bool, optional
-        Plan again with discontinuous torque allowed: the best value known, not a proven bound.
+        Whether to plan again with discontinuous torque allowed. This gives the best value known, not a proven bound.
     solve : bool, optional
-        Whether a motion that does not say what limits cost is planned again.
+        Whether a motion without saved sensitivities is planned again.
     families, own_limits : sequence, optional
-        Those with which the motion was planned, as of `brachis.plan`; they are not saved with it.
+        The ones with which the motion was planned, as passed to `brachis.plan`. They are not saved with it.
     listener : callable, optional
-        Is told what is being done, in one line of text.
+        Called with one line of text about each step.
 
     Returns
     -------
@@ -173,15 +174,15 @@ def report(
     Raises
     ------
     InputError
-        A trajectory's closed form is not known here; or families or limits are not valid.
+        The closed form of a trajectory is unknown; or families or limits are not valid.
     PlanningError
-        A trajectory is not an optimum of its problem; or, with `check`, no solver could solve the problem again.
+        A trajectory is not an optimum of its problem; or, with `check`, no solver solved the problem again.
 
     Examples
     --------
     >>> import brachis
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
-    >>> report = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
+    >>> report = brachis.bottleneck.report(result.trajectory)  # the same for a loaded one
     >>> [sensitivity.label.subject for sensitivity in report.sensitivities.limits][0]
     'j1'
     """
@@ -202,7 +203,7 @@ def report(
     costs = motion.sensitivities
     checked = None
     best = None
-    listener("looking for what is active, and when")
+    listener("finding the limits that are active, and when")
     candidate = None
     limits: Sequence[Limit] = limits_of(trajectory.robot, trajectory.task, own_limits)
     if not isinstance(motion, Trajectory):
@@ -238,35 +239,35 @@ def report(
 
 
 _LOOKS = 40
-"""A plan of a motion from itself takes so many times as long as to find what is active: the median of 30 motions, where
-it was 14 to 100."""
+"""Time to plan a motion from itself, as a multiple of the time to find its active limits: the median of 30 motions, for
+which it was 14 to 100."""
 _FRACTION = 0.1
-"""By which limits are raised in the sentences on what they cost."""
+"""Fraction by which limits are raised in the sentences on their cost."""
 _FRACTION_OF_RANGE = 0.01
-"""The same of an end of a range: of 10 % of a range a weld gained a seventh of what was said."""
+"""The same for the end of a range. With 10 % of a range, a weld gained only a seventh of the predicted saving."""
 _VERBS = {
     "exact": "saves",
     "estimate": "saves about",
     "least": "saves at least about",
     "bound": "saves, along the same joint path, no more than",
 }
-"""How much a change of the task saves, by its accuracy."""
+"""Words for how much a change of the task saves, by the accuracy of the saving."""
 _NOTHING = 1e-5
-"""Fraction of t_E; what saves less has no sentence."""
+"""Fraction of t_E; smaller savings are not mentioned."""
 
 
 def _figures(value: float) -> str:
-    """Write a positive number with two significant figures, or all before the point."""
+    """Write a positive number with two significant figures, or with all digits before the point."""
     return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
 
 
 def _part(saved: float, t_end: float) -> str:
-    """Write a time, s, as a part of t_E and in ms."""
+    """Write a time, s, as a percentage of t_E and in ms."""
     return f"{_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
 
 
 def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
-    """Say what every limit costs, the costliest first."""
+    """Say what every limit costs, beginning with the costliest."""
     lines = []
     if not sensitivities.reliable:
         lines.append(
@@ -284,16 +285,19 @@ def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list
     savings.sort(key=lambda saving: -saving[0])
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
     lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
-    if len(costly) < len(savings):
+    if not sensitivities.reliable:
+        lines.append("what other limits cost is unknown")
+    elif len(costly) < len(savings):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     if sensitivities.source == TIMINGS:
         how = "timings of the same joint path with limits raised"
     else:
-        how = f"multipliers by the {sensitivities.source}, residual {sensitivities.residual:.0e}"
+        residual = f"{100.0 * sensitivities.residual:.2g} % of the gradient"
+        how = f"multipliers ({sensitivities.source}), residual {residual}: reliable up to {100.0 * STATIONARY:g} %"
     lines.append(f"(to first order, from {how})")
     if not sensitivities.unique:
         lines.append(
-            "(each saving is for one limit that is raised alone; lowered as much, it may cost more time than that)"
+            "(each saving is for raising one limit alone; lowering it by as much may cost more time than that)"
         )
     for boundary in sensitivities.boundaries:
         saved = boundary.derivative * boundary.margin
@@ -307,19 +311,19 @@ def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list
 
 
 def _predict_saving(entry: Sensitivity) -> float:
-    """Predict what more room at one limit saves, s; where a speed is given, time goes as its inverse."""
+    """Predict the time that more room at one limit saves, s. For a given speed, the time is inverse to the speed."""
     saved = -entry.change(_fraction_of(entry))
     is_speed = bool(entry.label.cause) and entry.label.unit == "m/s"
     return saved / (1.0 + _FRACTION) if is_speed else saved
 
 
 def _fraction_of(entry: Sensitivity) -> float:
-    """By which part of its full scale a figure is changed in its sentence: other limits soon take over from a range."""
+    """Return the fraction by which a limit is raised in its sentence; less for ranges, where other limits take over."""
     return _FRACTION if entry.side is None else _FRACTION_OF_RANGE
 
 
 def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
-    """Say what more room at one limit is."""
+    """Say in words what more room at one limit means."""
     label = entry.label
     end = entry.side
     unit, factor = shown_unit(label.unit, degrees=degrees)
@@ -337,19 +341,19 @@ def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
 
 
 def _timing(gap: TimingGap, t_end: float) -> list[str]:
-    """Say what the timing costs from 1 % on: ``intervals: auto`` leaves 0.1 %."""
+    """Say what the timing costs if that is at least 1 %; ``intervals: auto`` leaves about 0.1 %."""
     saved = t_end - gap.least_time
     if saved < 0.01 * t_end or gap.left_out:
         return []
     line = (
         f"the timing costs about {_part(saved, t_end)}: the same joint path takes {gap.least_time:.4g} s "
-        "with torques that may jump; for a faster motion, set spline.intervals: auto or a larger number"
+        f"with torques that may jump; for a faster motion, {gap.advice}"
     )
     return [line]
 
 
 def _check_lines(check: SensitivityCheck) -> list[str]:
-    """Say how the predictions compare with solving again."""
+    """Compare the predictions with the results of solving again, in words."""
     lines = []
     for entry in check.entries:
         if not entry.predicted:
@@ -372,10 +376,10 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
         lines.append("checked: no change is larger than 0.1 ms")
     elif lost == len(larger):
         lines.append(
-            "checked: no solver brought the changes that are larger than 0.1 ms to an optimum"
+            "checked: for changes larger than 0.1 ms no solver reached an optimum"
         )
     else:
-        but = f", but for {lost} that no solver brought to an optimum" if lost else ""
+        but = f", except {lost} for which no solver reached an optimum" if lost else ""
         worst = f"{100.0 * check.worst_deviation():.2g} %"
         lines.append(
             f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}"
@@ -384,7 +388,7 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
 
 
 def write_active(entries: tuple[Saturation, ...]) -> list[str]:
-    """Say which limits are active for some time."""
+    """Say which limits are active, and for how long."""
     lines = []
     for entry in entries:
         if entry.share < SHORTEST_SHARE:
@@ -396,5 +400,5 @@ def write_active(entries: tuple[Saturation, ...]) -> list[str]:
         lines.append(f"{reached} for {100.0 * entry.share:.1f} % of the time, {times}")
     return [
         *(lines or ["nothing stays at a limit"]),
-        f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
+        f"(at its limit: at {100.0 * THRESHOLD:g} % of it or more, including ripple down to {100.0 * RIPPLE:g} %)",
     ]

@@ -21,18 +21,18 @@ from brachis.trajectory import MotionPhase, Samples, Trajectory
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LimitRatios(Summary):
-    """Ratios of the motion to all limits of its task, and to its process speeds. The arrays are read-only.
+    """Ratios of a motion to all limits of its task and to its process speeds. The arrays are read-only.
 
     Attributes
     ----------
     t : (K,) ndarray
-        Ascending, s; a time at which a derivative that a limit asks for jumps occurs twice, before and after the jump.
+        Ascending, s. Where a derivative that a limit needs jumps, the time occurs twice, before and after the jump.
     labels : tuple of Label
-        What every column is.
+        Labels of the columns.
     values : (K, c) ndarray
-        1 at the upper limit, -1 at the lower one. Of a position it is the place in its range: 0 in the middle. Of
-        a range with one end it is 1 minus the distance from it, rad or m, and 0 farther away. Of a process speed it is
-        1 while the tool has this speed, 0 otherwise.
+        1 at the upper limit, -1 at the lower one. For a position it is the place in its range, with 0 in the middle.
+        For a range with only one end it is 1 minus the distance from this end, rad or m, and 0 farther away. For a
+        process speed it is 1 while the tool has this speed, and 0 otherwise.
     """
 
     t: np.ndarray
@@ -45,23 +45,23 @@ class LimitRatios(Summary):
 
 
 def knot_times(trajectory: Trajectory) -> np.ndarray:
-    """Return the times of the knots of the splines from 0 to t_end, (N + 1,), s."""
+    """Return the times of the splines' knots from 0 to t_end, (N + 1,), s."""
     return np.unique(trajectory.knots) * trajectory.t_end
 
 
 _MOST_TIMES = 6000
-"""Times at which a motion is looked at, about: a scene of 120 pairs of bodies takes 0.05 s for every thousand."""
+"""Approximate number of times at which a motion is evaluated. A scene of 120 pairs takes 0.05 s per 1000 times."""
 _FEWEST_TIMES = 4
-"""Times in every knot interval, no fewer."""
+"""Minimum number of times in each knot interval."""
 
 
 def dense_samples(trajectory: Trajectory) -> Samples:
-    """Evaluate the trajectory at its knots, at its nodes and at some points in every knot interval."""
+    """Evaluate the trajectory at its knots, at its nodes and at some times in every knot interval."""
     return trajectory.at(_dense_times(trajectory, 16))
 
 
 def _dense_times(trajectory: Trajectory, per_interval: int) -> np.ndarray:
-    """Return the times of knots and nodes, and `per_interval` times in every knot interval, s; fewer of very many."""
+    """Return the times of knots and nodes, and up to `per_interval` times in every knot interval, s."""
     knots = knot_times(trajectory)
     per_interval = min(per_interval, max(_FEWEST_TIMES, _MOST_TIMES // len(knots)))
     grid = spread(knots, per_interval)
@@ -69,20 +69,20 @@ def _dense_times(trajectory: Trajectory, per_interval: int) -> np.ndarray:
 
 
 def limits_in(program: Program) -> list[Limit]:
-    """List the limits of a program but its safeguards."""
+    """List the limits of a program without its safeguards."""
     return [limit for limit in program.limits if not is_safeguard(limit)]
 
 
 def limit_ratios(
     trajectory: Trajectory, limits: Sequence[Limit] | None = None
 ) -> LimitRatios:
-    """Compare a trajectory with every limit at its nodes, its knots and densely between.
+    """Compute the ratios of a trajectory to every limit at its nodes, at its knots and densely between them.
 
     Parameters
     ----------
     trajectory : Trajectory
     limits : sequence of Limit, optional
-        Those of the trajectory's task if left out.
+        Limits to compare with. Default: those of the trajectory's task.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def limit_ratios(
 
 
 def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarray:
-    """Return 1 at the times, (K,), at which the tool has a given speed, m/s, and 0 at others."""
+    """Return 1 at the times, (K,), at which the tool has a given speed, m/s, and 0 at all other times."""
     slack = tolerances.TIME * trajectory.t_end
     is_held = np.zeros(len(t))
     for phase in trajectory.phases:
@@ -127,11 +127,11 @@ def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarra
 
 
 THRESHOLD = 0.99
-"""A limit is active from the time at which the motion uses this part of it."""
+"""A limit becomes active when the motion uses this fraction of it."""
 SHORTEST_SHARE = 5e-4
-"""Limits that are active for a smaller part of the time are not named."""
+"""Limits that are active for a smaller fraction of the time are not named."""
 RIPPLE = 0.95
-"""A limit stays active until the motion uses less than this part of it: splines ripple between their knots."""
+"""A limit stays active until the motion uses less than this fraction of it, because splines ripple between knots."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +141,9 @@ class ActiveInterval:
     Attributes
     ----------
     begin, end : float
-        s.
+        Times, s.
     side : {"lower", "upper"}
-        Which of the two bounds is active; of a torque, velocity or acceleration ``lower`` is the negative one.
+        Which of the two bounds is active. For a torque, velocity or acceleration ``lower`` is the negative one.
     """
 
     begin: float
@@ -153,29 +153,27 @@ class ActiveInterval:
 
 @dataclass(frozen=True, repr=False)
 class Saturation(Summary):
-    """How long one value of a limit is at it.
+    """How long one limited value is at its limit.
 
     Attributes
     ----------
     label : Label
-        What is limited.
+        Label of the limited value.
     share : float
-        Part of the time, 0 to 1, during which the limit is active.
+        Fraction of the time, 0 to 1, during which the limit is active.
     peak : float
         Largest ratio to the limit.
+    is_drawn : bool
+        Whether timelines show this value: it uses more than half of its limit, and changes or is active.
     active : tuple of ActiveInterval
-        When, in the order of time.
+        Intervals in which the limit is active, in the order of time.
     """
 
     label: Label
     share: float
     peak: float
+    is_drawn: bool
     active: tuple[ActiveInterval, ...]
-
-    @property
-    def is_half_used(self) -> bool:
-        """Whether the motion ever uses more than half of the limit; others are not drawn."""
-        return self.peak > 0.5
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -197,12 +195,12 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
     Parameters
     ----------
     motion : Trajectory or LimitRatios
-        Any trajectory, a saved one for example, or its ratios.
+        Any trajectory, for example a saved one, or its ratios.
 
     Returns
     -------
     tuple of Saturation
-        Of all limits, those active longest first.
+        One for each limited value. Those that are active longest come first.
     """
     ratios = limit_ratios(motion) if isinstance(motion, Trajectory) else motion
     entries = []
@@ -216,26 +214,27 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
         duration = sum(interval.end - interval.begin for interval in active)
         share = float(duration / ratios.t[-1])
         peak = float(np.abs(column).max())
-        entries.append(Saturation(label, share, peak, tuple(active)))
+        is_drawn = peak > 0.5 and bool(active or np.ptp(column) > 0.05)
+        entries.append(Saturation(label, share, peak, is_drawn, tuple(active)))
     return tuple(sorted(entries, key=lambda entry: (-entry.share, -entry.peak)))
 
 
 @dataclass(frozen=True)
 class PhaseLimits:
-    """What holds one phase back.
+    """The limits that slow one phase down.
 
     Attributes
     ----------
     phase : MotionPhase
     shares : tuple of (Label, float)
-        Limits that are active in it, and for which part of its time; those active longest first.
+        Limits that are active in the phase, each with the fraction of its time. Those active longest come first.
     """
 
     phase: MotionPhase
     shares: tuple[tuple[Label, float], ...]
 
     def __str__(self) -> str:
-        """Name the limits that are active longest, three of them."""
+        """Name the three limits that are active longest."""
         shares = self.shares[:3]
         texts = [
             f"{label} ({100.0 * share:.0f} % of the time)" for label, share in shares
@@ -254,7 +253,7 @@ class PhaseLimits:
 def limits_by_phase(
     trajectory: Trajectory, saturated: Sequence[Saturation]
 ) -> tuple[PhaseLimits, ...]:
-    """Find which of a motion's limits are active in each of its phases."""
+    """Find the limits that are active in each phase of a motion."""
     phases = []
     for phase in trajectory.phases:
         shares = []
@@ -272,14 +271,14 @@ def limits_by_phase(
 
 
 def _find_active(t: np.ndarray, values: np.ndarray) -> list[tuple[float, float]]:
-    """Find the intervals in which values, linear between the times (K,), keep to the threshold but for ripple."""
+    """Find the intervals in which values, linear between the times (K,), stay at the threshold apart from ripple."""
     samples = np.flatnonzero((values >= THRESHOLD) | (values < RIPPLE))
     is_active = np.pad(values[samples] >= THRESHOLD, 1)
     firsts = samples[is_active[1:-1] & ~is_active[:-2]]
     lasts = samples[is_active[1:-1] & ~is_active[2:]]
 
     def crossing(before: int) -> float:
-        """Time between two samples at which the line between them meets the threshold, s; an end of the motion."""
+        """Return the time between two samples at which the line between them crosses the threshold, s."""
         if not 0 <= before < len(t) - 1:
             return float(t[max(before, 0)])
         low, high = values[before : before + 2]

@@ -1,4 +1,4 @@
-"""The Typer application: help, exit codes, the options that several commands share, and how their values are read."""
+"""The Typer application: help, exit codes, and the options that several commands share with their parsing."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ Examples:
 
 \b
 Exit codes:
-  0    done; of a plan: planned and verified
-  1    no verified plan; a bug in brachis; standard output that cannot be written
+  0    done; for a plan: planned and verified
+  1    no verified plan; a bug in brachis; standard output could not be written
   2    wrong input: a file, a key, an option
   3    planned and verified, but a figure could not be written
   130  interrupted (Ctrl-C) before there was a motion
@@ -44,7 +44,7 @@ Exit codes:
 
 
 class Verbosity(IntEnum):
-    """How much a command prints besides errors and what was asked for."""
+    """How much a command prints besides errors and its result."""
 
     QUIET = 0
     NORMAL = 1
@@ -55,7 +55,7 @@ _VERBOSITY = ContextVar("verbosity", default=Verbosity.NORMAL)
 
 
 def get_verbosity() -> Verbosity:
-    """Return what the command line asks for."""
+    """Return the verbosity that the command line asks for."""
     return _VERBOSITY.get()
 
 
@@ -66,10 +66,10 @@ class InterruptedByUserError(BrachisError):
 
 
 class _Commands(TyperGroup):
-    """Commands that the user may interrupt, with the options that all commands have."""
+    """Group of commands that the user can interrupt. It adds the options that all commands share."""
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
-        """Run a command, its imports included; Ctrl-C that nothing else handled ends it as an error."""
+        """Run a command, including its imports. A Ctrl-C that nothing else has handled ends it with an error."""
         try:
             with interrupts.interruptible():
                 return super().invoke(ctx)
@@ -78,7 +78,7 @@ class _Commands(TyperGroup):
             raise InterruptedByUserError(message) from interrupt
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
-        """Find a command, and add the options that all commands have."""
+        """Find a command, and add the options that all commands share."""
         command = super().get_command(ctx, cmd_name)
         shared = [
             option for option in self.params if option.name in {"quiet", "verbose"}
@@ -88,7 +88,7 @@ class _Commands(TyperGroup):
         return command
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
-        """Find a command by its name; where a file stands in its place, name the command that is missing."""
+        """Find a command by its name. If a file stands in its place, name the command that is missing."""
         if self.get_command(ctx, args[0]) is None and is_file(args[0]):
             command = "inspect" if Path(args[0]).suffix in ROBOT_SUFFIXES else "plan"
             ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
@@ -101,12 +101,13 @@ json : bool, optional
 degrees : bool, optional
     Show angles in degrees; files and JSON keep rad.
 figures : bool, optional
-    Draw the figures too: that takes some seconds, and needs Matplotlib.
+    Also draw the figures. This takes some seconds and needs Matplotlib.
 strict : bool, optional
-    Treat implausible figures, such as degrees for rad, as errors or as warnings. Default: only a start posture that
-    looks like degrees is an error.
+    Treat implausible values, such as degrees in place of rad, as errors, or with --no-strict as warnings. Default:
+    only a start posture that looks like degrees is an error.
 changes : list of str, optional
-    Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. Repeatable.
+    Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. The option
+    can be repeated.
 urdf : path, optional
     URDF file to use instead of the one in the task.
 tool_frame : str, optional
@@ -116,33 +117,33 @@ base_frame : str, optional
 result : path
     Result file (npz) of 'brachis plan --out', or its folder.
 csv : path
-    CSV file: time (t, time_ms, ...), joint positions (j1, q_j1, j1_pos [deg], ...), and velocities (qd_j1, ...) and
-    accelerations (qdd_j1, ...) if known.
+    CSV file with columns for time (t, time_ms, ...) and joint positions (j1, q_j1, j1_pos [deg], ...), and for
+    velocities (qd_j1, ...) and accelerations (qdd_j1, ...) if known.
 robot : path
-    URDF file; or a task file (.yaml), whose robot, limits and settings are used.
+    URDF file, or a task file (.yaml) whose robot, limits and settings are used.
 task_space : str, optional
-    Task space of the path: rows such as x,y, or position, pose, pose_free_roll, joints. Default: that of the task, or
-    the most that the robot can prescribe.
+    Task space of the path: rows such as x,y, or one of the words position, pose, pose_free_roll, joints. Default: that
+    of the task, or the largest task space that the robot allows.
 angle : str, optional
-    Unit of angles in columns without a unit: rad, deg.
+    Unit of angles in columns whose heading has no unit: rad or deg.
 length : str, optional
-    Unit of lengths in columns without a unit: m, mm.
+    Unit of lengths in columns whose heading has no unit: m or mm.
 time : str, optional
-    Unit of times in a column without a unit: s, ms.
+    Unit of times in a column whose heading has no unit: s or ms.
 tolerance : float, optional
-    Largest deviation of the recovered path, m and rad. Default: 1e-6, or more if the file's last digits or the noise
-    are coarser.
+    Largest deviation of the recovered path from the motion, m and rad. Default: 1e-6, or more if the last digits in
+    the file or the noise are coarser.
 noise : float, optional
-    Standard deviation of measured positions, rad or m, which are then smoothed. Default: that of rounding to the file's
-    digits.
+    Standard deviation of measured positions, rad or m. The positions are smoothed accordingly. Default: the standard
+    deviation of rounding to the digits in the file.
 """
-"""Texts of options that several commands have."""
+"""Help texts of options that several commands share."""
 
 
 class DocumentedCommand(TyperCommand):
-    """A command whose help is its docstring: what it does, its options under Parameters, examples.
+    """A command whose help text is its docstring, with its options under Parameters and with examples.
 
-    Its options of several numbers also take one word: ``0 1 0``, ``0,1,0`` or ``"0 1 0"``.
+    Options that take several numbers accept them as separate words or as one: ``0 1 0``, ``0,1,0`` or ``"0 1 0"``.
     """
 
     def __init__(self, *args: Any, **keywords: Any) -> None:
@@ -151,7 +152,7 @@ class DocumentedCommand(TyperCommand):
         titles = r"\n\n(Parameters|Examples)\n-+\n"
         self.help, *titled_texts = re.split(titles, docstring)
         sections = dict(zip(titled_texts[::2], titled_texts[1::2], strict=True))
-        # The help must not wrap examples, so that each can be copied.
+        # Examples are not wrapped in the help text, so that each can be copied.
         self.epilog = f"\b\nExamples:\n{indent(sections.get('Examples', ''), '  ')}"
         entry = re.compile(r"^(\w+) : .*\n((?: +.*\n?)+)", re.MULTILINE)
         described = sections.get("Parameters", "")
@@ -161,7 +162,7 @@ class DocumentedCommand(TyperCommand):
             parameter.help = " ".join(texts.get(parameter.name, "").split())
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
-        """Split such words before the options are read."""
+        """Split words that contain several numbers, then read the options."""
         options = {
             name
             for parameter in self.params
@@ -172,7 +173,7 @@ class DocumentedCommand(TyperCommand):
 
 
 def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
-    """Split the word after one of `options`, or joined to it by ``=``, at commas and spaces."""
+    """Split the word that follows one of `options`, or is joined to it by ``=``, at commas and spaces."""
     words: list[str] = []
     for argument in args:
         option, equals, value = argument.partition("=")
@@ -206,7 +207,7 @@ def _print_version(is_set: bool) -> None:
 
 
 def _set_verbosity(option: typer.CallbackParam, is_set: bool) -> None:
-    """Remember ``--quiet`` or ``--verbose``."""
+    """Store the verbosity that ``--quiet`` or ``--verbose`` asks for."""
     if is_set:
         _VERBOSITY.set(Verbosity[str(option.name).upper()])
 
@@ -229,7 +230,7 @@ def options(
             "-q",
             callback=_set_verbosity,
             expose_value=False,
-            help="Print only errors, and JSON with --json.",
+            help="Print only errors, and the JSON object of --json.",
         ),
     ] = False,
     verbose: Annotated[
@@ -239,7 +240,7 @@ def options(
             "-v",
             callback=_set_verbosity,
             expose_value=False,
-            help="Write every step and its time to standard error, and tracebacks of errors.",
+            help="Write every step with its time, and tracebacks of errors, to standard error.",
         ),
     ] = False,
 ) -> None:
@@ -251,16 +252,16 @@ Json = Annotated[bool, Option("--json")]
 Degrees = Annotated[bool, Option("--degrees")]
 Changes = Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE")]
 _MOTIONS = ("result.npz", "unverified.npz")
-"""Names of a motion in the folder of ``brachis plan --out``."""
+"""File names of a motion in the folder of ``brachis plan --out``."""
 
 
 def motion_file(result: Path) -> Path:
-    """Return the file of a motion: the one named, or the one in the folder named.
+    """Return the file of a motion: the given file, or the one in the given folder.
 
     Raises
     ------
     ResultFileError
-        The folder holds no motion.
+        The folder contains no motion.
     """
     if not is_folder(result):
         return result
@@ -276,7 +277,7 @@ def motion_file(result: Path) -> Path:
 
 
 def task_space_of(text: str | None) -> str | list[str] | None:
-    """Read ``--task-space``: a word, or a list of rows."""
+    """Read the value of ``--task-space``: a word, or a list of rows."""
     from brachis.robot.task_map.protocol import ROWS
 
     if text is None:
@@ -288,9 +289,9 @@ def task_space_of(text: str | None) -> str | list[str] | None:
 def read_changes(
     changes: Sequence[str] | None, *, strict: bool | None = None
 ) -> dict[str, object]:
-    """Read the keys that ``--set`` and ``--strict`` set, and their values.
+    """Read the keys and values that ``--set`` and ``--strict`` set.
 
-    If a key is set twice, the last value counts.
+    If a key is set twice, the last value is used.
     """
     from brachis.task import read_assignment
 
@@ -301,7 +302,7 @@ def read_changes(
 
 
 def load_changed_task(path: Path, keys: Mapping[str, object]) -> brachis.Task:
-    """Load a task file, with the keys that `read_changes` has read set."""
+    """Load a task file with changed keys, as `read_changes` returns them."""
     robots = brachis.robots
     if robots.is_robot(str(path)) and path.suffix == "":
         name = robots.path_of(str(path)).parent.name
@@ -315,16 +316,16 @@ def load_changed_task(path: Path, keys: Mapping[str, object]) -> brachis.Task:
 
 
 def refuse_options(values: Mapping[str, object], source: str, allowed: str) -> None:
-    """Refuse options that do not fit the input.
+    """Raise an error for options that do not fit the input.
 
     Parameters
     ----------
     values : mapping of str to object
-        The options and their values; None: not given.
+        The options and their values; None if an option is not given.
     source : str
-        What the input is, with its article.
+        What the input is, with an article, for example "a URDF".
     allowed : str
-        What the options are for.
+        The input that the options are meant for.
 
     Raises
     ------
@@ -341,7 +342,7 @@ def refuse_options(values: Mapping[str, object], source: str, allowed: str) -> N
 
 
 def urdf_of(source: Path) -> Path:
-    """Return the URDF file; of a robot that comes with brachis, given by its name, its file.
+    """Return the path of a URDF, given as a file or as the name of an included robot.
 
     Raises
     ------

@@ -1,6 +1,7 @@
-"""Writing files: results all or none, figures if they can be written, and nothing over files of others.
+"""Writing files: all results or none, then the figures that can be written. Foreign files are never overwritten.
 
-Then how a command ends that makes a motion: its files, its answer, what was not completed, its exit code.
+This module also ends commands that make a motion: it writes their files, prints the answer and what was not completed,
+and returns the exit code.
 """
 
 from __future__ import annotations
@@ -36,27 +37,28 @@ from brachis.common.words import name_first
 from brachis.errors import InputError, NotInstalledError
 
 Writer = Callable[[Path], object]
-"""Writes one file to a path."""
+"""Function that writes one file to a path."""
 Drawing = Callable[[], Any]
-"""Draws a Matplotlib figure."""
+"""Function that draws a Matplotlib figure."""
 
 
 def check_output(
     out: Path, inputs: Iterable[Path | None], beginning: bytes = b""
 ) -> None:
-    """Refuse what cannot be written, or should not be replaced.
+    """Raise an error for an output that cannot be written, or that would replace a file that should stay.
 
-    An output is refused whose folder does not exist, or that would replace a folder, an input of the command or a file
+    That is an output whose folder does not exist, or one that would replace a folder, an input of the command or a file
     of another kind.
 
     Parameters
     ----------
     out : Path
-        What will be written. A new file may have any name; devices such as ``/dev/stdout`` are not checked.
+        File that will be written. A new file may have any name. Devices such as ``/dev/stdout`` are not checked.
     inputs : iterable of Path or None
         Files that the command reads.
     beginning : bytes, optional
-        Pattern of how an older file begins; for what is checked before it is written, as writing does it too.
+        Pattern that matches the beginning of older files of this kind. Needed only for checks ahead of writing, which
+        makes this check itself.
 
     Raises
     ------
@@ -70,12 +72,12 @@ def check_output(
             problem,
             where=str(out),
             found=f"no folder {out.parent}",
-            hint="Make the folder first",
+            hint="Create the folder first",
         )
     if not is_file(out):
         return
     for path in inputs:
-        with suppress(OSError):  # an input that cannot be read is another file
+        with suppress(OSError):  # an input that cannot be read is a different file
             if path is not None and out.samefile(path):
                 raise InputError(
                     "the output would overwrite an input file",
@@ -94,19 +96,19 @@ def write_files(
     listener: Listener,
     stale: Iterable[str] = (),
 ) -> tuple[list[str], list[InputError]]:
-    """Write results, all or none, and then the figures that can be written.
+    """Write all results or none, and then the figures that can be written.
 
-    The results are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Older
-    figures are removed before new ones are written, because they show another result.
+    The results are written to a temporary folder and then moved, so that a failure leaves the output folder as it was.
+    Older figures are removed before new ones are written, because they show an older result.
 
     Parameters
     ----------
     out : Path
-        Folder that exists.
+        Existing folder.
     results, figures : mapping of str to callable
-        Names, and what writes each.
+        File names, and the function that writes each file.
     listener : callable
-        Takes which figure is drawn, in plain words.
+        Called with a text that says which figure is being drawn.
     stale : iterable of str, optional
         Older files to remove.
 
@@ -122,7 +124,7 @@ def write_files(
     InputError
         A result cannot be written.
     KeyboardInterrupt
-        Ctrl-C while figures were drawn; its text says what was written before.
+        Ctrl-C while figures were drawn. Its text names the files that were written before.
     """
     written = [str(out / name) for name in results]
     failures = []
@@ -144,7 +146,7 @@ def write_files(
 def _write_results(
     out: Path, results: Mapping[str, Writer], stale: Iterable[str]
 ) -> None:
-    """Write results into a temporary folder, remove `stale`, and move the results to their places."""
+    """Write results to a temporary folder, remove the `stale` files, and move the results to their places."""
     temporary = temporary_in(out)
     with writing_errors(out):
         temporary.mkdir()
@@ -171,21 +173,21 @@ def write_one(
     inputs: Iterable[Path | None] = (),
     beginning: bytes = b"",
 ) -> Any:
-    """Write one file, unless it would take the place of what `check_output` protects; return what writing returns."""
+    """Write one file, unless it would replace a file that `check_output` protects; return what writing returns."""
     check_output(out, inputs, beginning)
     with end_cleanly():
         return write(out)
 
 
 def write_text(text: str, path: Path) -> None:
-    """Write a text file whole or not at all."""
+    """Write a text file completely or not at all."""
     with atomic_write(path) as stream:
         stream.write(text.encode())
 
 
 @contextmanager
 def end_cleanly() -> Iterator[None]:
-    """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
+    """Let SIGTERM leave the block like an exception, so that temporary files are removed."""
     before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield
@@ -199,11 +201,11 @@ _UNVERIFIED = {
     "overview.png": "unverified.png",
     "today.npz": "today.npz",
 }
-"""Names of files of a motion that is not verified; all others get the prefix ``unverified_``."""
+"""File names for a motion that is not verified. All other files get the prefix ``unverified_``."""
 
 
 def _unverified(name: str) -> str:
-    """Return the name of a file of a motion that is not verified, by that of one that is."""
+    """Return the name that a file has if its motion is not verified."""
     return _UNVERIFIED.get(name, f"unverified_{name}")
 
 
@@ -211,15 +213,15 @@ def _unverified(name: str) -> str:
 def output_folder(
     out: Path | None, names: Sequence[str], inputs: Sequence[Path | None]
 ) -> Iterator[None]:
-    """Make the folder for a motion's files; if the block fails, say which files of an earlier run are there.
+    """Create the folder for a motion's files. If the block fails, say which files of an earlier run remain there.
 
-    Without a folder nothing is made.
+    If `out` is None, nothing is created.
 
     Raises
     ------
     InputError
-        The folder cannot be made, has the name of a file, or holds under one of these names what `check_output`
-        refuses to replace.
+        The folder cannot be created or has the name of a file, or it contains a file of one of these names that
+        `check_output` does not allow to be replaced.
     """
     if out is None:
         yield
@@ -227,7 +229,7 @@ def output_folder(
     has_suffix = out.suffix in {Path(name).suffix for name in names}
     if is_file(out) or (has_suffix and not is_folder(out)):
         raise InputError(
-            "several files are written, into a folder, and this is the name of a file",
+            "several files are written to a folder, but this is the name of a file",
             where="--out",
             found=out,
             allowed="a folder",
@@ -243,7 +245,7 @@ def output_folder(
     except (Exception, KeyboardInterrupt):
         older = [name for name in both if is_file(out / name)]
         if older:
-            print_error(f"files of an earlier run stay in {out}: {', '.join(older)}")
+            print_error(f"files of an earlier run remain in {out}: {', '.join(older)}")
         raise
 
 
@@ -265,24 +267,24 @@ def finish(
     Parameters
     ----------
     data : dict
-        The answer: content of the JSON file, and of ``--json``, which also lists the files.
+        The answer, which is the content of the JSON file and of ``--json``. The latter also lists the files.
     results : mapping of str to callable
-        What writes the files of the motion, by name.
+        Functions that write the files of the motion, by file name.
     figures : mapping of str to callable
-        What draws the figures, by name.
+        Functions that draw the figures, by file name.
     out : Path or None
-        Folder; None: no files.
+        Folder; no files are written if it is None.
     names : sequence of str
-        Files that the command may write; older ones are removed.
+        Names of all files that the command may write. Older files of these names are removed.
     verified : bool
     json : bool
         Whether the answer is printed as JSON.
     show : callable
         Prints the answer for a person.
     result : Result or None
-        Result of a search.
+        Result of a search, if there was one.
     complaint : str, optional
-        What follows from a motion that is not verified.
+        Consequence of a failed verification, for the message.
     """
     failures: list[InputError] = []
     if out is not None:
@@ -304,10 +306,10 @@ def finish(
         show()
         print_lines(*(f"wrote {name}" for name in data.get("files", ())))
         if out is None and results:
-            print_lines("nothing was saved; --out FOLDER saves the motion")
+            print_lines("nothing was saved; use --out FOLDER to save the motion")
     if result is not None:
         if result.interrupted:
-            print_error("the search was ended early; this is the best motion so far")
+            print_error("the search ended early; this is the best motion so far")
         for step in result.not_completed:
             print_error(f"not completed: {step}")
     if not verified:
@@ -328,10 +330,10 @@ def draw(make: Drawing, path: Path) -> None:
 
 
 def exit_code(verified: bool, failures: Iterable[InputError]) -> int:
-    """Print which figures could not be written, and return the exit code of a motion."""
+    """Print which figures could not be written, and return the exit code of a command that makes a motion."""
     code = 0
     for reason, failure in {str(failure): failure for failure in failures}.items():
-        print_error(f"the result is written, its figures are not: {reason}")
+        print_error(f"the result was written, but its figures were not: {reason}")
         if not isinstance(failure, NotInstalledError):
             code = 3
     return code if verified else 1

@@ -1,8 +1,7 @@
-"""``brachis inspect``: the joints of a robot, its closed forms, and the path and the postures of a task."""
+"""``brachis inspect``: show the joints and closed forms of a robot, and the path and postures of a task."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +22,14 @@ from brachis.apps.cli.app import (
     task_space_of,
     urdf_of,
 )
-from brachis.apps.cli.output import print_json, print_lines, print_table, write_posture
+from brachis.apps.cli.output import (
+    print_fit,
+    print_json,
+    print_lines,
+    print_segments,
+    print_table,
+    write_posture,
+)
 from brachis.common.files import is_task_file
 from brachis.common.words import write_count
 from brachis.errors import InputError, check_names
@@ -32,12 +38,12 @@ if TYPE_CHECKING:
     from brachis import ik
     from brachis.problem.problem import Problem
     from brachis.robot import Robot
-    from brachis.task import FitReport, Task
+    from brachis.task import Task
 
 _NONE = "none"
-"""What a table shows for a missing limit or mass, and for a joint without friction."""
+"""Entry of a table for a missing limit or mass, and for a joint without friction."""
 _LISTED = 12
-"""Choices of redundant joints on the screen."""
+"""Largest number of choices of redundant joints that are printed without --verbose."""
 
 
 def inspect(
@@ -54,23 +60,24 @@ def inspect(
 ) -> None:
     """Show a robot's joints and its closed forms.
 
-    Limits, masses and friction of every joint, and which choices of redundant joints have a closed form. With --verbose
-    also the branches, the reasons against the other choices, and the pairs that may collide.
+    This prints the limits, mass and friction of every joint, and the choices of redundant joints that have a closed
+    form. With --verbose it also prints the branches, why the other choices have no closed form, and the pairs of bodies
+    that may collide.
 
     Parameters
     ----------
     source : path
-        URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the path and the
-        postures at its ends.
+        URDF file or name of a robot. For a task file, this shows its robot with the limits and masses in use, and the
+        path with the postures at its ends.
     task_space : str, optional
-        What the path prescribes: rows such as x,y or x,y,z,yaw, or a word such as pose or axis. Default: the task's,
-        or all that the robot can.
+        What the path prescribes: rows such as x,y or x,y,z,yaw, or a word such as pose or axis. Default: that of the
+        task, or the largest task space that the robot allows.
     posture : str, optional
-        Say where the tool is at these joint positions, for example '0, 0.3, 1.2', or in a named posture of the task.
+        Show where the tool is at these joint positions, for example '0, 0.3, 1.2', or in a named posture of the task.
     frame : str, optional
-        Say it in this frame of the task. Default: the world.
+        Frame of the task in which the tool is shown. Default: the world.
     lock : list of str, optional
-        Joint held at a position: name=value, repeatable.
+        Joint that is held at a position, as name=value. The option can be repeated.
 
     Examples
     --------
@@ -114,7 +121,7 @@ def inspect(
     if space is None:
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
-        remarks.append(f"task space: {words}; --task-space names another one")
+        remarks.append(f"task space: {words}; --task-space chooses another one")
     with name_task_file(None if task_space else source, keys):
         robot, task_map = bind(robot, space, tolerances)
         candidates = brachis.ik.find_all(robot, task_map)
@@ -147,7 +154,7 @@ def _problem_of(
     *,
     is_needed: bool,
 ) -> Problem | None:
-    """Check a task; None where it cannot be planned. `remarks` say why, and `collisions` which pairs are never free."""
+    """Check a task, and return None if it cannot be planned; `remarks` and `collisions` are filled with the reasons."""
     from brachis.problem.plausibility import check_within_reach, of_robot, of_task
     from brachis.problem.problem import Problem
     from brachis.robot.plausibility import report_issues
@@ -156,8 +163,8 @@ def _problem_of(
     try:
         collisions |= _collisions(robot, task)
         remarks += [
-            f"{' and '.join(pair)} are never free, in none of {MANY_POSTURES} random postures; if they may touch, "
-            f"add [{', '.join(pair)}] to collisions.disable"
+            f"{' and '.join(pair)} are never free: they are too close in all of {MANY_POSTURES} random postures; if "
+            f"they may touch, add [{', '.join(pair)}] to collisions.disable"
             for pair in collisions["never_free"]
         ]
         problem = Problem.of(robot, task)
@@ -174,7 +181,7 @@ def _problem_of(
 def _describe(
     robot: Robot, problem: Problem | None, collisions: dict[str, list[Any]]
 ) -> dict[str, Any]:
-    """Describe robot and task as plain data for JSON; free ends, and the length without positions, are None."""
+    """Describe robot and task as plain data for JSON. Free ends, and the length of a path of joints, are None."""
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
     from brachis.task.fields import plain
@@ -204,7 +211,7 @@ def _describe(
 
 
 def _warnings(robot: Robot, problem: Problem | None) -> list[str]:
-    """Say what is implausible, or refuse it where a plan of the task would (PlausibilityError)."""
+    """List what is implausible, or raise PlausibilityError where a plan of the task would."""
     from brachis.problem.plausibility import of_places, of_robot, of_task
     from brachis.robot.plausibility import refuse_issues
 
@@ -223,7 +230,7 @@ def _place_tool(
     task: Task | None,
     remarks: list[str],
 ) -> dict[str, Any]:
-    """Say where the tool is in a frame of the task, or in the world, by the keys of a task; doubts go to `remarks`."""
+    """Describe the tool's place in a frame of the task or in the world, with the keys of a task; add to `remarks`."""
     import numpy as np
     from scipy.spatial.transform import Rotation
 
@@ -261,7 +268,7 @@ def _place_tool(
 def _print_robot(
     robot: Robot, problem: Problem | None, data: dict[str, Any], *, degrees: bool
 ) -> None:
-    """Print all for a person."""
+    """Print the whole description for a person."""
     chain = f"{robot.base_frame} -> {robot.tool_frame}"
     joints = write_count(robot.n, "joint")
     print_lines(f"{data['robot']}: {chain}, {joints}")
@@ -275,7 +282,7 @@ def _print_robot(
     guarantees = data["guarantees"]
     for text in dict.fromkeys(guarantees.values()):
         names = [name for name in guarantees if guarantees[name] == text]
-        print_lines(f"{', '.join(names)} limit: {text}")
+        print_lines(f"limits on {', '.join(names)}: {text}")
     pairs = data["collisions"]["pairs"]
     if pairs:
         listed = (
@@ -294,28 +301,29 @@ def _print_robot(
         long = "" if length is None else f", {length:.4g} m long"
         named = ", ".join(dict.fromkeys(kinds))
         print_lines(f"path: {write_count(len(kinds), 'segment')} ({named}){long}")
+        print_segments(problem.path)
         for fit in task.fits:
-            _print_fit(fit)
+            print_fit(fit)
     redundancy = data["degree_of_redundancy"]
     space = ", ".join(data["task_space"])
     print_lines(f"task space [{space}]: degree of redundancy {redundancy}")
     if redundancy < 0:
         print_lines(
-            "The robot has fewer joints than the task space has rows; prescribe fewer rows."
+            "The robot has fewer joints than the task space has rows: prescribe fewer rows."
         )
     else:
         _print_decompositions(data["decompositions"])
 
 
 def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
-    """List the solids of robot and scene, and the pairs of them that may collide, or always do, by name."""
+    """List the names of all solids of robot and scene, and of the pairs that may collide or always do."""
     from brachis.scene import find_never_free, scene_of
 
     scene = scene_of(robot, task)
     if scene is None:
         return {}
     stuck = find_never_free(scene, robot, task.collisions.clearance)
-    # Those with bodies of the scene first.
+    # Pairs with bodies of the scene come first.
     pairs = (-scene.pairs.max(axis=1)).argsort(kind="stable").tolist()
     return {
         "solids": [solid.name for solid in scene.solids],
@@ -327,9 +335,9 @@ def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
 
 
 def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
-    """Name, type, axis, limits, mass and friction of every joint, with units.
+    """List the name, type, axis, limits, mass and friction of every joint, with units.
 
-    The mass is that of the links that the joint carries up to the next one, with the payload at the last one.
+    The mass is that of the links between the joint and the next one. At the last joint it includes the payload.
     """
     from brachis.robot.joints import UNITS, shown_unit
     from brachis.robot.limits import MAGNITUDES
@@ -366,27 +374,6 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     return rows
 
 
-def _print_fit(fit: FitReport) -> None:
-    """Print what was read from a file of points, how near the fitted path is to it, and its corners."""
-    print_lines(f"path from {fit}")
-    if fit.corners:
-        is_blended = any(corner.blend for corner in fit.corners)
-        what = (
-            "rounded within the tolerance" if is_blended else "at which the tool stops"
-        )
-        columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
-        rows = [
-            (
-                corner.row,
-                f"{math.degrees(corner.angle):.4g}",
-                f"{1e3 * corner.distance:.6g}",
-                f"{1e3 * corner.blend:.4g}",
-            )
-            for corner in fit.corners
-        ]
-        print_table(f"corners, {what}", columns, rows, numbers=columns)
-
-
 def _robot_of_urdf(
     path: Path,
     tool_frame: str | None,
@@ -394,9 +381,9 @@ def _robot_of_urdf(
     lock: Sequence[str],
     remarks: list[str],
 ) -> Robot:
-    """Make the robot of a URDF with the limits that the file states; a plan refuses missing ones, inspect does not.
+    """Make the robot of a URDF with the limits that the file states; missing limits are no error here.
 
-    Without a tool frame the chain is the URDF's first limb; `remarks` say which other choices there are.
+    Without a tool frame, the chain is the first limb of the URDF. `remarks` then name the other choices.
     """
     import numpy as np
 
@@ -409,12 +396,12 @@ def _robot_of_urdf(
         if limb.base and base_frame is None:
             base_frame = limb.base
             remarks.append(
-                f"base frame: {limb.base}, from which several limbs part; --base-frame names another one"
+                f"base frame: {limb.base}, from which several limbs branch off; --base-frame chooses another one"
             )
         if len(limb.leaves) > 1:
             remarks.append(
-                f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} part; "
-                "--tool-frame names another one"
+                f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} branch off; "
+                "--tool-frame chooses another one"
             )
     locked = {}
     for text in lock:
@@ -442,7 +429,7 @@ def _robot_of_urdf(
 
 
 def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
-    """Describe one choice of redundant joints: its solver, or why it has none."""
+    """Describe one choice of redundant joints: its solver, or the reason why it has none."""
     row: dict[str, Any] = {
         "redundant joints": ", ".join(candidate.redundant_joints) or "none",
         "solver": "-",
@@ -464,7 +451,7 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
 
 
 def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
-    """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
+    """Print a table of all choices, with the branches of those that have a solver and the reasons of the others."""
     columns = ["redundant joints", "solver", "branches"]
     if any(row["remark"] for row in rows):
         columns.append("remark")
@@ -475,7 +462,9 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     print_table("choices of redundant joints (-: no closed form)", columns, cells)
     if not is_verbose:
         omission = f"... and {len(rows) - len(shown)} more; " if rows != shown else ""
-        print_lines(f"{omission}--verbose lists branches, and reasons against choices")
+        print_lines(
+            f"{omission}--verbose lists the branches, and why choices have no closed form"
+        )
         return
     for labels in dict.fromkeys(row["labels"] for row in rows if row["labels"]):
         alike = [row["redundant joints"] for row in rows if row["labels"] == labels]
@@ -486,7 +475,7 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _print_place(place: dict[str, Any]) -> None:
-    """Print where the tool is, as a task file writes it: the position, and the orientation in every convention."""
+    """Print the tool's position, and its orientation in every convention, in the form that a task file uses."""
     from brachis.task.points.units import CONVENTIONS
 
     for key, values in place.items():

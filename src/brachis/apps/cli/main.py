@@ -1,7 +1,7 @@
-"""The command line: all commands, and how they end.
+"""The command line: the list of all commands, and what happens when one fails.
 
-Results go to standard output, everything else to standard error. With ``--json`` standard output gets one JSON object,
-also for an error. The exit codes are in `brachis.apps.cli.app`.
+Results go to standard output, everything else to standard error. With ``--json`` a command prints one JSON object on
+standard output, even after an error. The exit codes are listed in `brachis.apps.cli.app`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from brachis.common import interrupts
 from brachis.errors import BrachisError
 
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
-"""Base class of Typer's errors for wrong options; Typer does not export it."""
+"""Base class of the errors that Typer raises for wrong options. Typer does not export it."""
 
 _UNWRITABLE = {errno.ENOSPC, errno.EPIPE, errno.EBADF, errno.EIO}
-"""Errors of streams that cannot be written."""
+"""Error numbers that mean that a stream cannot be written."""
 
 _COMMANDS: tuple[Callable[..., None], ...] = (
     starting.robots,
@@ -52,13 +52,13 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     planning.sweep,
     motions.schema,
 )
-"""Commands in the order of the help; their names are those of the functions."""
+"""Commands in the order of the help text. Each command has the name of its function."""
 
 
 def _prepare(command: Callable[..., None]) -> Callable[..., None]:
     """Import the planner before a command runs, and show warnings as messages while it runs.
 
-    Ctrl-C waits for the end of the import, because compiled libraries may swallow it.
+    Ctrl-C takes effect only after the import, because compiled libraries may swallow it.
     """
 
     @wraps(command)
@@ -78,7 +78,7 @@ for _command in _COMMANDS:
 
 
 def main() -> None:
-    """Run the command line; no exception leaves it as a traceback."""
+    """Run the command line. No exception ends it with a traceback."""
     open_streams()
     try:
         code = copy_context().run(_run, as_json="--json" in sys.argv[1:])
@@ -95,7 +95,7 @@ def _run(*, as_json: bool) -> int:
     Raises
     ------
     OSError
-        Standard output cannot be written: errors of other files have their names.
+        Standard output cannot be written. Errors of other files carry a file name and are not raised.
     """
     try:
         return app(prog_name="brachis", standalone_mode=False) or 0

@@ -1,8 +1,9 @@
-"""How the command line speaks: results on standard output, everything else on standard error."""
+"""Output of the command line: results go to standard output, everything else to standard error."""
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import time
@@ -25,10 +26,12 @@ from brachis.errors import BrachisWarning, InputError
 if TYPE_CHECKING:
     from brachis.apps.controller import RunReport
     from brachis.apps.export import ProgramReport
+    from brachis.path import Path as ToolPath
+    from brachis.task import FitReport
     from brachis.verify import Verification
 
 _BEGAN = time.perf_counter()
-"""When the command line was loaded, s, so that all steps of a command are counted from one instant."""
+"""Time at which the command line was loaded, s. Verbose output counts the time of each step from here."""
 
 
 def print_table(
@@ -38,20 +41,21 @@ def print_table(
     *,
     numbers: Collection[str] = (),
 ) -> None:
-    """Print a table that fits the terminal: text wraps, numbers are neither cut nor wrapped.
+    """Print a table that fits the terminal. Text wraps; numbers are neither cut nor wrapped.
 
-    A table that is too wide loses its lines; if it is still too wide, its columns are printed in several tables, and
-    each repeats the first column.
+    A table that is too wide is printed without lines. If it is still too wide, its columns are spread over several
+    tables, each of which repeats the first column.
 
     Parameters
     ----------
     title : str
     columns : sequence of str
-        Headings, with units. The first column says what a row is about. Without any heading the table has no header.
+        Headings, with units. The first column says what each row is about. If all headings are empty, the table has no
+        header.
     rows : iterable of sequences
-        A cell for each column.
+        Each row has one cell per column.
     numbers : collection of str, optional
-        Headings of the columns of numbers.
+        Headings of the columns that contain numbers.
     """
     console = result_console()
     cells = [[str(cell) for cell in row] for row in rows]
@@ -91,7 +95,7 @@ def print_table(
 
 
 def _split_columns(least: Sequence[int], width: int) -> list[list[int]]:
-    """Share the columns out to tables without lines that fit; the first column is in each."""
+    """Distribute the columns over tables without lines that fit the width. Each table has the first column."""
     column_groups = [[0]]
     for i in range(1, len(least)):
         indices = [*column_groups[-1], i]
@@ -103,7 +107,7 @@ def _split_columns(least: Sequence[int], width: int) -> list[list[int]]:
 
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
-    """Print the checks, one a row."""
+    """Print the checks of a verification, one per row."""
     from brachis.verify import POSITION_SCALE
 
     verdict = "passed" if verification.passed else "FAILED"
@@ -137,7 +141,9 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
     if json:
         print_json(report.to_dict())
     elif isinstance(report, RunReport):
-        print_lines(f"as {report.controller} runs it, every {1e3 * report.period:g} ms:")
+        print_lines(
+            f"as {report.controller} runs it, every {1e3 * report.period:g} ms:"
+        )
         print_verification(report.verification, degrees=False)
     else:
         print_lines(str(report))
@@ -148,8 +154,40 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
     return 1
 
 
+def print_segments(path: ToolPath) -> None:
+    """Print s and the distance from the path's start at which each of several segments ends, for a path of the tool."""
+    ends = {
+        span.segment: f"path[{span.segment}] at s = {s:.4g} ({1e3 * path.between(0.0, s).length:.4g} mm)"
+        for span, s in zip(path.spans, path.breaks[1:], strict=True)
+        if span.segment is not None and path.positions
+    }
+    if len(ends) > 1:
+        print_lines(f"ends of the segments: {', '.join(ends.values())}")
+
+
+def print_fit(fit: FitReport) -> None:
+    """Print what was read from a file of points, how close the fitted path is to the points, and its corners."""
+    print_lines(f"path from {fit}")
+    if fit.corners:
+        is_blended = any(corner.blend for corner in fit.corners)
+        what = (
+            "rounded within the tolerance" if is_blended else "at which the tool stops"
+        )
+        columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
+        rows = [
+            (
+                corner.row,
+                f"{math.degrees(corner.angle):.4g}",
+                f"{1e3 * corner.distance:.6g}",
+                f"{1e3 * corner.blend:.4g}",
+            )
+            for corner in fit.corners
+        ]
+        print_table(f"corners, {what}", columns, rows, numbers=columns)
+
+
 def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
-    """Write a posture with names and units; None is free."""
+    """Write a posture with joint names and units; None means that it is free."""
     from brachis.robot.joints import shown_unit
 
     if data[key] is None:
@@ -163,15 +201,15 @@ def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
 
 
 def print_error(message: str) -> None:
-    """Print one message on standard error, if that can be written."""
+    """Print one message on standard error, if standard error can be written."""
     with suppress(OSError):
         sys.stderr.write(f"brachis: {message}\n")
         sys.stderr.flush()
 
 
 def json_text(data: Mapping[str, object]) -> str:
-    """Return one JSON object as text; numbers that JSON does not know become null."""
-    # json writes NaN and infinities as constants, which it reads as None here.
+    """Return one JSON object as text. NaN and infinities, which JSON does not have, become null."""
+    # The module json writes NaN and infinities as constants; here it reads them back as None.
     plain = json.loads(json.dumps(data), parse_constant=lambda _: None)
     return json.dumps(plain, indent=2) + "\n"
 
@@ -182,7 +220,7 @@ def print_json(data: Mapping[str, object]) -> None:
 
 
 def print_failure(message: str, code: int, *, as_json: bool) -> int:
-    """Print what went wrong on standard error, and with `as_json` also as JSON on standard output; return the code."""
+    """Print an error on standard error, and with `as_json` also as JSON on standard output; return the exit code."""
     print_error(message)
     if as_json:
         failure = {
@@ -197,7 +235,7 @@ def print_failure(message: str, code: int, *, as_json: bool) -> int:
 
 
 def print_usage_error(error: Any, *, as_json: bool) -> int:
-    """Print why the command line is not understood, and where help is; return the exit code."""
+    """Print why the command line was not understood and where to find help; return the exit code."""
     if type(error).__name__ == "NoArgsIsHelpError":
         with suppress(OSError):
             sys.stderr.write(f"{error.ctx.get_help()}\n")
@@ -212,7 +250,7 @@ def print_usage_error(error: Any, *, as_json: bool) -> int:
 def report_closed_output(error: OSError) -> None:
     """Say why standard output cannot be written, unless a pipe was closed.
 
-    What is left of it goes to the null device, so that the interpreter does not try again when it ends.
+    The rest of the output goes to the null device, so that the interpreter does not try to write it at exit.
     """
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -221,7 +259,7 @@ def report_closed_output(error: OSError) -> None:
 
 
 def open_streams() -> None:
-    """Make sure that both streams exist, and that they take any name of a file."""
+    """Open both streams if they are closed, and let them print any file name."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this program
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  (open as long as the program runs)
@@ -231,7 +269,7 @@ def open_streams() -> None:
 
 
 def result_console() -> Console:
-    """Return a console for results."""
+    """Return the console on which results are printed."""
     return Console(
         highlight=False,
         markup=False,
@@ -242,13 +280,13 @@ def result_console() -> Console:
 
 
 def print_lines(*lines: str) -> None:
-    """Print lines of a result."""
+    """Print the lines of a result."""
     for line in lines:
         result_console().print(line)
 
 
 def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None:
-    """Print an answer as JSON, or as lines for a person."""
+    """Print an answer, either as JSON or as lines for a person."""
     if as_json:
         print_json(data)
     else:
@@ -257,13 +295,13 @@ def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None
 
 @contextmanager
 def show_warnings() -> Iterator[None]:
-    """Print warnings of brachis as messages on standard error; a quiet command prints none."""
+    """Print warnings of brachis as messages on standard error. A quiet command prints none."""
     with warnings.catch_warnings():
         warnings.simplefilter("default", BrachisWarning)
         usual = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
-            """Print a warning of brachis as a message, and any other one as usual."""
+            """Print a warning of brachis as a message, and any other warning as usual."""
             if not issubclass(category, BrachisWarning):
                 usual(message, category, *where)
             elif get_verbosity() is not Verbosity.QUIET:
@@ -275,25 +313,25 @@ def show_warnings() -> Iterator[None]:
 
 @contextmanager
 def show_progress() -> Iterator[Callable[[str], None]]:
-    """Give a listener that shows what is done, and that notices Ctrl-C.
+    """Yield a listener that shows the current step and notices Ctrl-C.
 
-    On a terminal it shows the present step; a verbose command prints every step with its time since the command line
-    was loaded.
+    On a terminal it shows only the current step. A verbose command prints every step with the time since the command
+    line was loaded.
     """
     verbosity = get_verbosity()
     is_shown = verbosity is Verbosity.NORMAL
-    # On a terminal a quiet console would swallow what others write beside it.
+    # On a terminal, a quiet console would swallow the output of other writers.
     console = Console(
         stderr=True, quiet=not is_shown, force_terminal=None if is_shown else False
     )
     with console.status("working") as status:
 
         def show(text: str) -> None:
-            """Show what is done, as the verbosity asks for."""
+            """Show the current step in the way that the verbosity asks for."""
             interrupts.check()
             if verbosity is Verbosity.VERBOSE:
                 print_error(f"{time.perf_counter() - _BEGAN:.2f} s: {text}")
             else:
-                status.update(Text(text))  # a name may hold brackets
+                status.update(Text(text))  # a name may contain brackets
 
         yield show

@@ -1,4 +1,4 @@
-"""``brachis plan | bottleneck | sweep``: plan a task, say what holds the motion back, plan a task many times."""
+"""``brachis plan | bottleneck | sweep``: plan a task, find what slows the motion down, plan a task many times."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ from brachis.apps.cli.output import (
     print_json,
     print_lines,
     print_run,
+    print_segments,
     print_table,
     print_verification,
     show_progress,
@@ -69,10 +70,10 @@ def plan(
     task : path
         Task file (YAML).
     out : path, optional
-        Folder for result.npz, result.json, overview.png and candidates.png, and fit.png if the path was fitted to
-        points. If the verification fails, the names begin with unverified.
+        Folder for result.npz, result.json, overview.png and candidates.png, and for fit.png if the path was fitted to
+        points. If the verification fails, the file names begin with unverified.
     view : bool, optional
-        Show the motion in the browser, until Ctrl-C.
+        Show the motion in the browser until Ctrl-C is pressed.
     profile : str, optional
         Controller that runs the motion; see brachis export. Its limits are added to the task's, and the motion is
         planned such that it passes as the controller runs it.
@@ -131,7 +132,7 @@ def _plan_task(
 
     keys = read_changes(changes, strict=strict)
     changed = load_changed_task(task, keys)
-    # With a URDF of its own, the robot is not that of the task file.
+    # If a URDF is given, the robot is not the one of the task file.
     with name_task_file(None if urdf else task, keys):
         robot = urdf and str(urdf)
         if profile is None:
@@ -143,7 +144,6 @@ def _plan_task(
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
-    from brachis.search.stages import describe_coordinates
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
@@ -152,8 +152,7 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     least_motion = result.least_motion
     rows = {
         **result.summary(),
-        "redundant joints": describe_coordinates(trajectory),
-        "family": result.family,
+        **({} if result.family == trajectory.branch else {"family": result.family}),
         "start posture": write_posture(data, "start_posture", degrees=degrees),
         "end posture": write_posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
@@ -168,6 +167,7 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     print_table("plan", ("", ""), rows.items())
     if len(trajectory.phases) > 1:
         print_table("phases", PHASE_COLUMNS, phase_rows(trajectory.phases))
+        print_segments(candidate.problem.path)
     print_lines(*(f"path from {fit}" for fit in result.fits))
     tried = len(result.candidates)
     if tried > 1:
@@ -194,27 +194,26 @@ def bottleneck(
 ) -> None:
     """Report which limits cost time.
 
-    For each limit: how much time it costs, and when it is active. A task is planned first; a saved motion is used as it
-    is.
+    The report says how much time each limit costs, and when it is active. A task is planned first; a saved motion is
+    used as it is.
 
     Parameters
     ----------
     task : path
         Task file (YAML), or result file (npz) of a saved motion.
     check : bool, optional
-        Solve again with each limit raised by 1 %, and compare.
+        Solve again with each limit raised by 1 %, and compare the result with the prediction.
     reference : bool, optional
-        Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best known value,
-        not a proven bound, and takes seconds.
+        Compare with a reference: the same problem on a fine mesh, with torque that may jump. The reference is the best
+        known value, not a proven bound. This takes some seconds.
     out : path, optional
-        Folder for bottleneck.json and timeline.png. If the verification fails, the names begin with unverified_.
+        Folder for bottleneck.json and timeline.png. If the verification fails, the file names begin with unverified_.
 
     Examples
     --------
     brachis bottleneck task.yaml --set search.effort=single
     """
     from brachis.search.planned import describe_motion
-    from brachis.search.stages import describe_coordinates
 
     result = None
     with output_folder(out, _BOTTLENECK, (task, urdf)), show_progress() as listener:
@@ -233,8 +232,7 @@ def bottleneck(
             result or trajectory, check=check, reference=reference, listener=listener
         )
     data["bottleneck"] = report.to_dict()
-    redundant = describe_coordinates(trajectory)
-    head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
+    head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {trajectory.redundancy}"
     drawings: dict[str, Drawing] = {
         "timeline.png": lambda: brachis.plots.plot_timeline(trajectory)
     }
@@ -269,14 +267,15 @@ def sweep(
     source : path
         Sweep file (YAML).
     out : path, optional
-        Folder for plans, table.parquet, table.csv and sweep.png. Default: a folder in the current one with the name of
-        the file. An interrupted sweep continues there with the missing plans.
+        Folder for the plans, table.parquet, table.csv and sweep.png. Default: a folder with the name of the sweep file
+        in the current folder. An interrupted sweep continues there with the missing plans.
     jobs : int, optional
         Number of processes. Default and maximum: the number of processors.
     part : str, optional
-        Plan only part i of n, for example 2/8: one job of a cluster's array, all with the same folder.
+        Plan only part i of n, for example 2/8. On a cluster, each job of an array plans one part; all jobs use the same
+        folder.
     merge : bool, optional
-        Plan nothing: put the plans of all parts together in table.parquet and table.csv; an error if any is missing.
+        Plan nothing, but collect the plans of all parts in table.parquet and table.csv. A missing plan is an error.
     retry : bool, optional
         Plan failed plans again.
 
@@ -315,7 +314,7 @@ def sweep(
 
 
 def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
-    """Print the sweep for a person."""
+    """Print the result of a sweep for a person."""
     from brachis.common.summary import show_value
 
     summary = result.summary()

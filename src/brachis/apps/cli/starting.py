@@ -1,4 +1,4 @@
-"""``brachis robots | new | compose``: what a new user begins with."""
+"""``brachis robots | new | compose``: the commands that a new user begins with."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def robots(json: Json = False) -> None:
         page = urdf.with_name("README.md").read_text(encoding="utf-8")
         what = page.splitlines()[0].partition(": ")[
             2
-        ]  # the heading "# name: what it is"
+        ]  # the heading is "# name: what it is"
         joints = list(getattr(included, name).joint_names)
         listed.append({"name": name, "what": what, "joints": joints, "urdf": str(urdf)})
         rows.append((name, what, len(joints), ", ".join(joints)))
@@ -49,7 +49,7 @@ def robots(json: Json = False) -> None:
     print_table("included robots", columns, rows, numbers=("joints",))
     print_lines(
         *(f"{entry['name']}: {entry['urdf']}" for entry in listed),
-        "A name may stand for the URDF: brachis inspect scara3, brachis new scara3",
+        "A name can be used in place of a URDF file: brachis inspect scara3, brachis new scara3",
     )
 
 
@@ -62,15 +62,15 @@ def new(
 ) -> None:
     """Write a first task for a robot, with comments.
 
-    The task starts in a posture away from limits and singularities and follows a short line. It has been planned and
-    verified.
+    The task starts in a posture away from limits and singularities and follows a short line. Before the file is
+    written, the task is planned and verified.
 
     Parameters
     ----------
     urdf : path
         URDF file, or the name of an included robot.
     out : path, optional
-        Task file to write; it must not exist yet.
+        Task file to write. The file must not exist yet.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def new(
             "verified": result.verified,
         },
         f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(joints)}",
-        f"a quick plan of it is verified: the motion lasts {result.t_end:.4f} s; next: brachis plan {out} --out out",
+        f"a quick plan of it was verified: the motion takes {result.t_end:.4f} s; next: brachis plan {out} --out out",
         as_json=json,
     )
 
@@ -133,7 +133,7 @@ def compose(
 ) -> None:
     """Mount an arm on a linear axis, as a new URDF.
 
-    You state all figures of the axis; none is guessed.
+    You state all the data of the axis; nothing is guessed.
 
     Parameters
     ----------
@@ -150,17 +150,17 @@ def compose(
     out : path
         URDF file to write.
     axis : (3,) tuple of float, optional
-        Direction of the rail in the world frame: 0 1 0 or 0,1,0.
+        Direction of the rail in the world frame, written as 0 1 0 or 0,1,0.
     mount_xyz : (3,) tuple of float, optional
         Position of the arm's root link on the carriage, m.
     mount_rpy_deg : (3,) tuple of float, optional
-        Roll, pitch and yaw of this link, degrees; 180 0 0 hangs the arm upside down.
+        Roll, pitch and yaw of the arm's root link on the carriage, degrees. 180 0 0 hangs the arm upside down.
     name : str, optional
         Name of the rail's joint.
     root : str, optional
         Name of the root link, which is the world frame.
     meshes : bool, optional
-        Keep or remove the arm's meshes.
+        Whether the arm's meshes are kept or removed.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A recorded motion beside the motion that is planned along its path, within the same limits."""
+"""Comparison of a recorded motion with the motion planned along the same path within the same limits."""
 
 from brachis.apps.comparison.comparison import (
     Comparison,

@@ -1,4 +1,4 @@
-"""Plan the path of a recorded motion, and show both motions side by side."""
+"""Plan a motion along the path of a recorded one, and compare both motions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 _IMPLAUSIBLE_SPEED = 10.0
-"""Ratio of end times above which a recorded motion is implausibly fast."""
+"""Ratio of planned to recorded end time above which the recorded motion is implausibly fast."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,15 @@ class Use:
     limit : str
         Name of the limit.
     recorded : float
-        Largest ratio that the rows of the recorded motion prove; 1 is the limit. See `RatioBounds`.
+        Largest ratio to the limit that the rows of the recorded motion prove; 1 is the limit. See `RatioBounds`.
     recorded_at : str
         Joint that has this ratio, or the tool.
     recorded_time : float
         Time of this ratio, s.
     recorded_up_to : float
-        Largest ratio of the motion interpolated from the rows. What lies between the rows is not known.
+        Largest ratio of the motion interpolated from the rows. The true motion between the rows is unknown.
     planned : float
-        Largest ratio of the plan.
+        Largest ratio of the planned motion.
     planned_at : str
         Joint that has this ratio, or the tool.
     """
@@ -65,7 +65,7 @@ class Use:
 
     @property
     def recorded_text(self) -> str:
-        """How much the recorded motion uses for certain, and how much it may use."""
+        """How much of the limit the recorded motion uses for certain, and how much it may use."""
         proven = f"{100.0 * self.recorded:.1f} %"
         possible = f"{100.0 * self.recorded_up_to:.1f} %"
         if proven == possible:
@@ -73,7 +73,7 @@ class Use:
         return f"{proven}, between the rows up to {possible}"
 
     def __str__(self) -> str:
-        """How much both motions use, and where."""
+        """Say how much of the limit both motions use, and where."""
         return (
             f"{self.limit}: {self.recorded_text} used by the recorded motion ({self.recorded_at}), "
             f"{100.0 * self.planned:.1f} % in the plan ({self.planned_at})"
@@ -82,18 +82,18 @@ class Use:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Summary):
-    """A recorded motion and the motion planned in its place.
+    """A recorded motion and the motion planned to replace it.
 
     Attributes
     ----------
     recorded : Trajectory
         The recorded motion, with the path recovered from it.
     verification : Verification
-        Of the recorded motion, as interpolated from its rows.
+        Verification of the recorded motion, as interpolated from its rows.
     proven : tuple of RatioBounds
-        What its rows alone prove, limit by limit.
+        Ratios that its rows alone prove, limit by limit.
     result : Result
-        Of the plan along the same path, within the same limits.
+        Result of the plan along the same path, within the same limits.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class Comparison(Summary):
 
     @property
     def saved(self) -> float:
-        """Part of the recorded time that the plan saves; negative if the plan takes longer."""
+        """Fraction of the recorded time that the plan saves; negative if the plan takes longer."""
         return 1.0 - self.result.t_end / self.recorded.t_end
 
     @property
@@ -139,13 +139,13 @@ class Comparison(Summary):
 
     @property
     def exceeded(self) -> tuple[Use, ...]:
-        """Limits that the recorded motion exceeds for certain, beyond the task's tolerance."""
+        """Limits that the recorded motion certainly exceeds by more than the task's tolerance."""
         tolerance = self.recorded.task.refinement.tolerance
         return tuple(use for use in self.uses if use.recorded > 1.0 + tolerance)
 
     @property
     def verdict(self) -> str:
-        """What is gained, in one line."""
+        """The gain in time, in one line."""
         times = f"{self.result.t_end:.4f} s instead of {self.recorded.t_end:.4f} s"
         if not self.result.verified:
             return f"no verified motion was found along the recorded path ({times})"
@@ -154,7 +154,7 @@ class Comparison(Summary):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What has to be known of the recorded motion besides the times."""
+        """Remarks on the recorded motion that matter besides the times."""
         remarks = [
             f"the recorded motion exceeds the {use.limit} limit of {use.recorded_at} by "
             f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove, and "
@@ -164,8 +164,8 @@ class Comparison(Summary):
         speed = self.result.t_end / self.recorded.t_end
         if speed > _IMPLAUSIBLE_SPEED:
             remarks.append(
-                f"the recorded motion is {speed:.0f} times as fast as the plan: its times may have another unit "
-                "than was stated (--time, units)"
+                f"the recorded motion is {speed:.0f} times as fast as the plan: the unit of its times may not "
+                "be the stated one (--time, units)"
             )
         if self.recorded.task.spline.rest != "full":
             remarks.append(
@@ -174,7 +174,7 @@ class Comparison(Summary):
         return tuple(remarks)
 
     def summary(self) -> dict[str, object]:
-        """Return what is shown."""
+        """Return the entries shown to the user."""
         return {
             "verdict": self.verdict,
             "limits used": "; ".join(map(str, self.uses)),
@@ -182,7 +182,7 @@ class Comparison(Summary):
         }
 
     def __str__(self) -> str:
-        """Return all in plain words."""
+        """Return the whole comparison as text."""
         uses = map(str, self.uses)
         return "\n".join([self.verdict, *self.remarks, *uses, *self.recovered.told])
 
@@ -225,17 +225,18 @@ def compare(
 ) -> Comparison:
     """Plan the path of a recorded motion within the same limits, from the same start posture, and compare.
 
-    If the first plan is slower, a finer one is made; then the recorded joint path is timed anew. The fastest verified
-    motion counts.
+    If the first plan is slower than the recorded motion, a finer one is made. If that is slower too, the recorded joint
+    path is given a new timing. The fastest verified motion is used.
 
     Parameters
     ----------
     recorded : path or Trajectory
-        CSV file, or the trajectory that `brachis.import_motion` made of it.
+        CSV file, or the trajectory that `brachis.import_motion` made from it.
     robot, task, task_space, units, tolerance, noise : optional
-        As in `brachis.import_motion`; for files alone.
+        As in `brachis.import_motion`; only allowed for files.
     keep_end : bool, optional
-        Whether the plan also ends in the recorded end posture, not in any posture with the tool there.
+        Whether the plan also ends in the recorded end posture. Otherwise it may end in any posture with the tool at the
+        end of the path.
     listener : callable, optional
         Called with a text about each step.
 
@@ -293,7 +294,7 @@ def compare(
 
 
 def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
-    """Yield tasks of a recorded path, each for the case that those before it gave no faster motion."""
+    """Yield tasks for a recorded path. Each is meant for the case that the previous tasks gave no faster motion."""
     task = recorded.task
     if not keep_end:
         task = task.model_copy(update={"end": "free"})
@@ -306,16 +307,16 @@ def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
     if task.task_space != JOINTS:
         try:
             path = joint_path_of(recorded)
-        except PathError:  # the plans before it count
+        except PathError:  # the previous plans are used
             return
         yield task.model_copy(update={"task_space": JOINTS, "path": path})
 
 
 def plot_both_motions(comparison: Comparison) -> Figure:
-    """Plot path coordinate, tool speed, and the largest ratio to any limit over time, of both motions.
+    """Plot the path coordinate, the tool speed, and the largest ratio to any limit of both motions over time.
 
-    The line of the recorded motion is the ratio that its rows prove; the band above it is the ratio between the rows,
-    of the motion interpolated from them.
+    For the recorded motion, the line is the ratio that its rows prove. The band above it reaches up to the ratio of the
+    motion interpolated from the rows.
 
     Parameters
     ----------

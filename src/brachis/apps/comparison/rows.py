@@ -1,11 +1,12 @@
-"""What the rows of a recorded motion prove of its limits, whatever it does between them.
+"""Ratios to limits that the rows of a recorded motion prove, whatever happens between the rows.
 
-A joint that moves by dq within a period h has a velocity of dq / h at some time of it, and an acceleration equal to the
-second difference over h^2 within two periods, a jerk equal to the third over h^3 within three (mean value theorem of
-divided differences). So a limit on one of these is exceeded for certain where the differences exceed it. A limit on
-another quantity (a torque, the tool's speed) is compared with the quantity's value for these means, at the posture in
-the middle of the periods; changes of posture and velocity within the periods are neglected. What the errors of the rows
-may add to a ratio is subtracted. These errors matter less over more periods, so that several are also taken as one.
+A joint that moves by dq within a period h has the velocity dq / h at some time within it. Within two periods it has an
+acceleration equal to the second difference over h^2, and within three periods a jerk equal to the third difference over
+h^3 (mean value theorem of divided differences). A limit on one of these is therefore certainly exceeded where the
+differences exceed it. A limit on another quantity (a torque, the tool's speed) is compared with its value for these
+means, at the posture in the middle of the periods; changes of posture and velocity within the periods are
+neglected. The amount that errors of the rows may add to a ratio is subtracted. These errors matter less over longer
+periods, so several periods are also combined into one.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from brachis.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False)
 class RatioBounds:
-    """What rows prove of one limit.
+    """Ratios to one limit that the rows prove.
 
     Attributes
     ----------
     limit : str
         Name of the limit.
     subjects : tuple of str
-        Of its c values: joints, or the tool.
+        Subjects of the limit's c values: joints, or the tool.
     t : (K,) ndarray
         Times of the rows, s.
     ratios : (K, c) ndarray
-        Sizes of the ratios that are reached for certain; 0 where nothing is proven.
+        Sizes of the ratios that are certainly reached; 0 where nothing is proven.
     """
 
     limit: str
@@ -50,7 +51,7 @@ class RatioBounds:
 
 
 def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
-    """Compare the rows of an imported motion with every limit of its task."""
+    """Compute the ratios that the rows of an imported motion prove, for every limit of its task."""
     assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
     bounds = []
@@ -70,7 +71,7 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
     one_sided = np.where(np.isfinite(limit.upper), -np.inf, np.inf)
     harmless = np.where(np.isfinite(limit.centre), limit.centre, one_sided)
     is_mean = limit.guarantee.is_mean
-    # Periods that are taken as one. Limits of the tool may change along the path, so only one of them.
+    # Numbers of periods combined into one. Tool limits may change along the path, so for them only one period.
     strides = (1, 2, 4) if limit.role is Role.ROBOT and not is_mean else (1,)
     for stride in strides:
         first = np.arange(max(len(t) - order * stride, 0))[:, None]
@@ -103,9 +104,9 @@ def _differentiate(
     Returns
     -------
     Moments
-        The m-th derivative is m! times the divided difference; higher ones are 0.
+        The m-th derivative is m! times the divided difference; higher derivatives are 0.
     (4, W, n) ndarray
-        The most that the errors of the rows add to q and each derivative.
+        Largest amounts that errors of the rows add to q and to each derivative.
     """
     recovered = trajectory.recovered
     assert recovered is not None

@@ -1,4 +1,4 @@
-"""Composing robots: an arm on a linear axis, as a plain URDF.
+"""Composing robots: mounting an arm on a linear axis, with the result as a plain URDF.
 
 Examples
 --------

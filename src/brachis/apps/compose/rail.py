@@ -1,4 +1,4 @@
-"""An arm on a linear axis: its URDF is kept as XML, so that elements that brachis does not know stay as written."""
+"""An arm on a linear axis. The arm's URDF is handled as XML, so that elements unknown to brachis stay as written."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
 
 def _is_positive(value: np.ndarray) -> np.ndarray:
-    """Tell which values are positive."""
+    """Return which values are positive."""
     return value > 0.0
 
 
@@ -47,14 +47,14 @@ _FIGURES: dict[str, tuple[str, tuple[int, ...], Callable[[np.ndarray], Any]]] = 
     "mount_rpy": ("[roll, pitch, yaw] in rad", (3,), np.isfinite),
     "carriage_size": ("three lengths > 0 m", (3,), _is_positive),
 }
-"""Figures of a rail: what is allowed, the shape, and a test of values, which have to be finite too."""
+"""Data of a rail: the allowed values in words, the shape, and a test of values, which must also be finite."""
 
 
 def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
-    """Name mesh and texture files, which are found from the folder of `source`, relative to the folder of `target`.
+    """Make file names of meshes and textures, given relative to the folder of `source`, relative to that of `target`.
 
-    Without `target` they become absolute. Absolute names stay as they are, and so do packages that ROS finds, or that
-    are nowhere.
+    Without `target` the names become absolute. Names that are already absolute do not change. Neither do names in
+    packages that ROS finds, or that cannot be found.
     """
     old = source.parent.resolve()
     for element in robot.iter("mesh", "texture"):
@@ -76,36 +76,37 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rail:
-    """A linear axis with its carriage. Its figures are never guessed.
+    """A linear axis with its carriage. Its data are never guessed.
 
     Attributes
     ----------
     range : (2,) sequence of float
         Lowest and highest position on the rail, m.
     velocity : float
-        Limit of the rail's speed, m/s.
+        Velocity limit of the rail, m/s.
     force : float
-        Limit of the rail's drive force, N. It accelerates carriage and arm, and carries them on a rail that is not
-        horizontal.
+        Limit of the rail's drive force, N. This force accelerates carriage and arm, and holds them up on a rail that is
+        not horizontal.
     mass : float
-        Mass of the carriage, kg: a solid box.
+        Mass of the carriage, kg, which is a solid box.
     axis : (3,) sequence of float
-        Direction of the rail in the world frame, any length but zero; horizontal, vertical or tilted.
+        Direction of the rail in the world frame, of any length except zero. The rail may be horizontal, vertical or
+        tilted.
     mount_xyz, mount_rpy : (3,) sequence of float
         Placement of the arm's root link on the carriage, m and rad (roll, pitch and yaw about the fixed axes x, y, z
         of the world frame). ``(pi, 0, 0)`` hangs the arm upside down, ``(0, pi / 2, 0)`` mounts it on a wall.
     carriage_size : (3,) sequence of float
-        Sides of the carriage, m, along the axes of the mounted arm's root link, whose origin is the middle of the
-        box's top. For the drawing; the carriage only shifts, so that its inertia never enters the motion.
+        Lengths of the carriage, m, along the axes of the mounted arm's root link, whose origin is the centre of the
+        box's top. They are only drawn: the carriage never turns, so its moments of inertia do not matter.
     name : str
-        Name of the joint, and the beginning of the other new names.
+        Name of the joint, and prefix of the other new names.
     root : str
         Name of the root link.
 
     Raises
     ------
     InputError
-        A figure is out of its range.
+        A value is out of range.
     """
 
     range: Sequence[float]
@@ -120,7 +121,7 @@ class Rail:
     root: str = "world"
 
     def __post_init__(self) -> None:
-        """Check the figures."""
+        """Check the data."""
         for figure, (allowed, shape, test) in _FIGURES.items():
             raw = getattr(self, figure)
             try:
@@ -136,7 +137,7 @@ class Rail:
                     allowed=allowed,
                 )
             if figure == "axis":
-                value /= np.abs(value).max()  # squares of its size may overflow
+                value /= np.abs(value).max()  # squares of large values may overflow
                 value /= np.linalg.norm(value)
             plain = tuple(value.tolist()) if shape else float(value)
             object.__setattr__(self, figure, plain)
@@ -153,7 +154,7 @@ class Rail:
     def mount(
         self, arm: UrdfTree, source: Path, target: Path | None, *, meshes: bool
     ) -> str:
-        """Put the arm, whose XML is changed, on the carriage, and return the URDF's text."""
+        """Mount the arm on the carriage by changing the arm's XML, and return the text of the URDF."""
         root = f"{self.name}_base" if arm.root == self.root else arm.root
         self._check_names(arm, source, root)
         for mention in arm.robot.xpath("//link/@name | //@link | //@reference"):
@@ -170,7 +171,7 @@ class Rail:
         return "\n".join((declaration, COMPOSED, body.removeprefix(f"{COMPOSED}\n")))
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
-        """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""
+        """Raise an error for new names that the arm already uses for links or joints; frames are looked up by name."""
         taken = dict.fromkeys(arm.joints, "joint") | dict.fromkeys(arm.links, "link")
         taken.pop(arm.root)
         new = {
@@ -197,14 +198,16 @@ class Rail:
             )
 
     def _elements(self, arm_root: str) -> list[Element]:
-        """World, rail, carriage and mount."""
+        """Return the XML elements of world, rail, carriage and mount."""
         carriage = f"{self.name}_carriage"
         low, high = self.range
         speed = self.velocity
         x, y, z = self.axis
         width, depth, height = self.carriage_size
         turn = pin.rpy.rpyToMatrix(*self.mount_rpy)
-        down = (turn @ np.array([0.0, 0.0, -1.0])).round(15)  # cos(pi / 2) is not 0
+        down = (turn @ np.array([0.0, 0.0, -1.0])).round(
+            15
+        )  # in floating point cos(pi / 2) is not 0
         middle = np.array(self.mount_xyz) + 0.5 * height * down
         beam = middle + height * down + 0.5 * (low + high) * np.array(self.axis)
         beam_rpy = (0.0, -math.atan2(z, math.hypot(x, y)), math.atan2(y, x))
@@ -212,7 +215,7 @@ class Rail:
         centre = write_origin(middle, self.mount_rpy)
         inertia = pin.Inertia.FromBox(self.mass, *self.carriage_size).inertia
         ixx, iyy, izz = inertia.diagonal()
-        # A name of its own: the arm may have another grey.
+        # The name is new, because the arm may define a different grey.
         grey = f'<material name="{self.name}_grey"><color rgba="0.35 0.38 0.42 1"/></material>'
         new = etree.fromstring(f"""
 <robot>
@@ -253,7 +256,7 @@ class Rail:
 
 
 def robot_text(robot: Element) -> str:
-    """Text of a ``<robot>`` element and of the comments around it, indented."""
+    """Return the indented text of a ``<robot>`` element with the comments around it."""
     etree.cleanup_namespaces(robot)
     etree.indent(robot, "  ")
     tree = robot.getroottree()
@@ -270,9 +273,9 @@ def on_rail(
 ) -> str:
     """Mount an arm on a linear axis and return the URDF of both.
 
-    The chain is: link `rail.root` (the world frame), prismatic joint `rail.name`, link ``<name>_carriage``, fixed joint
-    ``<name>_mount``, and the arm's own root link, below which nothing of the arm changes. An arm's root link that is
-    itself called `rail.root` becomes ``<name>_base``. At rail position p, m, the arm's root link lies at
+    The chain consists of link `rail.root` (the world frame), prismatic joint `rail.name`, link ``<name>_carriage``,
+    fixed joint ``<name>_mount``, and the arm's root link, from which on the arm is unchanged. If the arm's root link is
+    itself called `rail.root`, it is renamed to ``<name>_base``. At rail position p, m, the arm's root link lies at
     ``p * axis + mount_xyz``, turned by `rail.mount_rpy`.
 
     Parameters
@@ -281,11 +284,11 @@ def on_rail(
         URDF of the arm, without xacro macros.
     rail : Rail
     meshes : bool, optional
-        False drops all visuals and collisions of the arm that are meshes.
+        False removes all visuals and collisions of the arm that are meshes.
     output : path, optional
-        File to write; an older one is replaced if this function wrote it. Mesh files are then named relative to its
-        folder; without `output` by absolute names. Those in packages that ROS finds, or that are nowhere, stay as they
-        are.
+        File to write. An older file is replaced if this function wrote it. Names of mesh files are relative to the
+        folder of this file, or absolute without `output`. Names in packages that ROS finds, or that cannot be found, do
+        not change.
 
     Returns
     -------
@@ -295,7 +298,8 @@ def on_rail(
     Raises
     ------
     InputError
-        A name is taken, or `output` cannot be written or would overwrite the arm's URDF or another one.
+        A name is already in use; or `output` cannot be written, or would overwrite the arm's URDF or another URDF that
+        this function did not write.
     UrdfError
         The arm's URDF is missing, broken, not one tree, or has bodies that are not physical.
 
@@ -317,7 +321,7 @@ def on_rail(
             allowed="another file",
         )
     text = rail.mount(arm, source, target, meshes=meshes)
-    # On a moving axis even the inertia of the arm's root link counts, which no joint moved before.
+    # On a moving axis even the inertia of the arm's root link matters, which no joint moved before.
     composed = read_tree(text, str(source))
     carried = read_dynamics(composed, (rail.name,), {}, composed.root)
     check_inertias(composed, carried.bodies, str(source))

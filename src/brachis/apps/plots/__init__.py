@@ -1,7 +1,7 @@
-"""Figures of a trajectory; a plot is one function here and one row of `PLOTS`.
+"""Figures of a trajectory. Each plot is one function in this package and one row of `PLOTS`.
 
-Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
-Matplotlib is imported when the first figure is made.
+Every function returns a new Matplotlib figure. It uses neither pyplot nor Matplotlib's global settings. Matplotlib is
+imported when the first figure is made.
 
 Examples
 --------
@@ -39,7 +39,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
     "limits": plot_limits,
     "fit": plot_fit,
 }
-"""Plots of one trajectory by name; `plot_comparison` compares many, `plot_candidates` draws a search."""
+"""Plots of one trajectory, by name. `plot_comparison` compares many plans, `plot_candidates` draws a search."""
 
 __all__ = [
     "PLOTS",

@@ -1,4 +1,4 @@
-"""End times of plans and of candidates side by side, and how well a path fits its points."""
+"""Plots of the end times of plans and candidates, and of the errors of paths fitted to points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 Case = float | str
-"""What is planned: a number that is varied, or a name."""
+"""What was planned: the value of a varied number, or a name."""
 
 
 def plot_comparison(
@@ -31,24 +31,24 @@ def plot_comparison(
     Parameters
     ----------
     rows : sequence of (case, choice, t_end)
-        What is planned (a direction, a payload, the name of a path, ...), what is chosen for it (redundant joints, a
-        branch, a robot, ...) and the end time in s; NaN marks a plan that was not found. Choices keep the order in
-        which they first appear; cases too, unless all of them are numbers, which are sorted.
+        The case is what was planned (a direction, a payload, the name of a path, ...). The choice is what was chosen
+        for it (redundant joints, a branch, a robot, ...). The end time is in s; NaN means that no plan was found.
+        Choices keep the order in which they first appear. So do cases, unless all of them are numbers, which are
+        sorted.
     xlabel : str, optional
-        What the cases are.
+        Label of the axis of cases.
     unit : str, optional
-        Written behind every case, with a space before it if there is to be one.
+        Text appended to every case, including a leading space if one is wanted.
 
     Returns
     -------
     Figure
-        Two columns wide, with more panels below where there are many cases. The shortest time of every case is printed
-        in bold type.
+        Two columns wide, with several panels if there are many cases. The shortest time of each case is in bold type.
 
     Raises
     ------
     InputError
-        `rows` is empty, a case is not finite, a time is not positive, or a pair of case and choice comes twice.
+        `rows` is empty, a case is not finite, a time is not positive, or a pair of case and choice occurs twice.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def plot_comparison(
 
 
 def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], float]:
-    """Check the rows and key them by case and choice."""
+    """Check the rows, and return the end times by case and choice."""
     check_list(rows, "rows", _ROW)
     if not rows:
         raise InputError("the list of rows is empty", where="rows", allowed=_ROW)
@@ -104,7 +104,7 @@ _ROW = "(case, choice, end time in s); the case is a finite number or a name, th
 
 
 def _is_row(row: object) -> bool:
-    """Tell whether something is a row of the table."""
+    """Return whether something is a valid row."""
     if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 3:
         return False
     case, _, t_end = row
@@ -122,7 +122,7 @@ def _draw_bars(
     choices: Sequence[str],
     cells: Mapping[tuple[Case, str], float],
 ) -> None:
-    """Draw one panel of grouped bars with their values above; pairs without a row leave a gap."""
+    """Draw one panel of grouped bars with their values above them. A pair without a row leaves a gap."""
     width = 0.84 / len(choices)
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
@@ -164,7 +164,7 @@ _MARKS: dict[str, dict[str, Any]] = {
         "marker": "o",
         "facecolors": "none",
         "edgecolors": style.GREY,
-        "label": "not finished; as much longer than its timing as the fastest",
+        "label": "not finished; estimated by the ratio of end time to timing of the fastest",
     },
     "refined": {
         "marker": "s",
@@ -174,7 +174,7 @@ _MARKS: dict[str, dict[str, Any]] = {
     "failed": {
         "marker": "x",
         "color": style.COLOURS[1],
-        "label": "no verified motion (at the right edge without any)",
+        "label": "no verified motion (at the right edge if there was no motion)",
     },
     "fastest": {
         "marker": "*",
@@ -186,29 +186,29 @@ _MARKS: dict[str, dict[str, Any]] = {
 
 
 def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
-    """Plot the end times of candidates, one row for each choice of redundant joints and branch.
+    """Plot the end times of candidates, with one row for each choice of redundant joints and branch.
 
     Parameters
     ----------
     candidates : sequence of Candidate
-        The fastest verified one first, as a `Result` has them.
+        Candidates in the order of a `Result`: the fastest verified one comes first.
 
     Returns
     -------
     Figure
-        Two columns wide; the row of the fastest candidate is the uppermost one. Candidates that were not
-        finished are drawn at the least time along their joint paths, multiplied by what finishing did to that of the
-        fastest one, so that like is compared with like.
+        Two columns wide; the row of the fastest candidate is at the top. An unfinished candidate is drawn at the least
+        time along its joint path, multiplied by the ratio of end time to least time of the fastest candidate. Finished
+        and unfinished candidates are therefore comparable.
 
     Raises
     ------
     InputError
-        `candidates` is empty, or has other entries than candidates.
+        `candidates` is empty, or has entries that are not candidates.
     """
     check_list(candidates, "candidates", "candidates")
     if not candidates or not all(isinstance(entry, Candidate) for entry in candidates):
         raise InputError(
-            "the list of candidates is empty, or has other entries",
+            "the list of candidates is empty, or has entries that are not candidates",
             where="candidates",
             found=f"{candidates!r:.60}",
             allowed="the candidates of a result: result.candidates",
@@ -246,7 +246,7 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
 
 
 def _row(candidate: Candidate) -> str:
-    """Name the choice of redundant joints and the branch."""
+    """Name a candidate's choice of redundant joints and its branch."""
     name = coordinates(candidate.redundant_joints, candidate.branch)
     joints = "no redundant joint" if name == "none" else name
     is_named = candidate.branch not in {"", joints}
@@ -255,7 +255,7 @@ def _row(candidate: Candidate) -> str:
 
 @of_motion
 def plot_fit(trajectory: Trajectory) -> Figure:
-    """Plot the largest distances, and angles where the tool turns, of the points from the path, and the tolerances.
+    """Plot how far the points are from the path fitted to them, in distance and angle, with the tolerances.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide, one part for each file or array that the path was fitted to; dotted lines are corners.
+        One column wide, with one panel for each file or array to which the path was fitted. Dotted lines mark corners.
 
     Raises
     ------
@@ -302,7 +302,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
 def _draw_error(
     ax: Axes, along: np.ndarray, errors: np.ndarray, tolerance: float, colour: int
 ) -> None:
-    """Draw errors of a fit over the path, and their tolerance."""
+    """Draw the errors of a fit along the path, and their tolerance."""
     ax.plot(along, errors, linewidth=0.6, color=style.COLOURS[colour])
     ax.axhline(tolerance, linewidth=0.8, linestyle="--", color=style.COLOURS[colour])
     ax.set_ylim(0.0, 1.15 * tolerance)

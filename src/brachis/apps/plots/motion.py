@@ -1,7 +1,8 @@
-"""Joint quantities, torques, ratios to limits, path coordinate and tool speed over time; and all on one page."""
+"""Plots over time: joint quantities, torques, ratios to limits, path coordinate, tool speed, and an overview."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import GridSpecBase, SubplotSpec
 
 _MOST_TICKS = 100
-"""Knots that are drawn as ticks, no more: hundreds are a grey bar, and take seconds."""
+"""Largest number of knots that are drawn as ticks. Hundreds would merge into a grey bar and take seconds."""
 
 
 @of_motion
@@ -50,8 +51,8 @@ def plot_motion(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion comes near
-        them; the faint ticks are the knots of the splines.
+        One column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion comes close
+        to them. The faint ticks are the knots of the splines.
     """
     rows = ("position", "velocity", "path coordinate", *tool_rows_of(trajectory))
     return _stack(trajectory, panels_of(trajectory, dense_samples(trajectory), *rows))
@@ -59,7 +60,7 @@ def plot_motion(trajectory: Trajectory) -> Figure:
 
 @of_motion
 def plot_torques(trajectory: Trajectory) -> Figure:
-    """Plot the normalised joint torques, and forces, with the band of what is allowed (Fig. 2 of the paper).
+    """Plot the normalised joint torques and forces with the band of allowed values (Fig. 2 of the paper).
 
     Parameters
     ----------
@@ -68,13 +69,13 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Joints without a limit are left out; if no joint has one, the torques themselves are shown,
-        and the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
+        One column wide. Joints without a limit are left out. If no joint has a limit, the torques themselves are shown,
+        with the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
 
     Raises
     ------
     UrdfError
-        The URDF has no masses, so that torques are unknown.
+        The URDF has no masses, so the torques are unknown.
 
     Examples
     --------
@@ -93,20 +94,20 @@ def plot_torques(trajectory: Trajectory) -> Figure:
 def plot_limits(
     trajectory: Trajectory, limits: Sequence[Limit] | None = None
 ) -> Figure:
-    """Plot the ratios to all limits, whatever kinds there are; of positions the places in their ranges.
+    """Plot the ratios to the limits of all kinds. For positions, the ratio is the place in the range.
 
     Parameters
     ----------
     trajectory : Trajectory, Result or path
-        Any one, a saved one for example.
+        Any motion, for example a saved one.
     limits : sequence of Limit, optional
-        Those of the trajectory's task if left out.
+        Limits to compare with. Default: those of the trajectory's task.
 
     Returns
     -------
     Figure
-        One column wide; a panel for every kind, a line for every joint or whatever else it limits. Dashed: the limits.
-        The faint ticks are the knots of the splines.
+        One column wide, with a panel for every kind of limit and a line for every joint or other value that it limits.
+        Dashed lines are the limits. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -121,7 +122,7 @@ def plot_limits(
 
 @of_motion
 def plot_overview(trajectory: Trajectory) -> Figure:
-    """Plot postures, what holds the motion, positions and velocities, progress and tool speed on two columns' width.
+    """Plot postures, active limits, positions, velocities, path coordinate and tool speed, two columns wide.
 
     Parameters
     ----------
@@ -130,9 +131,9 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        What holds the motion are the kinds of limits that are active longest, at most three; torques and forces if
-        they are among these, or no limit is active (accelerations if the URDF has no masses). See `plot_postures`,
-        `plot_torques`, `plot_limits` and `plot_motion` for what the panels show.
+        The panels at the top right show the kinds of limits that are active longest, at most three. If no limit is
+        active, they show torques and forces, or accelerations if the URDF has no masses. The panels are those of
+        `plot_postures`, `plot_torques`, `plot_limits` and `plot_motion`.
     """
     samples = dense_samples(trajectory)
     columns = [
@@ -155,7 +156,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
 def draw_holding(
     figure: Figure, place: SubplotSpec, trajectory: Trajectory, samples: Samples
 ) -> list[Axes]:
-    """Draw the limits that hold the motion, one panel below the other; see `plot_overview`."""
+    """Draw the limits that slow the motion down, one panel below the other; see `plot_overview`."""
     ratios = limit_ratios(trajectory)
     shares = dict.fromkeys(titles_of(ratios), 0.0)
     for entry in saturations(ratios):
@@ -174,14 +175,16 @@ def draw_holding(
     style.mark_end(axes[0], trajectory.t_end)
     if len(axes) > 2:
         for ax in axes:
-            label = ax.get_ylabel().replace(" / ", " /\n")
+            label = ax.get_ylabel()
+            if "$" not in label:
+                label = textwrap.fill(label, 16)
             ax.set_ylabel(label, fontsize=style.LABEL_SIZE)
     figure.align_ylabels(axes)
     return axes
 
 
 def _stack(trajectory: Trajectory, panels: Sequence[Panel]) -> Figure:
-    """Draw panels one below the other, one column wide, with one legend."""
+    """Draw panels one below the other, one column wide, with a common legend."""
     heights = [_height(panel) for panel in panels]
     figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 20.0)
     grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
@@ -192,7 +195,7 @@ def _stack(trajectory: Trajectory, panels: Sequence[Panel]) -> Figure:
 
 
 def _height(panel: Panel) -> float:
-    """Height of a panel, mm: less for few curves."""
+    """Return the height of a panel, mm. A panel with few curves is lower."""
     return 38.0 if len(panel.curves) > 2 else 24.0
 
 
@@ -205,7 +208,7 @@ def draw_panels(
     row: int = 0,
     column: int = 0,
 ) -> list[Axes]:
-    """Draw panels into a column of a grid, from a row on downwards, over one time axis."""
+    """Draw panels into a column of a grid, from `row` downwards, over one time axis."""
     axes = []
     for number, panel in enumerate(panels):
         ax = figure.add_subplot(grid[row + number, column])
@@ -222,7 +225,7 @@ def draw_panels(
 
 
 def _draw_panel(ax: Axes, panel: Panel) -> None:
-    """Draw one line for each curve, and the limits; curves with the same limit share its dashes."""
+    """Draw one line for each curve, and the limits. Curves with the same limit share its dashes."""
     for curve in panel.curves:
         label = style.plain(curve.name) if curve.style != BLACK else None
         ax.plot(panel.t, curve.values, label=label, **style.joint_style(curve.style))
@@ -237,21 +240,21 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
         for place, curve in enumerate(curves):
             look = {**style.joint_style(curve.style), **style.LIMIT}
             look["linestyle"] = style.limit_dashes(place, len(curves))
-            ax.plot(panel.t, limit, **look)
+            ax.plot(panel.t, limit, label="limit", **look)
     if panel.is_ratio:
         ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(ends)
 
 
 def lines_of(axes: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
-    """Collect one line of each subject that the axes show, by its label; joints first, in chain order."""
+    """Collect one line of each subject that the axes show, by its label. Joints come first, in chain order."""
     lines = style.lines_by_label(axes)
     joints = [style.plain(name) for name in trajectory.joint_names]
     return {name: lines[name] for name in (*joints, *lines) if name in lines}
 
 
 def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
-    """Set the labels, with time to the right; and the knots of the splines as faint ticks, unless they would merge."""
+    """Set the labels with time to the right, and mark the splines' knots as faint ticks unless they would merge."""
     style.dress(ax, r"$t$ (s)", ylabel)
     ax.set_xlim(0.0, trajectory.t_end)
     knots = knot_times(trajectory)[1:-1]
@@ -264,21 +267,21 @@ def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
 def plot_timeline(
     trajectory: Trajectory, limits: Sequence[Limit] | None = None
 ) -> Figure:
-    """Plot how near the motion is to each limit over time.
+    """Plot how close the motion is to each limit over time.
 
     Parameters
     ----------
     trajectory : Trajectory, Result or path
-        Any one, a saved one for example.
+        Any motion, for example a saved one.
     limits : sequence of Limit, optional
-        Those of the trajectory's task if left out.
+        Limits to compare with. Default: those of the trajectory's task.
 
     Returns
     -------
     Figure
-        Two columns wide; a row for each value of a limit of which the motion ever uses more than half. The
-        deeper the blue the nearer to the limit; orange where the limit is active, from 99 % of it on, ripple down to
-        95 % included. The faint ticks are the knots of the splines.
+        Two columns wide, with a row for each limited value that ever uses more than half of its limit. Rows that hardly
+        change are left out. A deeper blue is closer to the limit. Orange: the limit is active, from 99 % of it on,
+        including ripple down to 95 %. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -292,13 +295,13 @@ def plot_timeline(
 
     ratios = limit_ratios(trajectory, limits)
     used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
-    entries = [entry for entry in saturations(ratios) if entry.is_half_used]
+    entries = [entry for entry in saturations(ratios) if entry.is_drawn]
     entries.sort(key=lambda entry: ratios.labels.index(entry.label))
     rows = max(len(entries), 1)
     figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * rows)
     ax = figure.add_subplot()
     orange = style.COLOURS[1]
-    thick = 0.84  # of the distance between rows
+    thick = 0.84  # as a fraction of the distance between rows
     for row, entry in enumerate(entries):
         ratio = used[entry.label]
         cells = 0.5 * (ratio[1:] + ratio[:-1])[None]
@@ -324,12 +327,17 @@ def plot_timeline(
     )
     ax.tick_params(axis="y", length=0.0)
     if not entries:
-        style.write(ax, 0.5, 0.5, "no limit is used by 50 % or more", ha="center")
+        style.write(
+            ax,
+            0.5,
+            0.5,
+            "no limit is more than half used, except by constant ratios",
+            ha="center",
+        )
     blue = ScalarMappable(Normalize(0.0, 1.0), "Blues")
     bar = figure.colorbar(blue, ax=ax, pad=0.01, fraction=0.03)
-    style.dress(bar.ax, "", "part of the limit")
-    words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"
+    style.dress(bar.ax, "", "fraction of the limit")
+    words = f"active: at {100.0 * THRESHOLD:g} % of the limit or more, including ripple down to {100.0 * RIPPLE:g} %"
     style.legend_above(ax, style.PAGE_WIDTH - 20.0, {words: Patch(facecolor=orange)})
-    end = style.end_text(trajectory.t_end)
-    style.write(ax, 1.0, 1.02, end, ha="right", va="bottom")
+    ax.set_xlabel(f"{ax.get_xlabel()}, {style.end_text(trajectory.t_end)}")
     return figure

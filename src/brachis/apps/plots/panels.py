@@ -1,6 +1,6 @@
-"""The panels that plots, report and viewer draw of a motion: what each shows over time, in which unit, with its limits.
+"""The panels that plots, report and viewer draw of a motion: quantities over time, with their units and limits.
 
-A new panel is one row of `PANELS`, and a function if its values are not among the samples.
+A new panel needs one row of `PANELS`, and a function if its values are not among the samples.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
 
 MOST_CURVES = 10
-"""Curves of a panel of ratios, no more."""
+"""Largest number of curves in a panel of ratios."""
 BLACK = 48
-"""Style of curves of the whole arm: a number that gives a solid black line in all figures."""
+"""Style number of curves that belong to the whole arm. It gives a solid black line in all figures."""
 
 CurveBound = np.ndarray | float
-"""A limit over time, (K,), or at all times."""
+"""A limit over time, (K,), or a constant one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +33,15 @@ class PanelCurve:
     Attributes
     ----------
     name : str
-        Of a joint, ``tool``, ...
+        Name of a joint, ``tool``, ...
     style : int
-        Number of its colour and dashes: the index of the joint, or `BLACK`.
+        Number of the colour and dashes: the index of the joint, or `BLACK`.
     values : (K,) ndarray
     lower, upper : float or (K,) ndarray
-        Limits; infinite without one.
+        Limits; infinite if there is none.
     is_range : bool
-        Whether the limits are the ends of a range, whose middle uses nothing of them; otherwise zero does.
+        Whether the limits are the ends of a range. The ratio is then 0 in the middle of the range; otherwise it is 0
+        at zero.
     """
 
     name: str
@@ -52,12 +53,12 @@ class PanelCurve:
 
     @property
     def is_limited(self) -> bool:
-        """Whether it has limits in both directions at all times."""
+        """Whether the curve has limits in both directions at all times."""
         return bool(np.all(np.isfinite(self.upper - self.lower)))
 
     @property
     def ratios(self) -> np.ndarray:
-        """Values over the limits of their directions, both from the centre, (K,); of a curve that has both."""
+        """Ratios of the values to the limit in their direction, measured from the centre, (K,). Needs both limits."""
         centre = 0.5 * self.lower + 0.5 * self.upper if self.is_range else 0.0
         away = self.values - centre
         return away / np.where(away > 0.0, self.upper - centre, centre - self.lower)
@@ -70,21 +71,21 @@ class Panel:
     Attributes
     ----------
     title : str
-        In words: ``position``, ``torque``, ``torque / limit``, ...
+        Title in words: ``position``, ``torque``, ``torque / limit``, ...
     symbol : str
-        The title in Matplotlib's mathematics.
+        The title in Matplotlib's mathematical notation.
     unit : str
-        Of the values; empty if they are dimensionless.
+        Unit of the values; empty if they are dimensionless.
     t : (K,) ndarray
-        s.
+        Times, s.
     curves : tuple of PanelCurve
         Joints in chain order.
     ratio_title : str
-        Title of the values over their limits.
+        Title for the ratios of the values to their limits.
     is_ratio : bool
-        Whether the values are over their limits already.
+        Whether the values are such ratios already.
     ends : (float or None, float or None)
-        Ends of the axis; None if they follow from the values.
+        Ends of the vertical axis; None for an end that follows from the values.
     """
 
     title: str
@@ -98,26 +99,26 @@ class Panel:
 
     @property
     def heading(self) -> str:
-        """Title with the unit."""
+        """The title with the unit."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     @property
     def label(self) -> str:
-        """Symbol with the unit."""
+        """The symbol with the unit."""
         return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
 
     @property
     def values(self) -> np.ndarray:
-        """Values of all curves, (K, c)."""
+        """The values of all curves, (K, c)."""
         return np.column_stack([curve.values for curve in self.curves])
 
     def near_limits(self) -> list[tuple[np.ndarray, list[PanelCurve]]]:
-        """List the limits that are drawn: all of ratios, others if the motion comes within 30 % of its own range.
+        """List the limits to draw: for ratios all, otherwise those within 30 % of the motion's own range from it.
 
         Returns
         -------
         list of ((K,) ndarray, list of PanelCurve)
-            The limit over time, NaN where it is far away, and the curves that share it.
+            The limit over time, which is NaN where it is far away, and the curves that share it.
         """
         reach = 0.3 * max(np.ptp(self.values), 1e-9)
         drawn: dict[bytes, tuple[np.ndarray, list[PanelCurve]]] = {}
@@ -133,7 +134,7 @@ class Panel:
         return list(drawn.values())
 
     def view(self) -> tuple[float, float]:
-        """Return the ends of the axis: `ends`, or those of the values and of the limits near them."""
+        """Return the ends of the axis: `ends`, or those of the values and the limits close to them."""
         limits = [line for line, _ in self.near_limits()]
         shown = np.column_stack([self.values, *limits])
         low = float(np.nanmin(shown))
@@ -153,23 +154,24 @@ class PanelRow:
     Attributes
     ----------
     values : callable
-        Of trajectory and samples: (K, n) for the joints, or (K,).
+        Function of trajectory and samples that returns (K, n) values for joints, otherwise (K,).
     symbol : str
-        In Matplotlib's mathematics.
+        Symbol in Matplotlib's mathematical notation.
     prismatic : tuple of str
-        Title and symbol for prismatic joints if they differ.
+        Title and symbol for prismatic joints, if they differ.
     is_range : bool
         See `PanelCurve`.
     needs_masses : bool
-        Whether the values are known only if the URDF has masses.
+        Whether the values need the masses of the URDF.
     only_if_limited : bool
-        Whether the row is of interest only if the robot limits it.
+        Whether the row is shown only if the robot limits this quantity.
     unit : str or None
-        Unit of the values; None for joints, which have their own.
+        Unit of the values; None for joints, whose units differ.
     bounds : callable or None
-        Of trajectory and samples: the smallest and the largest values that the task allows, each a number or (K,).
+        Function of trajectory and samples that returns the smallest and the largest value that the task allows, each a
+        number or (K,).
     name : str
-        Name of the curve, where there is one.
+        Name of the curve, if the row has only one.
     ends : (float or None, float or None)
         See `Panel`.
     """
@@ -189,7 +191,7 @@ class PanelRow:
 def _bound_tool_speed(
     trajectory: Trajectory, samples: Samples
 ) -> tuple[CurveBound, CurveBound]:
-    """Return no lower bound, and the largest speed of the tool that the task allows, (K,), m/s."""
+    """Return minus infinity, and the largest tool speed that the task allows, (K,), m/s."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
     largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
     return -np.inf, largest
@@ -236,11 +238,11 @@ PANELS = {
         name="closest pair",
     ),
 }
-"""All panels by their titles. Rows without a unit are of joints; their keys are the names of the robot's limits."""
+"""All panels by title. Rows without a unit belong to joints; their keys are the names of the robot's limits."""
 
 
 def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
-    """Return the rows of joints that are of interest for a motion."""
+    """Return the titles of the joint rows that are shown for a motion."""
     return tuple(
         name
         for name, row in PANELS.items()
@@ -254,7 +256,7 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
 
 
 def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
-    """Return the rows of the tool, and of the clearance where the task looks at it."""
+    """Return the titles of the tool rows, with the clearance if the task checks collisions."""
     scene = scene_of(trajectory.robot, trajectory.task)
     has_pairs = scene is not None and len(scene.pairs) > 0
     return ("tool speed", "clearance") if has_pairs else ("tool speed",)
@@ -263,22 +265,22 @@ def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
 def panels_of(
     trajectory: Trajectory, samples: Samples, *names: str, degrees: bool = False
 ) -> list[Panel]:
-    """Make panels; joints in rad and joints in m have panels of their own.
+    """Make panels. Joints in rad and joints in m have separate panels.
 
     Parameters
     ----------
     trajectory : Trajectory
     samples : Samples
-        Of the trajectory.
+        Samples of the trajectory.
     *names : str
-        Some of `PANELS`.
+        Titles from `PANELS`.
     degrees : bool, optional
         Whether angles are in degrees.
 
     Returns
     -------
     list of Panel
-        One or two of each row, revolute joints first; none of torques without masses.
+        One or two for each row, with revolute joints first. Torques have none if there are no masses.
     """
     panels = []
     for name in names:
@@ -300,7 +302,7 @@ def panels_of(
 def _joint_panels(
     trajectory: Trajectory, samples: Samples, name: str, *, degrees: bool
 ) -> list[Panel]:
-    """Make the panels of a row of joints, one for each unit."""
+    """Make the panels of a joint row, one for each unit."""
     row = PANELS[name]
     robot = trajectory.robot
     lower, upper = robot.limits.both_ways(name)
@@ -326,7 +328,7 @@ def _joint_panels(
 
 
 def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, PanelCurve]]:
-    """List the curves of a joint with their panels."""
+    """List the curves of one joint, each with its panel."""
     return [
         (panel, curve)
         for panel in panels
@@ -338,18 +340,18 @@ def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, PanelCurv
 def ratio_panel(
     trajectory: Trajectory, ratios: LimitRatios, *titles: str, symbol: str = ""
 ) -> Panel:
-    """Make a panel of the ratios to some kinds of limits; a subject has the same style in all such panels.
+    """Make a panel of the ratios to some kinds of limits. A subject has the same style in all such panels.
 
-    Of many, such as pairs of bodies, those are shown that come nearest to their limits.
+    If there are many subjects, such as pairs of bodies, those that come closest to their limits are shown.
 
     Parameters
     ----------
     trajectory : Trajectory
     ratios : LimitRatios
     *titles : str
-        Of the labels' axes: which kinds.
+        Kinds of limits, by the axis titles of their labels.
     symbol : str, optional
-        Title in Matplotlib's mathematics if it is not in words.
+        Title in Matplotlib's mathematical notation, if it is not in words.
     """
     subjects = [label.subject for label in ratios.labels]
     order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
@@ -377,7 +379,7 @@ def ratio_panel(
 
 
 def at_distinct_times(ratios: LimitRatios) -> LimitRatios:
-    """Leave out the values before jumps, whose times occur twice."""
+    """Leave out the values just before jumps, so that no time occurs twice."""
     is_last = np.append(np.diff(ratios.t) > 0.0, True)
     return replace(ratios, t=ratios.t[is_last], values=ratios.values[is_last])
 
@@ -385,9 +387,9 @@ def at_distinct_times(ratios: LimitRatios) -> LimitRatios:
 def torque_panels(
     trajectory: Trajectory, samples: Samples, ratios: LimitRatios
 ) -> list[Panel]:
-    """Show torques and forces over their limits in one panel; by units in one or two if no joint has a limit.
+    """Make one panel of the ratios of torques and forces to their limits.
 
-    Without masses the list is empty.
+    If no joint has a limit, the panels show the torques and forces themselves. Without masses the list is empty.
     """
     panels = panels_of(trajectory, samples, "torque")
     titles = titles_of(ratios)
@@ -401,5 +403,5 @@ def torque_panels(
 
 
 def titles_of(ratios: LimitRatios) -> list[str]:
-    """List the titles of the kinds of limits."""
+    """List the axis titles of all kinds of limits."""
     return list(dict.fromkeys(label.axis for label in ratios.labels))

@@ -1,4 +1,4 @@
-"""Postures of the robot along the path, as stick figures by forward kinematics."""
+"""Postures of the robot along the path, drawn as stick figures by forward kinematics."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 
 
 def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Postures `q`, (K, n), as polylines in the world frame, (K, 2 n + 2, 3), m.
+    """Return postures `q`, (K, n), as polylines in the world frame, (K, 2 n + 2, 3), m.
 
-    They go through the base, every joint before and after its motion (one point if it is revolute) and the tool.
+    A polyline goes through the base, through every joint before and after its motion (the same point if the joint is
+    revolute), and to the tool.
     """
     model = robot.model
     base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
@@ -40,17 +41,17 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def drawing_plane(robot: Robot, axes: Sequence[int]) -> tuple[int, int] | None:
-    """World axes (0, 1, 2) of the plane in which a planar chain moves; None for other chains.
+    """Return the world axes (0, 1, 2) of the plane in which a planar chain moves; None for other chains.
 
     Parameters
     ----------
     robot : Robot
     axes : sequence of int
-        World axes of the task space's position rows. Two of them fix the plane; one leaves a choice.
+        World axes of the task space's position rows. Two axes determine the plane; a single one leaves a choice.
     """
     chain = robot.chain
     sizes = np.abs(chain.axes)
-    # How far a joint turns about another direction than a world axis, or slides along it.
+    # How far a joint's direction of motion is from that of a planar chain, for each normal.
     tilts = np.where(chain.revolute[:, None], 1.0 - sizes, sizes)
     is_normal = np.all(tilts < tolerances.LENGTH, axis=0)
     for normal in (2, 1, 0):
@@ -63,7 +64,7 @@ def drawing_plane(robot: Robot, axes: Sequence[int]) -> tuple[int, int] | None:
 _SHADES = [
     tuple(shade) for shade in np.linspace([0.72, 0.83, 0.91], [0.03, 0.23, 0.39], 7)
 ]
-"""Colours of the postures, from the first to the last."""
+"""Colours of the postures, from the first posture to the last."""
 _PATH: dict[str, Any] = {"color": style.COLOURS[1], "linewidth": 1.4}
 _JOINT: dict[str, Any] = {"linestyle": "", "markersize": 4.5}
 _REDUNDANT = style.COLOURS[4]
@@ -72,12 +73,12 @@ _VIEWS = tuple(
         (15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)
     )
 )
-"""Elevations and azimuths from which axes in space may be seen, degrees."""
+"""Elevations and azimuths among which the view of axes in space is chosen, degrees."""
 
 
 @of_motion
 def plot_postures(trajectory: Trajectory) -> Figure:
-    """Plot the robot as a stick figure at equidistant times, and the path of its tool (Fig. 1 of the paper).
+    """Plot the robot as a stick figure at equidistant times, with the path of its tool (Fig. 1 of the paper).
 
     Parameters
     ----------
@@ -86,8 +87,8 @@ def plot_postures(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide, equal scales. A planar chain is projected onto its plane; any other is drawn in space.
-        Later postures are darker. Squares are prismatic joints, filled markers redundant ones.
+        One column wide, with equal scales. A planar chain is projected onto its plane; any other chain is drawn in
+        space. Later postures are darker. Squares are prismatic joints, and filled markers are redundant joints.
     """
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
     place = figure.add_gridspec()[0]
@@ -99,7 +100,7 @@ def plot_postures(trajectory: Trajectory) -> Figure:
 def draw_postures(
     figure: Figure, trajectory: Trajectory, samples: Samples, place: SubplotSpec
 ) -> Axes:
-    """Draw tool path and postures into new axes that suit the robot: in its plane, or in space."""
+    """Draw tool path and postures into new axes, which show the robot's plane or space."""
     plane = plane_of(trajectory)
     in_space = {} if plane else {"projection": "3d", "computed_zorder": False}
     ax: Any = figure.add_subplot(place, **in_space)
@@ -146,15 +147,15 @@ def draw_postures(
 
 
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
-    """World axes of the plane in which a motion is drawn; None if it is drawn in space."""
+    """Return the world axes of the plane in which a motion is drawn; None if it is drawn in space."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     return drawing_plane(trajectory.robot, task_map.axes)
 
 
 def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
-    """Labels, equal scales and a floor of axes in space, seen from where points, (p, 3), fill the frame best.
+    """Set labels, equal scales and a floor for axes in space, seen from where points, (p, 3), fill the frame best.
 
-    The tool's path, (K, 3), has its shadow on the floor.
+    The tool's path, (K, 3), casts a shadow on the floor.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -171,14 +172,14 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     ax.set_box_aspect(spans)
 
     def look_from(elevation: float, azimuth: float) -> tuple[float, float]:
-        """Turn the axes; return how much of the frame points take if the box fits into it, and what the box takes."""
+        """Turn the axes; return the fraction of the frame that the points fill, and the extent of the box."""
         ax.view_init(elevation, azimuth)
         extent = _spans(ax, corners).max()
         return np.prod(_spans(ax, points)) / extent**2, extent
 
     best = max(_VIEWS, key=lambda view: look_from(*view)[0])
     _, extent = look_from(*best)
-    ax.set_box_aspect(spans, zoom=0.78 / extent)  # labels take the rest of the frame
+    ax.set_box_aspect(spans, zoom=0.78 / extent)  # labels fill the rest of the frame
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
@@ -187,7 +188,7 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
 
 
 def _draw_floor(ax: Any, z: float) -> None:
-    """Draw a grid of the ticks on the floor, up to the edges of the axes."""
+    """Draw a grid at the ticks on the floor, up to the edges of the axes."""
     x = ax.get_xlim()
     y = ax.get_ylim()
     grid = np.meshgrid(
@@ -200,7 +201,7 @@ def _draw_floor(ax: Any, z: float) -> None:
 
 
 def _spans(ax: Any, points: np.ndarray) -> np.ndarray:
-    """Parts of the frame's width and height that points in space, (p, 3), take."""
+    """Return the fractions of the frame's width and height that points in space, (p, 3), cover."""
     from mpl_toolkits.mplot3d import proj3d
 
     across, up, _ = proj3d.proj_transform(*points.T, ax.get_proj())

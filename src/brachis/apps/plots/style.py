@@ -1,6 +1,6 @@
-"""What all figures share: sizes, fonts, colours, axes, legends, files, notebooks.
+"""Settings and functions that all figures share: sizes, fonts, colours, axes, legends, files, notebooks.
 
-Everything is set on the figure at hand; Matplotlib's own settings are left alone.
+Everything is set on the individual figure. Matplotlib's global settings are not changed.
 """
 
 from __future__ import annotations
@@ -30,25 +30,26 @@ _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
 }
 SUFFIXES = tuple(_METADATA)
-"""Formats of `save_figure`."""
+"""File formats of `save_figure`."""
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as png (300 dpi), pdf or svg, by the suffix of `path`.
+    """Write a figure as png (300 dpi), pdf or svg, depending on the suffix of `path`.
 
-    Fonts are embedded in pdf as TrueType, which publishers ask for, and text stays text in svg. The same figure gives
-    the same file.
+    Fonts are embedded in pdf files as TrueType, as publishers require, and text remains text in svg files. The same
+    figure always gives the same file.
 
     Parameters
     ----------
     figure : Figure
     path : path
-        File to write. An older figure of this format is replaced, and kept if writing fails.
+        File to write. An older figure of this format is replaced; if writing fails, it is kept.
 
     Raises
     ------
     InputError
-        The suffix is not one of `SUFFIXES`, or the file cannot be written or is not such a figure.
+        The suffix is not one of `SUFFIXES`, the file cannot be written, or an existing file is not a figure of this
+        format.
     """
     import matplotlib as mpl
 
@@ -58,14 +59,14 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
         "svg.fonttype": "none",
         "svg.hashsalt": "brachis",
     }
-    # These three have no other way in; the context puts them back.
+    # These three can only be set globally; the context restores them.
     beginning = BEGINNINGS[f".{suffix}"]
     with mpl.rc_context(fonts), atomic_write(path, beginning) as stream:
         figure.savefig(stream, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
 
 
 def check_suffix(path: str | os.PathLike[str]) -> str:
-    """Return the format that the suffix of `path` asks for.
+    """Return the file format that the suffix of `path` stands for.
 
     Raises
     ------
@@ -75,7 +76,7 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
     suffix = file_name(path, "path").suffix.lower().removeprefix(".")
     if suffix not in SUFFIXES:
         raise InputError(
-            "the suffix of the figure is not that of a known format",
+            "the suffix of the figure does not belong to a known format",
             where=str(path),
             found=f"suffix .{suffix}" if suffix else "no suffix",
             allowed=", ".join(f".{name}" for name in SUFFIXES),
@@ -85,7 +86,7 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
 
 @cache
 def figure_class() -> type[Figure]:
-    """Return a class of Matplotlib's figures that notebooks show without further ado.
+    """Return a subclass of Matplotlib's figures that notebooks display.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def figure_class() -> type[Figure]:
         raise NotInstalledError("a figure", "Matplotlib", "plots") from None
 
     class NotebookFigure(Figure):
-        """A figure that a notebook shows."""
+        """A figure that a notebook displays."""
 
         def _repr_png_(self) -> bytes:
             return _png(self)
@@ -107,7 +108,7 @@ def figure_class() -> type[Figure]:
 
 
 def as_html(figure: Figure) -> str:
-    """Return an image element with the figure in it."""
+    """Return an HTML image element that contains the figure."""
     data = base64.b64encode(_png(figure)).decode()
     return f'<img alt="figure" style="min-width:0;max-width:100%;height:auto" src="data:image/png;base64,{data}"/>'
 
@@ -119,18 +120,18 @@ def _png(figure: Figure) -> bytes:
 
 
 COLUMN_WIDTH = 89.0
-"""One column of a journal, mm."""
+"""Width of one column of a journal, mm."""
 PAGE_WIDTH = 183.0
-"""Two columns, mm."""
+"""Width of two columns of a journal, mm."""
 LABEL_SIZE = 8.0
 """Font size of axis labels, points."""
 TICK_SIZE = 7.0
 """Font size of all other text, points."""
 LINE_WIDTH = 1.2
-"""Width of the lines of data, points."""
+"""Width of data lines, points."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's colours, which colour-blind readers can distinguish; without yellow, which is too faint on white."""
+"""Okabe and Ito's colours, which colour-blind readers can distinguish. Yellow, too faint on white, is left out."""
 DASHES: tuple[tuple[float, ...], ...] = (
     (),
     (6.0, 1.6),
@@ -139,22 +140,22 @@ DASHES: tuple[tuple[float, ...], ...] = (
     (2.6, 1.2),
     (6.0, 1.3, 1.2, 1.3, 1.2, 1.3),
 )
-"""Dashes that differ in print without colours; one fewer than colours, so that joints of long chains differ."""
+"""Dashes that differ in print without colours; one fewer than colours, so that the joints of long chains differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
-"""Hatchings of bars that differ in print without colours."""
+"""Hatchings of bars, which differ in print without colours."""
 LIMIT: dict[str, Any] = {
     "linewidth": 0.7,
     "linestyle": (0, (4.0, 2.0)),
     "zorder": 1.0,
     "gid": "limit",
 }
-"""Line properties of limits."""
+"""Line properties of limits in all figures."""
 GREY = "#666666"
 FAINT = "#CFCFCF"
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Make an empty figure of `width` times `height`, mm, that no global state knows of."""
+    """Make an empty figure of `width` times `height`, mm, without changing any global state."""
     size = (width / 25.4, height / 25.4)
     figure = figure_class()(figsize=size, layout="constrained", facecolor="white")
     figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.04)  # type: ignore[union-attr,call-arg]
@@ -162,7 +163,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def joint_style(joint: int) -> dict[str, Any]:
-    """Line properties of the joint with this index: a colour and, for print in greys, a line style."""
+    """Return the line properties of the joint with this index: a colour and, for greyscale print, a line style."""
     return {
         "color": COLOURS[joint % len(COLOURS)],
         "linestyle": (0.0, DASHES[joint % len(DASHES)]),
@@ -171,13 +172,13 @@ def joint_style(joint: int) -> dict[str, Any]:
 
 
 def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
-    """Line style of a limit that some joints share: the dashes of each lie in the gaps of the others."""
+    """Return the line style of a limit that several joints share: each draws its dashes in the gaps of the others."""
     period = 6.0 * sharing
     return (period - 6.0 * place) % period, (4.0, period - 4.0)
 
 
 def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
-    """Set labels, fonts and spines of one pair of axes."""
+    """Set the labels, fonts and spines of one pair of axes."""
     ax.set_xlabel(xlabel, fontsize=LABEL_SIZE)
     ax.set_ylabel(ylabel, fontsize=LABEL_SIZE)
     ax.tick_params(
@@ -189,7 +190,7 @@ def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
 
 
 def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> None:
-    """Draw a line where phases meet; with `labels`, write what they are, if there is room."""
+    """Draw a line where phases meet. With `labels`, also write the kind of each phase if there is room."""
     for phase in phases[:-1]:
         ax.axvline(phase.end, color=GREY, linewidth=0.6, linestyle=":", zorder=0.6)
     if not labels or len(phases) == 1:
@@ -204,18 +205,18 @@ def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> Non
 
 
 def write(ax: Axes, x: float, y: float, text: str, **look: Any) -> None:
-    """Write text at parts of the axes' width and height."""
+    """Write text at x and y, given as fractions of the axes' width and height."""
     look = {"va": "center", "fontsize": TICK_SIZE, **look}
     ax.text(x, y, text, transform=ax.transAxes, **look)
 
 
 def end_text(t_end: float) -> str:
-    """Return the end time, s, as it is written into figures."""
+    """Return the text with the end time, s, for figures."""
     return rf"$t_\mathrm{{E}} = {t_end:.3f}$ s"
 
 
 def mark_end(ax: Axes, t_end: float) -> None:
-    """Write the end time outside the right edge."""
+    """Write the end time next to the right edge of the axes."""
     write(ax, 1.02, 0.5, end_text(t_end), rotation=90.0)
 
 
@@ -228,9 +229,9 @@ def legend_above(
     ----------
     ax : Axes
     width : float
-        Room, mm.
+        Available width, mm.
     lines : mapping of str to Artist, optional
-        What the legend shows; by default the labelled artists of the axes.
+        Entries of the legend. Default: the labelled artists of the axes.
     """
     lines = lines_by_label([ax]) if lines is None else lines
     if lines:
@@ -246,14 +247,14 @@ def legend_above(
 
 
 def legend_below(figure: Figure, lines: Mapping[str, Artist]) -> None:
-    """Put one legend for all axes at the foot of a figure of two columns' width."""
+    """Put one legend for all axes below a figure that is two columns wide."""
     _add_legend(figure, PAGE_WIDTH - 10.0, lines, loc="outside lower center")
 
 
 def _add_legend(
     place: Axes | Figure, width: float, lines: Mapping[str, Artist], **look: Any
 ) -> None:
-    """Add a legend with as many columns as fit into `width`, mm; Matplotlib fills column by column."""
+    """Add a legend with as many columns as fit into `width`, mm. Matplotlib fills it column by column."""
     labels = list(lines)
     columns = len(labels)
     while columns > 1:
@@ -274,7 +275,7 @@ def _add_legend(
 
 
 def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
-    """Artists of some axes by their labels."""
+    """Return the labelled artists of some axes, by label."""
     return {
         label: line
         for ax in panels
@@ -283,5 +284,5 @@ def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
 
 
 def plain(name: str) -> str:
-    """Keep Matplotlib from reading a joint's name as mathematics."""
+    """Escape a joint's name, so that Matplotlib does not read it as mathematics."""
     return name.replace("$", r"\$")

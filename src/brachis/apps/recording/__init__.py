@@ -1,4 +1,4 @@
-"""Recorded motions: from files of joint positions over time to trajectories."""
+"""Recorded motions: reading files of joint positions over time, and turning them into trajectories."""
 
 from brachis.apps.recording.importing import import_motion, joint_path_of
 from brachis.apps.recording.recording import Recording, read_recording

@@ -1,7 +1,8 @@
-"""From a file of joint positions over time to a trajectory like those that are planned.
+"""Import of a file of joint positions over time as a trajectory, like a planned one.
 
-The path that a motion follows is found by forward kinematics: dense samples, and a smooth curve within a tolerance. The
-path coordinate over time is a B-spline that does not decrease. Where the motion waits, the path stops and may turn off.
+Forward kinematics gives dense samples of the tool's path, and a smooth curve is fitted to them within a tolerance. The
+path coordinate over time is a B-spline that does not decrease. Where the motion waits, the path stops and may have a
+corner.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ from brachis.trajectory import PhaseSpline, Recovered, Trajectory, join_splines
 from brachis.trajectory.recovered import LARGEST, check_tolerance
 
 _SURE = 3.0
-"""Largest deviation of measured positions, in standard deviations."""
+"""Assumed largest deviation of measured positions, in standard deviations."""
 
 
 @check_keywords
@@ -64,32 +65,32 @@ def import_motion(
     tolerance: float | None = None,
     noise: float | Sequence[float] | None = None,
 ) -> Trajectory:
-    """Make a trajectory of a recorded motion, to verify, draw, compare and export it.
+    """Turn a recorded motion into a trajectory that can be verified, drawn, compared and exported.
 
-    If the file has no velocities and accelerations, they are those of polynomials through its positions. The path of
-    the tool follows by forward kinematics, as a smooth curve within a tolerance. What was found out, and what is not
-    known, is in ``trajectory.recovered.told``.
+    If the file has no velocities and accelerations, they come from polynomials through its positions. The tool's path
+    follows from forward kinematics, as a smooth curve within a tolerance. ``trajectory.recovered.told`` says what was
+    found in the file and what is unknown.
 
     Parameters
     ----------
     path : path
-        CSV file whose first line names its columns: time (``t``, ``time_ms``, ...), the joints' positions (``j1``,
-        ``q_j1``, ``j1_pos [deg]``, ...) and, if known, velocities (``qd_j1``, ``j1_vel``, ...). Other columns are
-        left out.
+        CSV file whose first line names its columns: time (``t``, ``time_ms``, ...), joint positions (``j1``, ``q_j1``,
+        ``j1_pos [deg]``, ...) and, if known, velocities (``qd_j1``, ``j1_vel``, ...). Other columns are ignored.
     robot : path, Robot or Task, optional
-        URDF file, name of a robot, or robot; or a task file, as if it were `task`. Needed unless the task names one.
+        URDF file, name of a robot, or robot; or a task file, which is then used as `task`. Required unless the task
+        names a robot.
     task : path, mapping or Task, optional
-        A task whose robot, limits and settings are used; its start and path do not count.
+        Task whose robot, limits and settings are used. Its start and path are ignored.
     task_space : str or sequence of str, optional
-        Task space of the path: rows, ``pose``, ``pose_free_roll``, ``joints``. The task's unless given; without a task
-        the most that the robot can prescribe.
+        Task space of the path: rows, ``pose``, ``pose_free_roll`` or ``joints``. Default: that of the task; without a
+        task, the largest task space that the robot allows.
     units : mapping, optional
-        ``{"angle": "deg", "length": "mm", "time": "ms"}`` for columns whose header states none; rad, m and s otherwise.
+        ``{"angle": "deg", "length": "mm", "time": "ms"}`` for columns whose header states no unit. Default: rad, m, s.
     tolerance : float, optional
-        Of the path, m and rad. 1e-6 unless given, or more if the file's last digits or the noise are coarser.
+        Tolerance of the path, m and rad. Default: 1e-6, or more if the file's last digits or the noise are coarser.
     noise : float or (n,) array_like, optional
-        Standard deviation of measured positions, rad or m, which are then smoothed; that of rounding to the file's
-        digits unless given.
+        Standard deviation of measured positions, rad or m. The positions are smoothed accordingly. Default: the
+        standard deviation of rounding to the file's digits.
 
     Returns
     -------
@@ -98,11 +99,11 @@ def import_motion(
     Raises
     ------
     TaskError
-        The file is not understood; the message names line and column.
+        The file cannot be read; the message names the line and the column.
     PathError
         The tool follows no smooth path within the tolerance.
     InputError
-        Robot, task or task space are wrong.
+        Robot, task or task space is not valid.
 
     Examples
     --------
@@ -178,7 +179,7 @@ def import_motion(
 
 
 def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | None]:
-    """Return the robot with the settings of the task, and the task, which may stand in the robot's place."""
+    """Return the robot with the settings of the task, and the task, which may be passed as `robot`."""
     if task is None and robot is not None and not is_robot(robot):
         task = robot  # type: ignore[assignment]
         robot = None
@@ -197,7 +198,7 @@ def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | 
 def _join_coordinate(
     nodes: RecordedNodes, followed: RecoveredPath
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots and control points of s over time, which stays where it is during the waits; see `join_splines`."""
+    """Return knots and control points of s over time; s is constant during waits. See `join_splines`."""
     is_resting, _ = nodes.at_rest
     splines = [fit_coordinate(*followed.parts[0], is_resting=is_resting)]
     for (first, end), (t, s) in zip(followed.rests, followed.parts[1:], strict=True):
@@ -207,7 +208,7 @@ def _join_coordinate(
 
 
 def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
-    """Return the path of all joints that an imported motion follows, for a task in their space.
+    """Return the joint path of an imported motion, for a task in joint space.
 
     Raises
     ------
@@ -223,18 +224,18 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
 
 @dataclass(frozen=True, eq=False)
 class RecoveredPath:
-    """A path, and where on it a motion is.
+    """A path recovered from a motion, and the path coordinate of the motion.
 
     Attributes
     ----------
     segments : tuple of Segment
-        For a task.
+        Segments of the path, for a task.
     rests : list of (int, int)
-        The waits: their first and last nodes.
+        First and last node of each wait.
     parts : tuple of ((K,) ndarray, (K,) ndarray)
-        Dense times, s, and path coordinates between the waits.
+        Dense times, s, and path coordinates of each part between waits.
     miss : float
-        Largest distance of the motion's tool from the path, m or rad.
+        Largest distance of the tool from the path, m or rad.
     """
 
     segments: tuple[Segment, ...]
@@ -246,13 +247,13 @@ class RecoveredPath:
 def recover_path(
     task_map: TaskMap, nodes: RecordedNodes, tolerance: float
 ) -> RecoveredPath:
-    """Recover the path that a motion prescribes in a task space, within a tolerance, m and rad; it stops at waits.
+    """Recover the path of a motion in a task space within a tolerance, m and rad. The path stops at waits.
 
     Raises
     ------
     PathError
-        The tool does not move, or follows no smooth path within the tolerance: it turns off without a wait, for
-        example.
+        The tool does not move, or does not follow a smooth path within the tolerance, for example because it changes
+        its direction without a wait.
     """
     rests = find_rests(nodes)
     moves = split_at_rests(nodes, rests)
@@ -278,7 +279,7 @@ def recover_path(
 def _follow(
     task_map: TaskMap, nodes: RecordedNodes, tolerance: float
 ) -> tuple[list[Segment], np.ndarray, np.ndarray, np.ndarray]:
-    """Fit segments to a part of a motion between waits; see `recover_path`.
+    """Fit segments to the part of a motion between two waits; see `recover_path`.
 
     Returns
     -------
@@ -288,7 +289,7 @@ def _follow(
     values : (K, c) ndarray
         Task coordinates.
     share : (K,) ndarray
-        Way from the part's beginning, of all of its way.
+        Distance travelled since the part's beginning, as a fraction of its total.
     """
     from scipy.integrate import cumulative_trapezoid
     from scipy.interpolate import BPoly
@@ -306,11 +307,13 @@ def _follow(
             "the tool does not move along a path",
             found=f"{length[-1]:.3g} m",
             where="path",
-            hint="With the task space joints any motion can be imported",
+            hint="Any motion can be imported with the task space joints",
         )
     values = task_map.values(q)
     chosen = _choose_evenly(length)
-    share = 0.5 * tolerance  # the rest is for s over time, and between the points
+    share = (
+        0.5 * tolerance
+    )  # the other half is for s over time and for the path between the points
     allowed = FitTolerance(position=share, orientation=share)
     file = PointFile(file="the recorded motion", tolerance=allowed, corner="refuse")
     points = _points(task_map, values[chosen], chosen)
@@ -322,20 +325,20 @@ def _follow(
             found=str(error),
             allowed=f"{tolerance:g} m and rad",
             where="path",
-            hint="If the tool stops for less than five rows and changes its direction, split the file there. If the "
-            "positions are measured, set their noise, or raise the tolerance",
+            hint="If the tool stops for fewer than five rows and changes its direction, split the file there. If the "
+            "positions are measured, set their noise or raise the tolerance",
         ) from error
     return list(segments), t, values, length / length[-1]
 
 
 def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-    """Return the speed of the tool's position, (K,); 0 in a task space of joints."""
+    """Return the speed of the tool's position, (K,), which is 0 in joint space."""
     rates = np.einsum("kmn,kn->km", task_map.jacobian(task_map.twists(q)), qdot)
     return task_map.norms(rates)[0]
 
 
 def _choose_evenly(length: np.ndarray) -> np.ndarray:
-    """Choose 2000 indices at about equal distances, the first and the last one among them."""
+    """Choose about 2000 indices at roughly equal distances, including the first and the last."""
     count = 2000
     end = len(length) - 1
     even = np.searchsorted(length, np.linspace(0.0, length[-1], count)).clip(max=end)
@@ -345,7 +348,7 @@ def _choose_evenly(length: np.ndarray) -> np.ndarray:
 
 
 def _points(task_map: TaskMap, values: np.ndarray, rows: np.ndarray) -> Points:
-    """Make points of task coordinates, (K, c)."""
+    """Make points from task coordinates, (K, c)."""
     count = len(task_map.axes) if task_map.angles else values.shape[1]
     turning = values[:, count:]
     if len(task_map.angles) > 1:
@@ -365,7 +368,7 @@ def _nearest(
     share: np.ndarray,
     ends: tuple[float, float],
 ) -> np.ndarray:
-    """Return the path coordinates nearest to task coordinates, (K, c), between two ends, from shares on; ascending."""
+    """Return the ascending path coordinates closest to task coordinates, (K, c), beginning from shares of the way."""
     s = np.interp(share, [0.0, 1.0], ends)
     for _ in range(4):
         sample = path.sample(s)
@@ -383,14 +386,14 @@ DEGREE = 3
 def fit_coordinate(t: np.ndarray, s: np.ndarray, *, is_resting: bool) -> PhaseSpline:
     """Return s over time as the spline of a phase.
 
-    The knots lie where s bends. The control points do not decrease, and so the spline does not either.
+    Knots are placed where s bends. The control points do not decrease, so the spline does not decrease either.
 
     Parameters
     ----------
     t, s : (K,) ndarray
         Ascending.
     is_resting : bool
-        Whether ds/dt vanishes at the ends of the path; at waits, which begin between rows, it nearly does.
+        Whether ds/dt vanishes at the ends of the path. At waits, which begin between rows, it is only close to zero.
     """
     from scipy.interpolate import splrep
 
@@ -398,7 +401,7 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, is_resting: bool) -> PhaseSp
     t_norm = (t - t[0]) / duration
     first = 2 if is_resting and s[0] == 0.0 else 1
     last = 2 if is_resting and s[-1] == 1.0 else 1
-    for rms in (2e-8, 1e-9, 2e-10):  # of what the spline may differ from s
+    for rms in (2e-8, 1e-9, 2e-10):  # allowed difference between the spline and s
         knots, points, _ = splrep(t_norm, s, k=DEGREE, s=len(s) * rms**2)
         points = points[: len(knots) - DEGREE - 1].clip(s[0], s[-1])
         points[:first] = s[0]
@@ -413,7 +416,7 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, is_resting: bool) -> PhaseSp
 def _deviations(
     recording: Recording, noise: float | Sequence[float] | None
 ) -> np.ndarray:
-    """Return the standard deviation of every joint's positions, (n,), rad or m: as stated, or that of the digits.
+    """Return the standard deviation of each joint's positions, (n,), rad or m: as stated, or from the last digit.
 
     Raises
     ------
@@ -444,7 +447,7 @@ def _task_of(
     segments: Sequence[Segment],
     space: str | Sequence[str],
 ) -> Task:
-    """Write down the task that the motion fulfils."""
+    """Make the task that the motion fulfils."""
     is_resting, is_calm = nodes.at_rest
     content: dict[str, Any] = {
         "brachis": 1,

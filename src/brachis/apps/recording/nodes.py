@@ -1,20 +1,20 @@
-"""From recorded positions to a motion that is twice continuously differentiable.
+"""Conversion of recorded positions to a motion that is twice continuously differentiable.
 
-Derivatives at a row are those of a polynomial through five rows beside it. Of the five rows before, around and behind
-it those are taken through which the polynomial bends least (essentially non-oscillatory interpolation: A. Harten,
-B. Engquist, S. Osher, S. R. Chakravarthy, Journal of Computational Physics 71, 1987): where accelerations jump, as they
+Derivatives at a row are those of a polynomial through five neighbouring rows. Among the windows of five rows that
+contain the row, the one whose polynomial bends least is used (essentially non-oscillatory interpolation: A. Harten,
+B. Engquist, S. Osher, S. R. Chakravarthy, Journal of Computational Physics 71, 1987). Where accelerations jump, as they
 do in time-optimal motions, a spline through all rows would overshoot by a fifth of the jump and ring on both sides.
-Velocities and accelerations of the file are used instead if they agree with these.
+Velocities and accelerations from the file are used instead if they agree with these derivatives.
 
-Positions that are measured, or rounded to few digits, have no second derivatives of their own: a smoothing spline takes
-their place.
+Positions that are measured, or rounded to few digits, have no meaningful second derivatives. They are replaced by a
+smoothing spline.
 
-Accelerations that jump between two rows are found by what lies on both sides. A quintic piece between two rows, one
-before and one after a jump, overshoots by up to a tenth of it. If both rows are continued at constant jerk, the
-velocities meet where the jump is (subcell resolution: A. Harten, Journal of Computational Physics 83, 1989). There the
-acceleration changes from the one to the other within a small part of the period.
+A jump of the acceleration between two rows is found from the motion on both sides. A quintic piece from a row before a
+jump to a row after it overshoots by up to a tenth of the jump. If the motion is continued from both rows at constant
+jerk, the two velocities meet where the jump is (subcell resolution: A. Harten, Journal of Computational Physics 83,
+1989). There the acceleration changes from one side's value to the other's within a small fraction of the period.
 
-A recorded motion waits where several rows have the same posture; between the waits it moves along the path.
+A recorded motion waits where several rows have the same posture. Between the waits it moves along the path.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ _TINY = np.finfo(float).tiny
 _DEGREE = 5
 """Degree of smoothing splines."""
 _AT_REST = {1: 1e-3, 2: 1e-2}
-"""Velocity and acceleration at an end, as parts of the largest ones, below which they are zero."""
+"""Fractions of the largest velocity (1) and acceleration (2) below which those at an end count as zero."""
 _NARROWEST = 0.02
-"""Half of the shortest part of a period in which the acceleration changes at a jump."""
+"""Half of the shortest fraction of a period within which the acceleration changes at a jump."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedNodes:
-    """A motion in quintic pieces between nodes.
+    """A motion of quintic pieces between nodes.
 
     Attributes
     ----------
     t : (L,) ndarray
-        s.
+        Times, s.
     states : (3, L, n) ndarray
         q, qdot and qddot.
     notes : tuple of str
@@ -75,19 +75,19 @@ class RecordedNodes:
 
     @property
     def at_rest(self) -> tuple[bool, bool]:
-        """Whether both ends are at rest, and whether their accelerations vanish too."""
+        """Whether both ends are at rest, and whether their accelerations also vanish."""
         ends = [0, -1]
         return not self.qdot[ends].any(), not self.qddot[ends].any()
 
 
 def nodes_of(recording: Recording, deviation: np.ndarray) -> RecordedNodes:
-    """Find velocities and accelerations.
+    """Find velocities and accelerations for recorded positions.
 
     Parameters
     ----------
     recording : Recording
     deviation : (n,) ndarray
-        Standard deviation of every joint's positions, rad or m; 0 where they are exact.
+        Standard deviation of every joint's positions, rad or m; 0 for exact positions.
     """
     t = recording.t
     states = _smooth(t, recording.q, deviation)
@@ -117,13 +117,13 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> RecordedNodes:
 
 
 def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """Return positions and three derivatives of smoothing splines, (4, K, n); NaN for joints that need none."""
+    """Return positions and three derivatives of smoothing splines, (4, K, n); NaN for joints without one."""
     states = np.full((4, *q.shape), np.nan)
     bends = np.maximum(np.abs(np.diff(q, n=2, axis=0)).max(axis=0), _TINY)
-    # A quintic piece of 1 s has an acceleration of 60 rad/s^2 for a position that is 1 rad off.
+    # In a quintic piece of 1 s, a position error of 1 rad gives an acceleration of 60 rad/s^2.
     rounding = 60.0 * deviation / bends
-    # Rounding noise, relative to the largest acceleration, above which positions are smoothed: if a spline explains
-    # them, and in any case.
+    # Rounding noise, relative to the largest acceleration, above which positions are smoothed: first only if a spline
+    # explains them, then in any case.
     for threshold, in_any_case in ((1e-3, False), (0.2, True)):
         is_rough = rounding > threshold
         if is_rough.any():
@@ -135,7 +135,7 @@ def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
 
 def _interpolate(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, str]:
-    """Return positions and three derivatives, (4, K, j), of some joints, and how they were found."""
+    """Return positions and three derivatives, (4, K, j), of some joints, and a note on how they were found."""
     states = _differentiate(recording.t, recording.q[:, joints])
     note = (
         "velocities and accelerations are those of polynomials through five rows each"
@@ -166,7 +166,7 @@ def _differentiate(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     highest = np.linalg.solve(around[:, :, None] ** powers, values[windows])[:, -1]
     ranges = np.maximum(np.ptp(values, axis=0), _TINY)
     bends = (np.abs(highest) / ranges).max(axis=1)
-    # Of the windows that contain a row, the one around it is taken unless others bend much less.
+    # Among the windows that contain a row, the one centred on it is used unless others bend much less.
     before = FEWEST_ROWS - 1
     padded = np.pad(bends, before, constant_values=np.inf)
     containing = np.lib.stride_tricks.sliding_window_view(padded, FEWEST_ROWS)
@@ -184,11 +184,11 @@ def _differentiate(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _fit_rows(
     t: np.ndarray, q: np.ndarray, deviation: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Fit a least-squares spline of the fewest intervals that explain the rows (K, n); see `_fit_spline`.
+    """Fit a least-squares spline with the minimum number of intervals that explains the rows (K, n); see `_fit_spline`.
 
-    At its ends as many derivatives vanish as the rows allow: none, the velocity, the acceleration too.
+    At each end as many derivatives vanish as the rows allow: none, the velocity, or also the acceleration.
     """
-    # More intervals, until the spline is about as far off as noise alone, which is 1.
+    # Add intervals until the spline is about as far off as noise alone would be, which is 1.
     count = 4.0
     while True:
         states, off = _fit_spline(t, q, deviation, int(count), 0, 0)
@@ -204,13 +204,13 @@ def _fit_rows(
 def _count_vanishing(
     t: np.ndarray, q: np.ndarray, deviation: np.ndarray, largest: np.ndarray
 ) -> int:
-    """Count the derivatives that vanish at an end, from which t is counted, by polynomials through the rows near it."""
+    """Count the derivatives that vanish at an end, where t is 0, by polynomials through the rows close to it."""
     is_away = (np.abs(q - q[0]) > 220.0 * deviation).any(axis=1)
     first = int(np.argmax(is_away)) if is_away.any() else len(t)
     count = max(8, first) + 1
     near = t[:count]
     u = near / near[-1]
-    # Derivatives that are small, as parts of the largest ones, or not known to five standard deviations, vanish.
+    # Derivatives vanish if they are small relative to the largest ones, or below five standard deviations.
     for order, small in ((2, 0.2), (1, 0.05)):
         powers = u[:, None] ** np.array([0, order, order + 1, order + 2])
         covariance = np.linalg.inv(powers.T @ powers)
@@ -230,14 +230,14 @@ def _fit_spline(
     first: int,
     last: int,
 ) -> tuple[np.ndarray, float]:
-    """Fit a spline of `count` intervals, with so many vanishing derivatives at its first and last end.
+    """Fit a spline of `count` intervals, with `first` and `last` vanishing derivatives at its two ends.
 
     Returns
     -------
     (4, K, n) ndarray
         Positions and three derivatives at the rows.
     float
-        Root mean square distance from the rows, of the worst joint, in standard deviations of the rows.
+        Root mean square distance of the worst joint from the rows, in standard deviations of the rows.
     """
     from scipy.interpolate import BSpline
     from scipy.sparse import csr_array
@@ -246,7 +246,7 @@ def _fit_spline(
     rows = np.arange(len(t))
     breaks = np.interp(np.linspace(0.0, rows[-1], count + 1), rows, t)
     knots = np.pad(breaks, _DEGREE, mode="edge")
-    # Derivatives vanish at an end where the first control points are equal: all from the free ones.
+    # Derivatives vanish at an end where its control points are equal, so these follow from the free ones.
     points = np.arange(len(knots) - _DEGREE - 1)
     columns = np.clip(points - first, 0, points[-1] - first - last)
     tied = csr_array((np.ones(len(points)), (points, columns)))
@@ -266,14 +266,14 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
     ----------
     t : (K,) ndarray
     states : (4, K, n) ndarray
-        Positions and three derivatives at the rows, from one side of a jump each.
+        Positions and three derivatives at the rows, each taken from one side of a jump.
 
     Returns
     -------
     (L,) ndarray
-        Times with those of the new nodes.
+        Times of the rows and of the new nodes.
     (3, L, n) ndarray
-        Positions and two derivatives there.
+        Positions and two derivatives at these times.
     int
         Number of jumps.
     """
@@ -297,7 +297,7 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """By how much the acceleration in each quintic piece leaves the range between its ends, relative to `scale`."""
+    """Return how far the acceleration in each quintic piece leaves the range of its ends, relative to `scale`."""
     from scipy.interpolate import BPoly
 
     q, qdot, qddot = states[:3]
@@ -313,10 +313,10 @@ def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndar
 def _place_jump(
     before: np.ndarray, after: np.ndarray, h: float, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return two nodes in a period h between which the acceleration changes from one side's to the other's.
+    """Return two nodes in a period h between which the acceleration changes from the value before to the one after.
 
-    The velocities of both sides meet best in the middle of the change. A steady change between accelerations that
-    differ by D, within a time w, leads D w^2 / 24 further than a jump in its middle.
+    The middle of the change is where the velocities continued from both sides agree best. If accelerations differ by D,
+    a steady change within a time w leads D w^2 / 24 further than a jump in its middle.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def _place_jump(
     """
 
     def gap(place: Any, order: int) -> Any:
-        """Difference of both sides' derivatives at parts of the period, as parts of `scale`."""
+        """Return the difference of both sides' derivatives at fractions of the period, relative to `scale`."""
         t = np.asarray(place)[..., None] * h
         difference = extrapolate(after, t - h)[order] - extrapolate(before, t)[order]
         return difference / scale
@@ -354,7 +354,7 @@ def _place_jump(
     last = place * h + 0.5 * width
     begin = extrapolate(before, first)
     end = extrapolate(after, last - h)
-    # The node nearer to its row is exact; from it the acceleration changes at constant jerk to that of the other.
+    # The node closer to its row is exact. From it the acceleration changes to that of the other at constant jerk.
     jerk = (end[2] - begin[2]) / width
     if place <= 0.5:
         end = extrapolate([*begin, jerk], width)
@@ -364,13 +364,13 @@ def _place_jump(
 
 
 def find_rests(nodes: RecordedNodes) -> list[tuple[int, int]]:
-    """Find the waits inside a motion: numbers of the first and the last node of each.
+    """Find the waits inside a motion, given by the numbers of their first and last nodes.
 
-    A wait has five rows or more, none of them the first or the last one of the motion.
+    A wait has at least five rows, and neither the first nor the last row of the motion is among them.
     """
     speed = np.abs(nodes.qdot).max(axis=1)
     same = np.all(np.abs(np.diff(nodes.q, axis=0)) <= tolerances.ROUNDING, axis=1)
-    slow = speed <= 1e-3 * speed.max()  # up to there it is rounding
+    slow = speed <= 1e-3 * speed.max()  # up to this speed it is rounding
     still = np.concatenate([[False], same & slow[1:] & slow[:-1], [False]])
     edges = np.flatnonzero(np.diff(still))
     last = len(nodes.t) - 1
@@ -382,7 +382,7 @@ def find_rests(nodes: RecordedNodes) -> list[tuple[int, int]]:
 
 
 def with_rests(nodes: RecordedNodes) -> RecordedNodes:
-    """Return the motion without the rounding of its positions, velocities and accelerations at rest."""
+    """Return the motion without rounding errors of positions, velocities and accelerations in its waits."""
     states = nodes.states.copy()
     for first, end in find_rests(nodes):
         states[0, first : end + 1] = nodes.q[first]
@@ -393,7 +393,7 @@ def with_rests(nodes: RecordedNodes) -> RecordedNodes:
 def split_at_rests(
     nodes: RecordedNodes, rests: list[tuple[int, int]]
 ) -> list[RecordedNodes]:
-    """Return the parts between waits in which the motion moves."""
+    """Return the moving parts of a motion, between its waits."""
     edges = [0, *chain(*rests), len(nodes.t) - 1]
     moves = [slice(a, b + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     return [RecordedNodes(nodes.t[move], nodes.states[:, move]) for move in moves]

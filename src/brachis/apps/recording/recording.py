@@ -1,4 +1,4 @@
-"""A recorded motion: time and joint positions from a CSV file, whose header names the columns and their units."""
+"""A recorded motion: time and joint positions from a CSV file whose header names the columns and their units."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _UNITS: Final = {
     "m": ("length", LENGTHS),
     "Nm": ("torque", {"Nm": 1.0, "N": 1.0}),
 }
-"""What each SI unit measures, and the units of a file with their factors."""
+"""The quantity of each SI unit, and the units that a file may use for it, with their factors."""
 _TIME_COLUMNS = ("t", "time", "timestamp")
 _JOINT_COLUMNS: Final = {
     "tau": "tau_{0} torque_{0} effort_{0} {0}_tau {0}_torque {0}_effort",
@@ -33,7 +33,7 @@ _JOINT_COLUMNS: Final = {
     "qdot": "qd_{0} dq_{0} v_{0} vel_{0} velocity_{0} {0}_vel {0}_velocity",
     "q": "{0} q_{0} pos_{0} position_{0} {0}_pos {0}_position",
 }
-"""Names of the columns of joint ``{0}``; a name that stands in several rows has the meaning of the last one."""
+"""Column names of joint ``{0}``. A name that appears in several rows has the meaning of the last one."""
 _QUANTITIES: Final = {
     "t": ("time", ""),
     "q": ("position", ""),
@@ -41,19 +41,19 @@ _QUANTITIES: Final = {
     "qddot": ("acceleration", "/s^2"),
     "tau": ("torque", ""),
 }
-"""Each quantity in words, and what follows its unit of time, angle or length."""
+"""Name of each quantity, and the text that follows its unit of time, angle or length."""
 _UNIT_WORDS = "|".join({**TIMES, **ANGLES, **LENGTHS})
 _NAME_AND_UNIT = re.compile(
     rf"^(.+?)\s*(?:[\[(]\s*([a-z0-9/^]+)\s*[\])]|_((?:{_UNIT_WORDS})(?:(?:/|_|_per_)s(?:\^?2)?)?))$"
 )
 FEWEST_ROWS = 5
-"""Rows of the shortest motion: a polynomial through five rows gives the derivatives."""
+"""Minimum number of rows of a motion: derivatives come from a polynomial through five rows."""
 _STILL = 1e-12
-"""A joint that moves less between rows with all digits stands still, rad or m."""
+"""If rows have all digits, a joint that moves less than this between them stands still, rad or m."""
 
 
 def check_units(units: object) -> dict[str, str]:
-    """Return units of the quantities ``angle``, ``length`` and ``time`` that the user states; None: not stated.
+    """Check the units that the user states for ``angle``, ``length`` and ``time``; drop those that are None.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def check_units(units: object) -> dict[str, str]:
             "wrong type",
             where="units",
             found=repr(units),
-            allowed='{"angle": "deg", "length": "mm", "time": "ms"}, or some of them',
+            allowed='{"angle": "deg", "length": "mm", "time": "ms"}, or some of these keys',
         )
     known = dict(_UNITS.values())
     check_names("quantity", units, known, "units")
@@ -76,23 +76,24 @@ def check_units(units: object) -> dict[str, str]:
 
 
 Columns = dict[tuple[str, str], tuple[int, str | None]]
-"""By quantity and joint (the empty string for time): index of the column, and the unit that its header states."""
+"""Index of each column and the unit that its header states, by quantity and joint (an empty string for time)."""
 
 
 def _allowed_columns(joints: Sequence[str]) -> str:
-    """Say which columns a file has, for messages."""
+    """Describe the expected columns of a file, for messages."""
     first = joints[0]
     rates = f"qd_{first}, ..., qdd_{first}, ... if rates are known"
     return f"t, then {', '.join(joints)} (or q_{first}, ...), and {rates}"
 
 
 def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> Columns:
-    """Find the columns of time and joints; other columns are left out.
+    """Find the columns of time and joints. Other columns are ignored.
 
     Raises
     ------
     TaskError
-        Time or a joint's position is missing or given twice, or only some joints have velocities or accelerations.
+        The time or the position of a joint is missing or occurs twice, or only some joints have velocities or
+        accelerations.
     """
     meanings = dict.fromkeys(_TIME_COLUMNS, ("t", ""))
     for kind, forms in _JOINT_COLUMNS.items():
@@ -110,7 +111,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
             unit = unit.replace("s2", "s^2")
         key = meanings.get(name)
         if key in columns:
-            problems.append(f"{_describe(*key)} is given twice")
+            problems.append(f"{_describe(*key)} occurs twice")
         if key is not None:
             columns[key] = (i, unit)
     kinds = dict.fromkeys(["q", *(kind for kind, joint in columns if joint)])
@@ -129,7 +130,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
 
 
 def _describe(kind: str, joint: str) -> str:
-    """Name a column, for messages."""
+    """Describe a column, for messages."""
     return f"the {_QUANTITIES[kind][0]} of {joint!r}" if joint else "the time"
 
 
@@ -140,7 +141,7 @@ def _read_column(
     base: str,
     units: Mapping[str, str],
 ) -> tuple[np.ndarray, str, float]:
-    """Return a column in SI units, (K,), its unit in the file, and half of its last digit in SI units.
+    """Return a column in SI units, (K,), its unit in the file, and half its last digit in SI units.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def _read_column(
             where=table.where,
         )
     rounding = 0.0
-    for decimals in range(12):  # more do not matter
+    for decimals in range(12):  # further decimals do not matter
         if np.ptp(values) and np.array_equal(np.round(values, decimals), values):
             rounding = 0.5 * 10.0**-decimals * factors[unit]
             break
@@ -203,26 +204,26 @@ class HasJoints(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Positions of a robot's joints at K times.
+    """Positions of a robot's joints at K times, as read from a file.
 
     Attributes
     ----------
     t : (K,) ndarray
-        Times from 0, s.
+        Times, beginning with 0, s.
     q : (K, n) ndarray
-        rad or m.
+        Positions, rad or m.
     qdot, qddot : (K, n) ndarray or None
-        If the file has them; rad/s or m/s, rad/s^2 or m/s^2.
+        Velocities and accelerations if the file has them, rad/s or m/s, rad/s^2 or m/s^2.
     tau : (K, n) ndarray or None
-        Torques, if the file has them; Nm or N.
+        Torques if the file has them, Nm or N.
     rounding : (n,) ndarray
         Half of the last digit of every joint's positions, rad or m; 0 if the file has all digits.
     units : tuple of str
-        Of every joint's positions: rad or m.
+        Unit of every joint's positions: rad or m.
     source : str
-        The file.
+        Name of the file.
     notes : tuple of str
-        What was found out about it.
+        Notes on how the file was read.
     """
 
     t: np.ndarray
@@ -239,22 +240,22 @@ class Recording:
 def read_recording(
     path: str | os.PathLike[str], robot: HasJoints, units: Mapping[str, str]
 ) -> Recording:
-    """Read a CSV file of time and joint positions, and of velocities and accelerations if it has them.
+    """Read a CSV file of times and joint positions, with velocities and accelerations if it has them.
 
-    Rows in which the robot stands still before and after the motion are left out.
+    Rows before and after the motion, in which the robot stands still, are left out.
 
     Parameters
     ----------
     path : path
     robot : Robot or ControllerAxes
-        Its joints name the columns.
+        Robot whose joints, or axes, the columns are named after.
     units : mapping
         Units of ``angle``, ``length`` and ``time`` in columns whose header states none.
 
     Raises
     ------
     TaskError
-        The file cannot be read, columns are missing, times do not ascend, or nothing moves.
+        The file cannot be read, columns are missing, times do not ascend, or no joint moves.
     """
     source = Path(path)
     joints = robot.joint_names
@@ -286,7 +287,7 @@ def read_recording(
     known = {i for i, _ in columns.values()}
     ignored = [name for i, name in enumerate(table.header) if i not in known]
     if ignored:
-        notes.append(f"left out the columns {', '.join(ignored)}")
+        notes.append(f"ignored columns: {', '.join(ignored)}")
     moving, left_out = _moving_rows(t, q, rounding, source)
     moved = {kind: values[moving] for kind, values in states.items()}
     return Recording(
@@ -305,7 +306,7 @@ def read_recording(
 def _moving_rows(
     t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path
 ) -> tuple[slice, list[str]]:
-    """Return the rows of the motion, and what is left out before and after it, in words.
+    """Return the rows of the motion, and notes on the rows left out before and after it.
 
     Raises
     ------
@@ -334,7 +335,7 @@ def _moving_rows(
 
 
 def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
-    """Refuse times that do not ascend."""
+    """Raise an error if times do not ascend."""
     for i in np.flatnonzero(np.diff(t) <= 0.0):
         raise TaskError(
             "the times do not increase",
@@ -344,7 +345,7 @@ def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
 
 
 def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
-    """Refuse degrees that were taken for radians: no joint turns so far."""
+    """Raise an error for angles so large that they must be degrees read as radians."""
     ends = [robot.limits.position_lower, robot.limits.position_upper]
     farthest = np.abs(ends).max(axis=0)
     reach = 1.5 * np.where(np.isfinite(farthest), farthest, 0.0)
@@ -362,13 +363,13 @@ def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
 
 
 def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray) -> int:
-    """Return the row at which motion begins; the number of rows if nothing moves.
+    """Return the row at which the motion begins; the number of rows if nothing moves.
 
-    If the file has few digits, a gentle motion has been going on for a while when the last digit shows it. It grows as
-    the cube of time, so that it is eight times as large after twice the time.
+    If the file has few digits, a gentle motion has already gone on for a while when the last digit changes. It grows as
+    the cube of time, so it is eight times as large after twice the time.
     """
     away = np.abs(q - q[0])
-    # A last digit that flickers changes by 2 roundings; 24 are a dozen changes of it.
+    # A flickering last digit changes by 2 roundings; 24 roundings are a dozen such changes.
     changed = away > np.maximum(_STILL, 2.2 * rounding)
     clear = away > np.maximum(_STILL, 24.0 * rounding)
     if not changed.any():

@@ -1,4 +1,4 @@
-"""A motion as one HTML file, from which a person decides whether to run it; `make_report` does the whole.
+"""A report on a motion: one HTML file from which a person decides whether to run the motion.
 
 Examples
 --------

@@ -1,4 +1,4 @@
-"""The interactive figures of a report for Plotly, and its animation of stick figures."""
+"""The interactive Plotly figures of a report, and its animation of stick figures."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from brachis.apps.report.tables import NEAR
 from brachis.trajectory import Trajectory
 
 Figure = dict[str, Any]
-"""``data`` and ``layout`` of Plotly."""
+"""A Plotly figure: its ``data`` and ``layout``."""
 
 
 def encode(values: np.ndarray) -> dict[str, Any]:
-    """Write an array as Plotly reads it: single precision, base64."""
+    """Write an array in the form that Plotly reads: single precision, base64."""
     data = base64.b64encode(values.astype("<f4").tobytes()).decode()
     return {"dtype": "f4", "shape": ",".join(map(str, values.shape)), "bdata": data}
 
 
 def motion_figure(motion: ReportedMotion) -> Figure:
-    """Positions and their derivatives, torques and forces, and the tool's speed, with their limits.
+    """Draw positions and their derivatives, torques and forces, and the tool's speed, with their limits.
 
-    Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once. Torques and forces
-    are also shown over their limits: those of a wrist are smaller than those of a shoulder.
+    Joints in rad and joints in m have separate panels. The reader can hide a joint in all panels at once. Torques and
+    forces are also shown as ratios to their limits, because those of a wrist are much smaller than those of a shoulder.
     """
     trajectory = motion.trajectory
     samples = motion.samples
@@ -72,7 +72,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 def _traces(
     panel: Panel, curve: PanelCurve, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
-    """Draw one curve, and its limits, which the page draws thin and dashed."""
+    """Draw one curve and its limits. The page draws limits thin and dashed."""
     look = style.joint_style(curve.style)
     shared = {"yaxis": axis, "name": curve.name, "legendrank": curve.style}
     hover = f"%{{y:.4g}} {panel.unit}".rstrip()
@@ -88,7 +88,7 @@ def _traces(
     if curve.is_limited and not panel.is_ratio:
         line["customdata"] = encode(100.0 * np.abs(curve.ratios))
         hover += f", %{{customdata:.1f}} % ({panel.ratio_title})"
-    # Plotly must not read names as markup.
+    # Escape names, so that Plotly does not read them as markup.
     name = curve.name.replace("&", "&amp;").replace("<", "&lt;").replace("%{", "% {")
     line["hovertemplate"] = f"{hover}<extra>{name}</extra>"
     traces = [line]
@@ -107,10 +107,10 @@ def _traces(
 
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
-    """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
+    """Draw how close the motion is to each limit over time, in rows: blue, orange if active, red beyond the limit."""
     ratios = at_distinct_times(motion.ratios)
     used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
-    entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
+    entries = [entry for entry in motion.saturations if entry.is_drawn][::-1]
     shares = np.array([used[entry.label] for entry in entries])
     colours = shares.copy()
     for row, entry in zip(colours, entries, strict=True):
@@ -128,19 +128,19 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
 
 
 def _layout(trajectory: Trajectory, height: int) -> dict[str, Any]:
-    """Layout with one time axis and panels of this height together, pixels; the page sets how it looks."""
+    """Return a layout with one time axis and this total height of the panels, pixels. The page sets the style."""
     return {"height": height + 110, "xaxis": {"range": [0.0, trajectory.t_end]}}
 
 
 def scene(motion: ReportedMotion) -> dict[str, Any]:
-    """Write what the page's animation shows.
+    """Return the data of the page's animation.
 
     Returns
     -------
     dict
-        ``t``, ``s``, ``speed`` (of the tool) at K times; ``bones``, (K, p, 3), m; ``plane``, the two world axes that a
-        planar robot moves in, or None; ``joints``, with ``name``, ``redundant`` and, for every quantity, the values
-        with their unit and parts of their limits; ``levels``, the parts of a limit from which on values are marked.
+        ``t``, ``s``, ``speed`` (of the tool) at K times; ``bones``, (K, p, 3), m; ``plane``, the two world axes of a
+        planar robot's plane, or None; ``joints``, with ``name``, ``redundant`` and, for every quantity, the values with
+        their unit and their ratios to the limits; ``levels``, the ratios above which values are marked.
     """
     trajectory = motion.trajectory
     samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 240))

@@ -1,4 +1,4 @@
-"""What a report is made of: a motion, its verification, and what holds it back."""
+"""The content of a report: a motion, its verification, and what slows it down."""
 
 from __future__ import annotations
 
@@ -27,33 +27,33 @@ from brachis.verify import Verification, verify_trajectory
 
 @dataclass(frozen=True, eq=False)
 class ReportedMotion:
-    """A motion with everything that a report shows of it.
+    """A motion with all the data that its report shows.
 
     Attributes
     ----------
     trajectory : Trajectory
     samples : Samples
-        Dense ones.
+        Dense samples of the motion.
     panels : list of Panel
-        Of all quantities of the joints.
+        Panels of all joint quantities.
     verification : Verification
     ratios : LimitRatios
     saturations : tuple of Saturation
-        Those active longest first.
+        When each limit is active. Limits that are active longest come first.
     held_back : tuple of str
-        What holds the motion back, a sentence each.
+        Sentences that say what slows the motion down.
     remarks : tuple of Issue
-        What is implausible in robot and task.
+        Implausible values of robot and task.
     guarantees : dict of str to str
-        Where each limit holds, by its name.
+        Text that says where each limit is met, by the name of the limit.
     degrees : bool
         Whether angles are shown in degrees.
     not_completed : tuple of str
-        What the search did not complete.
+        Steps that the search did not complete.
     candidates : tuple of Candidate
-        What the search looked at; none for a saved motion.
+        Candidates of the search; none for a saved motion.
     planned : dict of str to str
-        How the motion was planned, if that is known.
+        How the motion was planned, if known.
     """
 
     trajectory: Trajectory
@@ -74,7 +74,7 @@ class ReportedMotion:
 def reported_motion(
     motion: PlannedMotion | Trajectory, *, degrees: bool = False
 ) -> ReportedMotion:
-    """Gather what there is to say of a motion; a saved one is verified again."""
+    """Collect the content of a report. A saved motion is verified again."""
     limits: Sequence[Limit] = ()
     if isinstance(motion, Trajectory):
         trajectory = motion
@@ -93,7 +93,7 @@ def reported_motion(
         report = bottleneck.report(motion)
     except BrachisError as error:
         report = bottleneck.report(motion, solve=False)
-        unknown = [f"What the limits cost is not known: {error}"]
+        unknown = [f"What the limits cost is unknown: {error}"]
     held_back = (*report.text(degrees=degrees).splitlines(), *unknown)
     samples = dense_samples(trajectory)
     rows = joint_rows_of(trajectory)
@@ -111,12 +111,12 @@ def reported_motion(
 
 
 def _describe_plan(result: PlannedMotion) -> dict[str, Any]:
-    """Return what is known of a motion that was planned just now."""
+    """Return the report's entries that are known only for a freshly planned motion."""
     report = result.solver_report
     least = result.least_motion
     not_completed = result.not_completed
     if result.interrupted:
-        early = "the search was ended early: a faster motion may have been missed"
+        early = "the search ended early: a faster motion may have been missed"
         not_completed = (early, *not_completed)
     return {
         "verification": result.verification,

@@ -203,7 +203,7 @@ const HEAT = {
     [0, "#F7FBFF"], [at / TOP / 2, "#9ECAE1"], [at / TOP, "#08306B"], [at / TOP, "#E69F00"],
     [beyond / TOP, "#E69F00"], [beyond / TOP, "#C00000"], [1, "#C00000"],
   ],
-  colorbar: { title: { text: "part of the limit" }, thickness: 12, tickvals: [0, 0.25, 0.5, 0.75, 1] },
+  colorbar: { title: { text: "fraction of the limit" }, thickness: 12, tickvals: [0, 0.25, 0.5, 0.75, 1] },
   hovertemplate: "%{y}: %{customdata:.1f} % of its limit at %{x:.4f} s<extra></extra>",
 };
 function curve(trace, text) {

@@ -1,4 +1,4 @@
-"""A motion as one HTML file without links to anything: all data, pictures and programs are in it."""
+"""The report as one self-contained HTML file: all data, pictures and programs are in it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Report:
     Attributes
     ----------
     html : str
-        The whole page.
+        Text of the whole page.
     verified : bool
         Whether the motion passed the verification.
     """
@@ -40,12 +40,12 @@ class Report:
     verified: bool
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the page to a file; an older report is replaced, and kept if writing fails.
+        """Write the page to a file. An older report is replaced; if writing fails, it is kept.
 
         Raises
         ------
         InputError
-            The suffix is another than html, or the file cannot be written or is not a report.
+            The suffix is not html, the file cannot be written, or an existing file is not a report.
         """
         check_report_name(path)
         with atomic_write(path, BEGINNINGS[".html"]) as stream:
@@ -53,17 +53,17 @@ class Report:
 
     @property
     def size(self) -> int:
-        """Length of the file, bytes."""
+        """Size of the file, bytes."""
         return len(self.content)
 
     @property
     def content(self) -> bytes:
-        """What the file holds."""
-        # Names of files need not be text.
+        """Content of the file."""
+        # File names are not always valid text.
         return self.html.encode(errors="backslashreplace")
 
     def __repr__(self) -> str:
-        """Say what it is, not what is in it."""
+        """Return a short description without the content."""
         return f"Report({'verified' if self.verified else 'NOT verified'}, {1e-6 * self.size:.1f} MB)"
 
     def _repr_html_(self) -> str:
@@ -73,7 +73,7 @@ class Report:
 
 
 def check_report_name(path: str | os.PathLike[str]) -> None:
-    """Refuse the name of a file of another format.
+    """Raise an error if the suffix of a file is not that of a report.
 
     Raises
     ------
@@ -90,11 +90,11 @@ def make_report(
     Parameters
     ----------
     motion : Result or Trajectory
-        Of `brachis.plan`; or a trajectory, a loaded one for example, which is verified again.
+        A result of `brachis.plan`; or a trajectory, for example a loaded one, which is verified again.
     title : str, optional
-        Of the page; the robot's name if left out, "motion" if it has none.
+        Title of the page. Default: the robot's name, or "motion" if it has none.
     degrees : bool, optional
-        Whether the tables and the interactive figures show angles in degrees; the pictures are in rad either way.
+        Whether the tables and the interactive figures show angles in degrees. The pictures always use rad.
 
     Returns
     -------
@@ -128,29 +128,29 @@ def make_report(
         phase_columns=(*PHASE_COLUMNS, "active limits"),
         kinds=joint_rows_of(reported.trajectory),
         pictures=_pictures(reported),
-        data=data.replace("<", "\\u003c"),  # no text ends the script element
+        data=data.replace("<", "\\u003c"),  # so that no text can end the script element
         plotly=plotly,
     )
     return Report(page, reported.verification.passed)
 
 
 def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
-    """Captions and pictures, which print and show without JavaScript."""
+    """Yield captions and pictures, which can be printed and need no JavaScript."""
     trajectory = reported.trajectory
-    caption = "The motion at a glance; dashed lines are limits, faint ticks the knots of the splines"
+    caption = "Overview of the motion. Dashed lines are limits; faint ticks are the knots of the splines."
     yield caption, as_html(plot_overview(trajectory))
     if len(reported.candidates) > 1:
-        caption = "End times of all that the search looked at"
+        caption = "End times of all candidates of the search"
         yield caption, as_html(plot_candidates(reported.candidates))
     if any(fit.profile for fit in trajectory.task.fits):
-        caption = "How far the points are from the path that was fitted to them"
+        caption = "Distance of the points from the path that was fitted to them"
         yield caption, as_html(plot_fit(trajectory))
 
 
 def _template() -> Any:
-    """Read the page's template, which includes its style and program.
+    """Read the page's template, including its style and program.
 
-    What is filled in is escaped unless the template marks it as safe.
+    Inserted text is escaped unless the template marks it as safe.
     """
     jinja2 = require_library("jinja2", "a report", library="Jinja2", extra="report")
     environment = jinja2.Environment(
@@ -165,7 +165,7 @@ def _template() -> Any:
 
 @cache
 def _plotly() -> str:
-    """Pack Plotly's program: 1.5 of 4.8 MB."""
+    """Compress Plotly's program from 4.8 MB to 1.5 MB."""
     plotly = require_library(
         "plotly.offline", "a report", library="Plotly", extra="report"
     )

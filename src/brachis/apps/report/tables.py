@@ -1,4 +1,4 @@
-"""The tables of a report, in words and figures with their units."""
+"""The tables of a report, with words, and numbers with their units."""
 
 from __future__ import annotations
 
@@ -18,18 +18,17 @@ from brachis.apps.plots.panels import Panel, PanelCurve, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
 from brachis.robot.from_task import in_use
-from brachis.search.stages import describe_coordinates
 from brachis.task import Task
 from brachis.trajectory import phase_rows
 
 NEAR = 0.9
-"""Values that use more of a limit are marked as near it; 1 is the limit itself."""
+"""Ratio to a limit above which a value is marked as close to it; 1 is the limit itself."""
 _LISTED = 6
-"""Segments of a path, and numbers of one, that are named."""
+"""Largest number of segments of a path, and of numbers in a segment, that are written out."""
 
 
 def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
-    """Say what a person asks first."""
+    """List the main figures of a motion, by name."""
     trajectory = motion.trajectory
     samples = motion.samples
     verification = motion.verification
@@ -47,14 +46,14 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
         "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
         "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
         "largest distance from the path": f"{verification.path_error:.1e} m or rad",
-        "redundant joints": describe_coordinates(trajectory),
+        "redundant joints": trajectory.redundancy,
         **named,
         **motion.planned,
     }
 
 
 def identity(motion: ReportedMotion) -> dict[str, str]:
-    """Say what the motion is of: robot, path, payload and where the robot stands; and when the page was made."""
+    """Describe robot, path, payload and mounting, and say when the report was made."""
     trajectory = motion.trajectory
     task = trajectory.task
     name = trajectory.robot.name
@@ -85,7 +84,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
 
 
 def describe_path(task: Task) -> str:
-    """Name the segments of a path, each by its shape and its entries in the task."""
+    """Describe each segment of a path by its shape and its entries in the task."""
     shapes = []
     for segment in task.path:
         for shape, values in segment.model_dump(exclude_defaults=True).items():
@@ -101,7 +100,7 @@ def describe_path(task: Task) -> str:
 
 
 def _write_entry(value: object) -> str:
-    """Write an entry of a segment: short lists as they are, long ones and mappings by their length."""
+    """Write an entry of a segment. Long lists and mappings are replaced by their length."""
     nested = (list, tuple, dict)
     if isinstance(value, float):
         return f"{value:.4g}"
@@ -113,12 +112,12 @@ def _write_entry(value: object) -> str:
 
 
 def task_text(task: Task) -> str:
-    """Write a task as YAML; of files without their folders, which say nothing to another reader."""
+    """Write a task as YAML, with file names but without their folders, which mean nothing to other readers."""
     return yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False)
 
 
 def _without_folders(value: Any) -> Any:
-    """Replace absolute paths of files, wherever they are, by the files' names."""
+    """Replace every absolute path in nested data by the name of the file."""
     if isinstance(value, dict):
         return {key: _without_folders(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -127,7 +126,7 @@ def _without_folders(value: Any) -> Any:
 
 
 def _file_name(text: str) -> str:
-    """Return the name of the file of an absolute path; any other text as it is."""
+    """Return the file name of an absolute path, and any other text unchanged."""
     for kind in (PurePosixPath, PureWindowsPath):
         if kind(text).is_absolute():
             return kind(text).name
@@ -135,7 +134,7 @@ def _file_name(text: str) -> str:
 
 
 def what_limits(motion: ReportedMotion) -> str:
-    """Name the limits that are active longest, in one sentence."""
+    """Name the limits that are active longest in one sentence."""
     shares = [
         f"{entry.label} ({100.0 * entry.share:.0f} % of the time)"
         for entry in motion.saturations
@@ -143,11 +142,11 @@ def what_limits(motion: ReportedMotion) -> str:
     ]
     if not shares:
         return "No limit is active."
-    return f"At its limits longest: {', '.join(shares[:3])}."
+    return f"Limits that are active longest: {', '.join(shares[:3])}."
 
 
 def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
-    """List the phases, each with the limits that hold it back; none of a motion with one phase."""
+    """List the phases, each with its active limits. The list is empty for a motion with one phase."""
     phases = limits_by_phase(motion.trajectory, motion.saturations)
     rows = phase_rows(motion.trajectory.phases)
     if len(rows) == 1:
@@ -156,15 +155,15 @@ def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
 
 
 def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
-    """List what every joint does, in chain order.
+    """Describe the motion of every joint, in chain order.
 
     Returns
     -------
     list of dict
-        ``name``; ``redundant``; the positions ``start``, ``end`` and, from the lowest to the highest, ``travel``, with
-        their unit; ``peaks``: of every kind of quantity the extreme ``value`` with its unit, the ``limit`` and the
-        ``share`` of it, both empty without a limit, and how near it is: the ``level`` ``beyond``, ``at``, ``near`` or
-        none.
+        ``name``; ``redundant``; the positions ``start`` and ``end``, and the range ``travel`` from the lowest to the
+        highest position, with their unit. ``peaks`` has an entry for every kind of quantity: the extreme ``value`` with
+        its unit; the ``limit`` and the ``share`` of it that is used, both empty without a limit; and the ``level``,
+        which is ``beyond``, ``at``, ``near`` or empty.
     """
     trajectory = motion.trajectory
     tolerance = trajectory.task.refinement.tolerance
@@ -187,7 +186,7 @@ def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
 
 
 def _find_peak(panel: Panel, curve: PanelCurve, tolerance: float) -> dict[str, str]:
-    """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
+    """Find the value of a joint that is closest to its limit or, without a limit, the largest value."""
     ratios = np.abs(curve.ratios if curve.is_limited else curve.values)
     worst = np.argmax(ratios)
     value = f"{_write_number(curve.values[worst])} {panel.unit}"
@@ -207,14 +206,14 @@ def _find_peak(panel: Panel, curve: PanelCurve, tolerance: float) -> dict[str, s
 
 
 def _write_number(value: float) -> str:
-    """Write a number with four significant figures, large ones without an exponent, rounding noise as zero."""
+    """Write a number with four significant figures; large numbers have no exponent, and rounding noise is zero."""
     if abs(value) <= 1e-9:
         return "0"
     return f"{value:.0f}" if 1e4 <= abs(value) < np.inf else f"{value:.4g}"
 
 
 def check_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
-    """List the checks of the verification in words, those that failed first."""
+    """List the checks of the verification in words. Failed checks come first."""
     rows = []
     for check in sorted(motion.verification.checks, key=lambda check: check.passed):
         figure, allowed, unit = check.figures(degrees=motion.degrees)
@@ -239,7 +238,7 @@ def check_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
 
 
 def versions() -> dict[str, str]:
-    """Name the versions of what made the report."""
+    """Return the versions of brachis, Python and the libraries used, by name."""
     libraries = ("pin", "numpy", "scipy", "plotly")
     return {
         "brachis": brachis.__version__,

@@ -1,4 +1,4 @@
-"""Many plans: a task whose keys are varied over grids, rows and random draws, planned in processes or on a cluster."""
+"""Sweeps: a task is planned many times, with keys varied over grids, rows and random draws."""
 
 from brachis.apps.sweeps.result import SweepResult
 from brachis.apps.sweeps.run import sweep

@@ -1,4 +1,4 @@
-"""End times over one key, or two."""
+"""The figure of a sweep: end times over one key or two."""
 
 from __future__ import annotations
 
@@ -20,26 +20,27 @@ if TYPE_CHECKING:
 _HEIGHT = 62.0
 """Height of the figure for each key, mm."""
 _MOST_TICKS = 12
-"""Names along one axis, and cells of a heat map along one axis that have their times written in them."""
+"""Largest number of names along one axis, and of cells along one axis of a heat map that shows times as text."""
 _COLOURS = "viridis"
 _END_TIME = r"$t_\mathrm{E}$ (s)"
 
 
 def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure:
-    """Draw the end times of verified plans over one key, a line, or two, a heat map.
+    """Draw the end times of verified plans over one key, as a line, or over two keys, as a heat map.
 
     Parameters
     ----------
     rows : sequence of mapping
-        With the keys, ``status`` and ``t_end_s`` (s). Of plans that agree in the keys the fastest is shown.
+        Rows with the keys, ``status`` and ``t_end_s`` (s). Among plans with the same values of the keys, the fastest is
+        shown.
     keys : sequence of str
-        One or two. Of two keys with less than half of their combinations, as of random draws, points are shown instead
-        of a heat map.
+        One or two keys. If the rows contain less than half of the combinations of two keys, as for random draws, points
+        are shown instead of a heat map.
 
     Returns
     -------
     Figure
-        Crosses mark where no plan is verified.
+        Crosses mark values for which no plan is verified.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
 def _find_fastest(
     rows: Sequence[Mapping[str, Any]], keys: Sequence[str]
 ) -> dict[tuple[Any, ...], float]:
-    """Find the least time for each combination of the keys' values, s; NaN where no plan is verified."""
+    """Find the least time for each combination of the keys' values, s; NaN if no plan is verified."""
     cells: dict[tuple[Any, ...], float] = {}
     for row in rows:
         cell = tuple(row[key] for key in keys)
@@ -126,9 +127,9 @@ def _find_fastest(
 def _locate(
     column: Sequence[Any], *, side_by_side: bool
 ) -> tuple[np.ndarray, list[Any]]:
-    """Return where values lie on an axis, and what is written there in place of numbers.
+    """Return the positions of values on an axis, and the labels written there instead of numbers.
 
-    Numbers lie at themselves; others, and all of a heat map, side by side.
+    Numbers lie at their own value. Other values, and all values of a heat map, lie side by side.
     """
     distinct = list(dict.fromkeys(column))
     if all(type(value) in {int, float} for value in distinct):
@@ -140,7 +141,7 @@ def _locate(
 
 
 def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
-    """Draw cells at whole numbers x and y, NaN empty; small maps have the times written in them."""
+    """Draw cells at whole numbers x and y, with NaN empty. Small maps show the times as text."""
     grid = np.full((int(y.max()) + 1, int(x.max()) + 1), np.nan)
     grid[y.astype(int), x.astype(int)] = times
     image = ax.imshow(grid, cmap=_COLOURS, aspect="auto", origin="lower")
@@ -162,7 +163,7 @@ def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) ->
 
 
 def _title(key: str) -> str:
-    """Name a key with its unit."""
+    """Return the name of a key with its unit."""
     unit = unit_of(key)
     return style.plain(f"{key} ({unit})" if unit else key)
 

@@ -1,4 +1,4 @@
-"""From a sweep file to the plans that it asks for, each known by all that decides its outcome; and making a plan."""
+"""Reading a sweep file, listing its plans, and making a plan. A plan is recognised by all that decides its outcome."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ from brachis.task.yaml_reader import read_yaml
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is sent to a worker; no file is needed there.
+    """A plan in the form in which it is sent to a worker, which needs no file.
 
     Attributes
     ----------
     digest : str
-        Of all that follows, 16 hexadecimal digits: plans that are alike are made once.
+        Hash of all other attributes, 16 hexadecimal digits. Equal plans are made only once.
     task : Task
-        With all files read.
+        Task, with the content of all its files.
     urdf : str
         Text of the URDF.
     version : str
-        Of brachis.
+        Version of brachis.
     """
 
     digest: str
@@ -64,12 +64,12 @@ FAILED = "failed"
 
 @dataclass(frozen=True)
 class PlanOutcome:
-    """What came of a plan.
+    """The outcome of a plan.
 
     Attributes
     ----------
     facts : dict
-        Values of `brachis.apps.sweeps.result.COLUMNS`; those that are left out are null.
+        Values of `brachis.apps.sweeps.result.COLUMNS`. Missing values are null.
     motion : bytes or None
         The saved trajectory, an npz archive.
     """
@@ -81,7 +81,7 @@ class PlanOutcome:
     def of_error(
         cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
     ) -> PlanOutcome:
-        """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
+        """Return the outcome of a failed plan, with the message of the error unless another is given."""
         kind = type(error).__name__
         facts = {
             "status": FAILED,
@@ -93,18 +93,18 @@ class PlanOutcome:
 
 
 SweepRow = tuple[Mapping[str, Any], Plan | BrachisError]
-"""Values of the varied keys, and the plan, or an error if the task is refused: one row of the sweep's table."""
+"""One row of the sweep's table: the values of the varied keys, and the plan, or an error if the task is not valid."""
 
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """A sweep before it is run.
+    """A sweep that has been read but not run.
 
     Attributes
     ----------
     settings : SweepSettings
     base : mapping
-        The task, not checked yet.
+        The task, which is not checked yet.
     rows : tuple of SweepRow
     """
 
@@ -119,7 +119,7 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
     Parameters
     ----------
     source : path or mapping
-        A sweep file, or its content; ``task`` may be a `Task` in a mapping.
+        Sweep file, or its content. In a mapping, ``task`` may be a `Task`.
 
     Returns
     -------
@@ -128,8 +128,8 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
     Raises
     ------
     TaskError
-        The sweep or its task is wrong; or a key is refused in all plans that set it. A value that is refused while
-        others of the key are not becomes a row with that error.
+        The sweep or its task is not valid; or a key is an error in all plans that set it. If only some values of a key
+        are errors, their plans become rows with the error.
     """
     content: object = source
     name = "sweep"
@@ -182,18 +182,18 @@ def _plan(
         urdf = read_file(Path(task.robot.urdf))
     except BrachisError as error:
         return error
-    # Plans run side by side already, and the number of processes of one must not make it another plan.
+    # Plans already run in parallel, and the number of processes must not change the digest.
     search = task.search.model_copy(update={"jobs": 1})
     task = task.model_copy(update={"search": search})
     known = task.to_dict()
-    known["robot"].pop("urdf", None)  # its text counts, not where it is
+    known["robot"].pop("urdf", None)  # the text of the URDF matters, not its place
     said = json.dumps([known, urdf, brachis.__version__], sort_keys=True)
     digest = hashlib.sha256(said.encode()).hexdigest()[:16]
     return Plan(digest, task, urdf, brachis.__version__)
 
 
 def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) -> None:
-    """Refuse keys that make every task wrong, and names that the robot does not have.
+    """Raise an error for keys that are wrong in every task, and for names that the robot does not have.
 
     Raises
     ------
@@ -202,14 +202,14 @@ def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) ->
 
     @cache
     def find_error(plan: Plan | BrachisError) -> BrachisError | None:
-        """Return why a task is refused, or a name that its robot does not have."""
+        """Return the error of a task that is not valid or that has an unknown name."""
         if isinstance(plan, BrachisError):
             return plan
         try:
             Problem.of(robot_of(plan), plan.task)
         except UnknownNameError as error:
             return error
-        except BrachisError:  # other values of the same key may be right
+        except BrachisError:  # other values of the same key may be valid
             return None
         return None
 
@@ -219,38 +219,38 @@ def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) ->
         plans.sort(key=lambda plan: isinstance(plan, BrachisError))
         if all(map(find_error, plans)):
             refused[key] = (
-                f"refused in every plan that sets it ({len(plans)}); the first: {find_error(plans[0])}"
+                f"an error in every plan that sets it ({len(plans)}); the first: {find_error(plans[0])}"
             )
     if refused:
-        # One wrong key refuses the plans of all others.
+        # One wrong key makes the plans of all other keys fail.
         named = [key for key, text in refused.items() if key in text]
         key = (named or [*refused])[0]
         raise TaskError(refused[key], where=f"{name}: {key}")
 
 
 def robot_of(plan: Plan) -> Robot:
-    """Make the robot of a plan; reads no file."""
+    """Make the robot of a plan without reading a file."""
     return robot_from_settings(plan.task.robot, urdf_text=plan.urdf)
 
 
 def run_plan(plan: Plan) -> PlanOutcome:
-    """Make a plan; a worker calls this.
+    """Make a plan. This function is called by workers.
 
     Raises
     ------
     ClusterError
-        This process has another version of brachis than the one that asks.
+        This process has a different version of brachis than the process that runs the sweep.
     """
     if plan.version != brachis.__version__:
         raise ClusterError(
-            "a worker has another version of brachis",
+            "a worker has a different version of brachis",
             found=brachis.__version__,
             allowed=plan.version,
             hint="Install the same version for all workers",
         )
     began = time.perf_counter()
     try:
-        with warnings.catch_warnings():  # they are among the outcome's remarks
+        with warnings.catch_warnings():  # warnings are among the remarks of the outcome
             warnings.simplefilter("ignore", BrachisWarning)
             result = planner.plan(
                 robot_of(plan), plan.task, progress=False, check_advice=False

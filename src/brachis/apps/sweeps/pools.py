@@ -1,6 +1,6 @@
-"""Where plans are made: processes of this machine, or the executor of a cluster.
+"""Pools in which plans are made: processes on this machine, or the executor of a cluster.
 
-A pool takes plans and gives each back with its outcome, as soon as there is one, in any order.
+A pool receives plans and yields each plan with its outcome as soon as it is finished, in any order.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ Outcomes = Generator[tuple[Plan, PlanOutcome], None, None]
 Pool = Callable[[Sequence[Plan]], Outcomes]
 
 AHEAD = 2
-"""Plans that are handed out for each process, so that none waits for the next one."""
+"""Number of plans that are handed out for each process, so that no process waits for its next plan."""
 HEARTBEAT = 1.0
-"""Time until Ctrl-C, or the end of the parent process, is noticed, s."""
+"""Time after which Ctrl-C or the end of the parent process is noticed, s."""
 _POLL = 0.02
-"""Time between two looks at what is done, s; plans take tenths of a second or more."""
-_CONTINUES = "Finished plans are stored: the same sweep continues with the others"
-_ENDED = "each worker process ended during this plan: a crash, or too little memory"
+"""Time between two checks for finished plans, s. Plans take tenths of a second or more."""
+_CONTINUES = "Finished plans are stored; run the same sweep again to make the others"
+_ENDED = "every worker process ended during this plan: a crash, or too little memory"
 _ONE_THREAD = dict.fromkeys(
     (
         "OMP_NUM_THREADS",
@@ -41,23 +41,23 @@ _ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
-"""Environment of worker processes."""
+"""Environment variables of worker processes."""
 
 
 def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
-    """Choose where plans are made.
+    """Return the pool in which plans are made.
 
     Parameters
     ----------
     jobs : int or None
-        Processes on this machine; None: as many as it has processors.
+        Number of processes on this machine. None means as many as it has processors.
     executor : Executor or None
-        What makes them in place of processes of this machine.
+        Executor that makes the plans instead of processes on this machine.
 
     Raises
     ------
     InputError
-        Both are given, or one is wrong.
+        Both are given, or one is not valid.
     """
     if executor is None:
         workers = None if jobs is None else count(jobs, "jobs")
@@ -76,10 +76,10 @@ def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
 def as_completed(
     plans: Iterable[Plan], submit: Callable[[Plan], Future[PlanOutcome]], width: int
 ) -> Iterator[tuple[Plan, PlanOutcome]]:
-    """Hand out plans, up to `width` at a time, and yield what comes back.
+    """Hand out plans, up to `width` at a time, and yield their outcomes.
 
-    Plans that were under way when a process ended are made again, one at a time, so that the one that ends it is known.
-    Futures of some clusters have only ``done``, ``exception``, ``result`` and ``cancel``.
+    Plans that were running when a process ended are made again, one at a time, to find out which plan ends it. Futures
+    of some clusters have only ``done``, ``exception``, ``result`` and ``cancel``.
     """
     waiting = iter(plans)
     suspects = deque[Plan]()
@@ -118,7 +118,7 @@ def _error_of(future: Future[PlanOutcome]) -> BaseException | None:
 
 
 def _outcome_of(future: Future[PlanOutcome]) -> PlanOutcome:
-    """Return what came of a plan; `run_plan` makes an outcome of every error but those of the worker itself."""
+    """Return the outcome of a plan. `run_plan` turns every error into an outcome, except errors of the worker."""
     error = _error_of(future)
     if error is None:
         return future.result()
@@ -136,7 +136,7 @@ def _outcome_of(future: Future[PlanOutcome]) -> PlanOutcome:
 
 
 def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
-    """Make plans by an executor, which gets all of them at once.
+    """Make plans with an executor, which receives all of them at once.
 
     Yields
     ------
@@ -145,7 +145,7 @@ def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
     Raises
     ------
     ClusterError
-        Its workers ended, cannot be reached, or cannot run brachis.
+        The workers ended, cannot be reached, or cannot run brachis.
     """
     try:
         yield from as_completed(
@@ -158,15 +158,16 @@ def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
 
 
 def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
-    """Make plans in processes of this machine.
+    """Make plans in processes on this machine.
 
-    A plan that ends its process (memory, a crash) fails; those that were made beside it are made again.
+    A plan that ends its process (too little memory, a crash) fails. Plans that were running at the same time are made
+    again.
 
     Parameters
     ----------
     plans : sequence of Plan
     jobs : int or None
-        Number of processes, if there are as many processors and plans; None: as many as possible.
+        Largest number of processes. There are never more than processors or plans. None means as many as possible.
 
     Yields
     ------
@@ -185,7 +186,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
     processes = executor()
 
     def submit(plan: Plan) -> Future[PlanOutcome]:
-        """Hand out a plan, to new processes if the old ones ended."""
+        """Hand out a plan, and start new processes if the old ones ended."""
         nonlocal processes
         with interrupts.block_in_children():  # this may start processes
             try:
@@ -202,10 +203,10 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this worker process soon after its parent: a parent that was killed cannot end its workers."""
+    """End this worker process soon after its parent, because a killed parent cannot end its workers."""
 
     def watch() -> None:
-        """Wait for the end of the parent."""
+        """Wait for the end of the parent process."""
         while os.getppid() == parent:
             time.sleep(HEARTBEAT)
         os._exit(1)

@@ -1,7 +1,8 @@
-"""What a sweep gives: its folder, with every finished plan in files of its own, and the table of all plans.
+"""The result of a sweep: its folder, in which every finished plan has its own files, and the table of all plans.
 
-``plans/3f/3f0a....parquet`` is one row, ``plans/3f/3f0a....npz`` its motion. Both are whole or not there: they are
-written under temporary names, the motion first, so that a row is a plan that is finished.
+``plans/3f/3f0a....parquet`` is one row of the table, and ``plans/3f/3f0a....npz`` is its motion. Files are written
+under temporary names and then renamed, so that they are complete or missing. The motion is written first, so that every
+row belongs to a finished plan.
 """
 
 from __future__ import annotations
@@ -47,15 +48,15 @@ COLUMNS = {
     "remarks": "string",
     "motion": "string",
 }
-"""Columns of an outcome: names and Arrow types. Times in s; the path error in m or rad, whichever is larger."""
+"""Columns of an outcome, with Arrow types. Times are in s. The path error is the larger of the values in m and rad."""
 TABLE = "table"
-"""Name of the table of all plans, without its suffix."""
+"""File name of the table of all plans, without its suffix."""
 _ABOUT = "sweep.json"
 _MARK = "brachis_sweep"
 
 
 def read_description(folder: Path) -> dict[str, Any] | None:
-    """Return what a sweep wrote down in its folder; None if the folder contains no sweep."""
+    """Return the description that a sweep wrote into its folder; None if the folder contains no sweep."""
     try:
         about: dict[str, Any] = json.loads(read_file(folder / _ABOUT))
         is_ours = _MARK in about
@@ -70,12 +71,13 @@ class Store:
     Parameters
     ----------
     folder : Path
-        Made if it does not exist. One that holds other files than those of a sweep is refused.
+        Created if it does not exist. A folder that contains other files than those of a sweep is an error.
 
     Raises
     ------
     InputError
-        The folder is not a sweep's, or cannot be written; or, as `NotInstalledError`, pyarrow is not installed.
+        The folder does not belong to a sweep or cannot be written; or, as `NotInstalledError`, pyarrow is not
+        installed.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -89,20 +91,20 @@ class Store:
             raise InputError(
                 "the folder contains other files",
                 where=str(folder),
-                allowed=f"a new folder, or one with a sweep's {_ABOUT}",
+                allowed=f"a new folder, or one with the {_ABOUT} of a sweep",
             )
 
     def describe(self, about: Mapping[str, Any]) -> None:
-        """Write down what the folder is for."""
+        """Write the description of the sweep into the folder."""
         with atomic_write(self.folder / _ABOUT) as stream:
             stream.write(json.dumps({_MARK: 1, **about}, indent=2).encode() + b"\n")
 
     def _place(self, digest: str, suffix: str) -> Path:
-        """Name a file of a plan, in one of 256 folders: a folder with thousands of files is slow to write to."""
+        """Return the path of a plan's file in one of 256 folders; folders with thousands of files are slow to write."""
         return self.folder / "plans" / digest[:2] / f"{digest}{suffix}"
 
     def write(self, digest: str, outcome: PlanOutcome) -> dict[str, Any]:
-        """Store a finished plan; returns its columns."""
+        """Store a finished plan and return its columns."""
         motion = self._place(digest, ".npz")
         columns_file = self._place(digest, ".parquet")
         with writing_errors(columns_file):
@@ -144,10 +146,9 @@ class Store:
         keys : sequence of str
             The varied keys.
         rows : mapping of int to (mapping, mapping)
-            By the number of the plan, values of these keys, and the columns of the outcome; those that are left out are
-            null.
+            Values of these keys, and columns of the outcome, by the number of the plan. Missing columns are null.
         name : str
-            Of the files, without their suffixes.
+            Name of the files, without their suffixes.
         """
         from pyarrow import csv
 
@@ -165,12 +166,12 @@ class Store:
         return table
 
     def read_table(self) -> pa.Table:
-        """Read the table.
+        """Read the table of all plans.
 
         Raises
         ------
         InputError
-            It is missing or cannot be read.
+            The table is missing or cannot be read.
         """
         path = self.folder / f"{TABLE}.parquet"
         try:
@@ -184,7 +185,7 @@ class Store:
 
 
 def _column(values: Sequence[Any]) -> list[Any]:
-    """Return numbers, texts and truth values as they are, and others, lists for example, as JSON."""
+    """Return numbers, texts and truth values as they are, and other values, for example lists, as JSON."""
     kinds = {type(value) for value in values if value is not None}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
@@ -200,17 +201,17 @@ class SweepResult(Summary):
     Attributes
     ----------
     folder : Path
-        Where plans and table are stored.
+        Folder in which plans and table are stored.
     keys : tuple of str
         Task keys that were varied.
     table : pyarrow.Table
-        One row for each plan: ``plan`` (its number), the keys, and what came of it: ``status`` (verified, unverified or
+        One row for each plan: ``plan`` (its number), the keys, and the outcome: ``status`` (verified, unverified or
         failed), ``t_end_s`` (s), ``worst_ratio`` (to a limit), ``path_error`` (m or rad), ``chosen_joints``,
         ``chosen_branch``, ``chosen_solver``, ``iterations``, ``wall_time_s`` (s), ``error`` (its class) and
         ``message``, ``remarks``, ``motion`` (its file in the folder). Values that are neither numbers nor strings are
-        JSON.
+        written as JSON.
     name : str
-        Of the table's files, without their suffixes; ``table`` unless the sweep was one part.
+        Name of the table's files, without their suffixes: ``table``, unless only a part of the sweep was run.
 
     Examples
     --------
@@ -239,12 +240,12 @@ class SweepResult(Summary):
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> SweepResult:
-        """Read the sweep that a folder holds.
+        """Read the sweep in a folder.
 
         Raises
         ------
         InputError
-            It holds no sweep, or one that was not finished.
+            The folder contains no sweep, or an unfinished one.
         """
         path = Path(folder)
         about = read_description(path)
@@ -252,21 +253,21 @@ class SweepResult(Summary):
             raise InputError(
                 "the folder contains no sweep",
                 where=str(path),
-                allowed=f"one with its {_ABOUT}",
+                allowed=f"a folder with the {_ABOUT} of a sweep",
             )
         settings = SweepSettings.model_validate(about["settings"])
         return cls(path, settings.keys, Store(path).read_table())
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Keys that take more than one value."""
+        """Keys with more than one value."""
         return tuple(
             key for key in self.keys if len(self.table.column(key).unique()) > 1
         )
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The table as Parquet and as CSV."""
+        """Files of the table, as Parquet and as CSV."""
         return tuple(
             self.folder / f"{self.name}.{suffix}" for suffix in ("parquet", "csv")
         )
@@ -285,7 +286,7 @@ class SweepResult(Summary):
         Parameters
         ----------
         plan : int
-            Its number, from 0.
+            Number of the plan, from 0.
 
         Raises
         ------
@@ -306,16 +307,16 @@ class SweepResult(Summary):
         return Trajectory.load(self.folder / row["motion"])
 
     def ranked(self) -> list[dict[str, Any]]:
-        """Return the rows of verified plans, the fastest first."""
+        """Return the rows of verified plans, beginning with the fastest."""
         verified = [row for row in self.rows() if row["status"] == VERIFIED]
         return sorted(verified, key=lambda row: row["t_end_s"])
 
     def count(self, status: str) -> int:
-        """Count the plans of a status: verified, unverified or failed."""
+        """Count the plans with a status: verified, unverified or failed."""
         return self.table.column("status").to_pylist().count(status)
 
     def failures(self) -> dict[str, tuple[int, str]]:
-        """Return, for each class of error, the commonest first, how many plans failed with it, and one message."""
+        """Return how many plans failed with each class of error, with one message; the commonest error comes first."""
         failed = [row for row in self.rows() if row["status"] == FAILED]
         counts = collections.Counter(row["error"] for row in failed)
         messages = {row["error"]: row["message"] for row in failed}
@@ -324,9 +325,9 @@ class SweepResult(Summary):
         }
 
     def summary(self) -> dict[str, Any]:
-        """Return the sweep in short: numbers of plans, best, median and worst verified ones, failures by cause.
+        """Summarise the sweep: numbers of plans; best, median and worst verified plan; failures by cause.
 
-        Of an even number of plans the median is the faster one of the two in the middle.
+        For an even number of plans, the median is the faster of the two in the middle.
         """
         ranked = self.ranked()
         summary: dict[str, Any] = {"plans": len(self.table)}
@@ -347,13 +348,13 @@ class SweepResult(Summary):
         return {**summary, "wall_time_s": sum(filter(None, times))}
 
     def plot(self, keys: Sequence[str] | None = None) -> Figure:
-        """Draw the end times of verified plans over one key, a line, or two, a heat map.
+        """Draw the end times of verified plans over one key, as a line, or over two keys, as a heat map.
 
         Parameters
         ----------
         keys : sequence of str, optional
-            One or two of the varied keys; by default the first two that take more than one value. Where plans differ
-            in others too, the fastest of them is shown.
+            One or two of the varied keys. Default: the first two keys with more than one value. If plans also differ in
+            other keys, the fastest of them is shown.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Running a sweep: stored plans are kept, the others are made, and each is stored as soon as it is finished."""
+"""Running a sweep: stored plans are kept, missing ones are made, and each is stored as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -36,49 +36,49 @@ def sweep(
     listener: Listener | None = None,
     progress: bool | None = None,
 ) -> SweepResult:
-    """Plan a task many times, with other values of its keys.
+    """Plan a task many times with different values of its keys.
 
-    Every finished plan is stored at once. A sweep that was killed goes on where it was: run it again with the same
-    folder. A plan is known by its task with all defaults, its URDF's text and the version of brachis, not by its place
-    in the sweep: where the sweep was changed meanwhile, plans that it still has are kept, new ones are made, and the
-    table is of the sweep as it is now.
+    Every finished plan is stored at once. If a sweep was killed, run it again with the same folder, and it continues
+    where it stopped. A plan is recognised by its task with all defaults, the text of its URDF and the version of
+    brachis, not by its place in the sweep. If the sweep was changed in the meantime, plans that it still contains are
+    kept and new ones are made, and the table describes the current sweep.
 
     Parameters
     ----------
     source : path or mapping
-        A sweep file, or its content as in `SweepSettings`.
+        Sweep file, or its content as in `SweepSettings`.
     out : path, optional
-        Folder; by default one in the current folder, named as the file without its suffix, or ``sweep``.
+        Folder of the sweep. Default: a folder in the current one, named like the file without its suffix, or ``sweep``.
     jobs : int, optional
-        Processes on this machine, no more than it has processors, which is also the default.
+        Number of processes on this machine. Maximum and default: its number of processors.
     executor : Executor, optional
-        Makes the plans in place of processes of this machine: a Dask client, or any ``concurrent.futures.Executor``,
-        such as those of mpi4py and parsl. Its workers need brachis, and no files.
+        Makes the plans instead of processes on this machine: a Dask client or any ``concurrent.futures.Executor``, such
+        as those of mpi4py and parsl. Its workers need brachis, but no files.
     part : str, optional
-        ``"i/n"``: of n parts of the sweep only the i-th, from 1 on, for jobs of a cluster's scheduler that share the
-        folder. It has a table of its own, such as ``table-2-of-8.csv``.
+        ``"i/n"`` plans only the i-th of n parts of the sweep, counted from 1. This is meant for jobs of a cluster's
+        scheduler that share the folder. Each part has its own table, such as ``table-2-of-8.csv``.
     merge : bool, optional
-        Whether only to put the plans of all parts together in one table; no plan is made.
+        Whether to only collect the plans of all parts in one table. No plan is made.
     retry : bool, optional
         Whether stored failures are planned again.
     listener : callable, optional
-        Called with how far the sweep is, and how much time is left.
+        Called with a text on the progress of the sweep and the time left.
     progress : bool, optional
-        Whether to show that, as `plan` does.
+        Whether to show the progress, as `plan` does.
 
     Returns
     -------
     SweepResult
-        One row for each plan. Plans that failed are rows with the error's class and message.
+        One row for each plan. The row of a failed plan has the class and message of the error.
 
     Raises
     ------
     TaskError
-        The sweep is wrong, or a key is refused in all plans that set it; nothing was run.
+        The sweep is not valid, or a key is an error in all plans that set it. Nothing was run.
     InputError
-        The folder is not a sweep's; a library is missing; or, with `merge`, plans are missing.
+        The folder does not belong to a sweep; a library is missing; or, with `merge`, plans are missing.
     ClusterError
-        The executor lost its workers, or they cannot run brachis; what was finished is stored.
+        The executor lost its workers, or they cannot run brachis. Finished plans are stored.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def sweep(
 
 
 def _read_part(text: str, plans: int) -> tuple[int, int]:
-    """Read ``i/n``, of no more parts than plans."""
+    """Read ``i/n``, where n is at most the number of plans."""
     numbers = re.fullmatch(r"([0-9]+)/([0-9]+)", text)
     first, part_count = map(int, numbers.groups()) if numbers else (0, 0)
     if not 1 <= first <= part_count <= plans:
@@ -146,7 +146,7 @@ def _read_part(text: str, plans: int) -> tuple[int, int]:
 
 
 def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
-    """Make no plan; raise an error if there is one to make."""
+    """Make no plan, and raise an error if any plan is missing."""
     digests = {plan.digest for plan in plans}
     numbers = [
         str(number)
@@ -158,7 +158,7 @@ def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
             "parts of the sweep are missing",
             where="merge",
             found=f"no result of {write_count(len(numbers), 'plan')}: {name_first(numbers, ', ')}",
-            hint="Run their parts in the same folder, or the sweep without merge",
+            hint="Run the missing parts in the same folder, or run the sweep without merge",
         )
     yield from ()
 
@@ -166,7 +166,7 @@ def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
 def _run(
     selected: Sequence[Plan], store: Store, pool: Pool, *, retry: bool, tell: Listener
 ) -> dict[str, dict[str, Any]]:
-    """Make the plans that are not stored yet, and return the columns of all, by digest."""
+    """Make the plans that are not stored yet, and return the columns of all plans by digest."""
     plans = {plan.digest: plan for plan in selected}
     facts_by_digest = {}
     for digest in plans:
@@ -179,7 +179,7 @@ def _run(
     tell(f"{stored} of {every}{' are stored already' if stored else ''}")
     missing = [plan for digest, plan in plans.items() if digest not in facts_by_digest]
     try:
-        # Workers end with this block, even if an outcome cannot be stored.
+        # Workers end with this block even if an outcome cannot be stored.
         with closing(pool(missing)) as outcomes:
             for plan, outcome in outcomes:
                 facts_by_digest[plan.digest] = store.write(plan.digest, outcome)
@@ -195,6 +195,6 @@ def _run(
         interrupts.clear()
         counts = f"{len(facts_by_digest)} of {len(plans)} plans"
         raise KeyboardInterrupt(
-            f"{counts} are stored in {store.folder}; the same sweep goes on from there"
+            f"{counts} are stored in {store.folder}; the same sweep continues from there"
         ) from interrupt
     return facts_by_digest

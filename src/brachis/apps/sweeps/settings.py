@@ -1,4 +1,4 @@
-"""What a sweep file says: a task, and the values that its keys take."""
+"""Content of a sweep file: a task, and the values that its keys take."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
 
 
 class _OneKey(Model):
-    """A mapping with exactly one of its keys."""
+    """A mapping in which exactly one of the keys is given."""
 
     @property
     def given(self) -> dict[str, Any]:
-        """The key that is given, with its value."""
+        """The given key with its value."""
         return {key: value for key, value in self if value is not None}
 
     @model_validator(mode="after")
@@ -60,14 +60,16 @@ class Spacing(_OneKey):
     """Values at equal distances or ratios."""
 
     linear: tuple[Number, Number, _HowMany] | None = Field(
-        default=None, description="Equal distances: first value, last value, how many."
+        default=None,
+        description="Equal distances: first value, last value, number of values.",
     )
     logarithmic: tuple[Positive, Positive, _HowMany] | None = Field(
-        default=None, description="Equal ratios: first value, last value, how many."
+        default=None,
+        description="Equal ratios: first value, last value, number of values.",
     )
 
     def values(self) -> list[JsonValue]:
-        """List them."""
+        """List the values."""
         ((key, values),) = self.given.items()
         spread = np.linspace if key == "linear" else np.geomspace
         return spread(*values).tolist()
@@ -85,20 +87,25 @@ class Distribution(_OneKey):
     """Distribution of random values."""
 
     uniform: Annotated[tuple[Number, Number], AfterValidator(_ascending)] | None = (
-        Field(default=None, description="Every value between two ends is as likely.")
+        Field(
+            default=None, description="All values between two ends are equally likely."
+        )
     )
     log_uniform: (
         Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] | None
     ) = Field(
-        default=None, description="Every ratio between two ends, > 0, is as likely."
+        default=None,
+        description="The logarithm is uniform between those of two ends > 0.",
     )
     normal: tuple[Number, Positive] | None = Field(
         default=None, description="Mean and standard deviation."
     )
-    choice: _Values | None = Field(default=None, description="Each value is as likely.")
+    choice: _Values | None = Field(
+        default=None, description="All listed values are equally likely."
+    )
 
     def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
-        """Draw values."""
+        """Draw random values."""
         ((key, values),) = self.given.items()
         if key == "choice":
             return [values[i] for i in generator.integers(len(values), size=count)]
@@ -117,16 +124,16 @@ class RandomSettings(Model):
     seed: Count = Field(
         default=0,
         ge=0,
-        description="Seed. Every key has a stream of its own: more draws, or another key, leave the first ones as they "
-        "are.",
+        description="Seed. Every key has its own random stream, so that more draws or further keys do not change the "
+        "first draws.",
     )
     keys: Annotated[dict[Name, Distribution], Field(min_length=1)] = Field(
-        description="For every key uniform: [low, high], log_uniform: [low, high], normal: [mean, standard deviation] "
-        "or choice: [values]."
+        description="The distribution of every key: uniform: [low, high], log_uniform: [low, high], normal: [mean, "
+        "standard deviation] or choice: [values]."
     )
 
     def draws(self) -> list[dict[str, JsonValue]]:
-        """Draw: for each of the draws the values of all keys."""
+        """Return the values of all keys for each draw."""
         drawn: list[dict[str, JsonValue]] = [{} for _ in range(self.count)]
         for key, distribution in self.keys.items():
             seed = [self.seed, zlib.crc32(key.encode())]
@@ -137,22 +144,22 @@ class RandomSettings(Model):
 
 
 class SweepSettings(Model):
-    """A sweep: every combination of the grid, with every row, with every random draw."""
+    """A sweep, which combines every point of the grid with every row and every random draw."""
 
     sweep: Literal[1] = Field(description="Version of the format.")
     task: JsonValue = Field(
-        description="Task file, relative to the sweep file's folder; or a task in place."
+        description="Task file, relative to the folder of the sweep file; or the task itself."
     )
     fixed: dict[Name, JsonValue] = Field(
-        default={}, description="Keys that all plans set alike."
+        default={}, description="Keys that have the same value in all plans."
     )
     grid: dict[Name, GridValues] = Field(
         default={},
-        description="For every key its values: a list, {linear: [first, last, count]} or {logarithmic: [first, last, "
+        description="Values of every key: a list, {linear: [first, last, count]} or {logarithmic: [first, last, "
         "count]}.",
     )
     rows: tuple[dict[Name, JsonValue], ...] = Field(
-        default=(), description="Keys that change together."
+        default=(), description="Sets of keys that change together."
     )
     random: RandomSettings | None = Field(
         default=None, description="Keys with random values."
@@ -187,7 +194,7 @@ class SweepSettings(Model):
 
     @property
     def _varied(self) -> dict[str, Collection[str]]:
-        """Keys that are varied, by the place that varies them."""
+        """Varied keys, by the part of the file that varies them."""
         return {
             "grid": self.grid,
             "rows": dict.fromkeys(key for row in self.rows for key in row),
@@ -196,11 +203,13 @@ class SweepSettings(Model):
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys that are varied, in the order of the file."""
+        """Varied keys, in the order of the file."""
         return tuple(itertools.chain(*self._varied.values()))
 
     def changes(self) -> list[dict[str, JsonValue]]:
-        """List what every plan sets of the varied keys: the grid's first key changes slowest, equal ones come once.
+        """List the varied keys and their values for every plan. The grid's first key changes slowest.
+
+        Equal plans occur only once.
 
         Raises
         ------
@@ -238,5 +247,5 @@ class SweepSettings(Model):
 
 
 def _alike(changes: dict[str, JsonValue]) -> str:
-    """Return a text that is the same for the same changes, whether a number is written as 90 or as 90.0."""
+    """Return a text that is equal for equal changes, no matter whether a number is written as 90 or 90.0."""
     return json.dumps(json.loads(json.dumps(changes), parse_int=float), sort_keys=True)

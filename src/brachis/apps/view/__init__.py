@@ -1,6 +1,6 @@
-"""A motion in the browser: robot, path, tool trace and ghost postures, with plots that follow a slider.
+"""The viewer: robot, path, tool trace and ghost postures in the browser, with plots that follow a slider.
 
-The browser talks to a server on this machine (viser, of the extra ``view``), which plays the motion.
+The browser talks to a server on this machine (viser, from the extra ``view``), which plays the motion.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What is drawn of a robot and its scene: the shapes of the URDF or a skeleton, and where they are.
+"""Shapes of a robot and its scene for drawing: those of the URDF or a skeleton, and their placements.
 
-Shapes belong to the joint that moves them; joint 0 is the world, which stands still.
+Every shape belongs to the joint that moves it. Joint 0 is the world, which stands still.
 """
 
 from __future__ import annotations
@@ -34,40 +34,40 @@ if TYPE_CHECKING:
     Meshes = dict[int, list[trimesh.Trimesh]]
 
 _COLOURS = {
-    "shape": (150, 160, 172, 255),  # of a shape without a colour of its own
+    "shape": (150, 160, 172, 255),  # for a shape without its own colour
     "bone": (72, 101, 129, 255),
     "joint": (230, 159, 0, 255),
     "axis": (120, 130, 140, 255),
     "scene": (190, 120, 90, 255),
 }
-"""RGBA from 0 to 255."""
+"""Colours as RGBA from 0 to 255."""
 _LARGEST = 200_000_000
-"""Size of all mesh files of a robot together, unpacked, bytes; readers take several times as much memory."""
+"""Largest total size of a robot's unpacked mesh files, bytes. Reading them takes several times as much memory."""
 
 _FLOOR = 4.0
-"""Length and width of what is drawn of a half-space, m."""
+"""Length and width of the plate that represents a half-space, m."""
 _THIN = 0.002
-"""Its thickness, m."""
+"""Thickness of this plate, m."""
 
 
 def link_shapes(
     urdf: str, folder: Path
 ) -> tuple[dict[str, list[trimesh.Trimesh]], list[str]]:
-    """Read the shapes of the links that have any.
+    """Read the visual shapes of the links.
 
     Parameters
     ----------
     urdf : str
         Text of the URDF.
     folder : Path
-        Where it is: names of mesh files are relative to it, and packages are looked for in the folders above it.
+        Folder of the URDF. Names of mesh files are relative to it, and packages are searched in the folders above it.
 
     Returns
     -------
     shapes : dict of str to list of Trimesh
-        By link, in the link's frame, m.
+        Shapes by link, in the link's frame, m.
     unread : list of str
-        Of the shapes that cannot be shown, the link and the reason; of missing files one line.
+        Link and reason for each shape that cannot be shown. Missing files share one entry.
     """
     tree = read_tree(urdf, "URDF")
     shapes: dict[str, list[trimesh.Trimesh]] = {}
@@ -94,19 +94,19 @@ def link_shapes(
         except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
             unread.append(f"{name}: {type(error).__name__}: {error}")
     if absent:
-        hint = "ROS_PACKAGE_PATH may name the folder of a package"
+        hint = "ROS_PACKAGE_PATH can name the folder of a package"
         names = name_first(absent, ", ")
         unread.insert(0, f"missing mesh files: {names}; {hint}")
     return shapes, [reason[:500] for reason in unread]
 
 
 def _check_size(path: Path, room: int) -> int:
-    """Return the size of a mesh file, of an archive that of what is in it, bytes.
+    """Return the size of a mesh file, or of the unpacked content of an archive, bytes.
 
     Raises
     ------
     InputError
-        It is packed, so that its size is not known, or larger than `room`, bytes.
+        The file is compressed, so that its size is unknown, or it is larger than `room`, bytes.
     """
     if path.suffix in {".gz", ".bz2"}:
         raise InputError(
@@ -131,12 +131,12 @@ def _check_size(path: Path, room: int) -> int:
 def _meshes(
     name: str, visual: Element, materials: list[Element]
 ) -> list[trimesh.Trimesh]:
-    """Have yourdfpy read one visual, as the only one of a robot of one link.
+    """Read one visual with yourdfpy, as the only visual of a robot with one link.
 
     Raises
     ------
     InputError
-        There is nothing in it, or numbers that are not finite.
+        The visual has no faces, or numbers that are not finite.
     """
     import trimesh
     import yourdfpy
@@ -157,15 +157,15 @@ def _meshes(
             meshes.append(_paint(bare))
     if not meshes or not all(np.isfinite(mesh.vertices).all() for mesh in meshes):
         raise InputError(
-            "the mesh has no faces, or corners that are not finite",
+            "the mesh has no faces, or has corners that are not finite",
             where=visual.xpath("string(geometry/mesh/@filename)"),
         )
     return meshes
 
 
 def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Colour a mesh unless it has a picture on it."""
-    # A material, or colours of the faces.
+    """Colour a mesh unless it has a texture."""
+    # The look is a material, or the colours of the faces.
     look = getattr(mesh.visual, "material", mesh.visual)
     pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
     if pictures != [None, None]:
@@ -175,7 +175,7 @@ def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
-    """Give a mesh a matt material, RGBA from 0 to 255, and sharp edges if it has few faces."""
+    """Give a mesh a matt material with an RGBA colour, 0 to 255, and sharp edges if it has few faces."""
     import trimesh
 
     if len(mesh.faces) <= 2000:
@@ -188,14 +188,14 @@ def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trime
 
 
 def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forward kinematics of postures `q`, (K, n).
+    """Compute forward kinematics of postures `q`, (K, n).
 
     Returns
     -------
     positions : (K, n + 2, 3) ndarray
-        Of the world, of what every joint moves, and of the tool, in the world frame, m.
+        Positions of the world, of the frame that each joint moves, and of the tool, in the world frame, m.
     quaternions : (K, n + 2, 4) ndarray
-        w, x, y, z.
+        Their orientations: w, x, y, z.
     """
     tool = robot.frame_id
     rows = [
@@ -208,20 +208,20 @@ def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Shapes by the joint that moves them, in the joint's frame, m.
+    """Shapes for drawing, by the joint that moves them, in the joint's frame, m.
 
     Attributes
     ----------
     links : dict of int to list of Trimesh
-        Visual shapes of the URDF; joint 0 is the world.
+        Visual shapes of the URDF and bodies of the scene; joint 0 is the world.
     skeleton : dict of int to list of Trimesh
         Joints and the straight lines between them.
     unread : tuple of str
-        Shapes of the URDF that cannot be shown, and why.
+        Shapes of the URDF that cannot be shown, with reasons.
     box : (2, 3) ndarray
-        Lower and upper corner of the box that the whole robot keeps within, m.
+        Lower and upper corner of a box that contains the whole robot at all times, m.
     moving_box : (2, 3) ndarray
-        Of the box that its joints, what they move, and the tool keep within, m.
+        The same for a box that contains only the joints, the bodies they move, and the tool, m.
     """
 
     links: Meshes
@@ -232,12 +232,12 @@ class Bodies:
 
     @property
     def shows_links(self) -> bool:
-        """Whether the links can be seen; otherwise the skeleton has to do."""
+        """Whether all links can be shown; otherwise the skeleton is shown."""
         return bool(self.links) and not self.unread
 
 
 def bodies_of(trajectory: Trajectory) -> Bodies:
-    """Read a robot's shapes, and draw its skeleton as large as the robot is."""
+    """Read a robot's shapes, and make a skeleton that fits its size."""
     import trimesh
     from scipy.spatial.transform import Rotation
 
@@ -272,7 +272,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
 
 
 def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
-    """Draw every joint along its axis, the link from it to the next one, and what a prismatic joint slides on."""
+    """Make rods for each joint along its axis, for the links between joints, and for the rails of prismatic joints."""
     import trimesh
 
     robot = trajectory.robot
@@ -308,7 +308,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
 
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
-    """Return the path at the motion's own s, (K, 3), m; what it does not prescribe is the tool's."""
+    """Return the path at the motion's own s, (K, 3), m. Coordinates that it does not prescribe are the tool's."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     axes = list(task_map.axes)
     points = samples.tool_position.copy()
@@ -320,7 +320,7 @@ def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
 
 
 def scene_meshes(trajectory: Trajectory) -> Meshes:
-    """Make the meshes of the bodies of a task's scene, without the robot's own, in the frames of their joints, m."""
+    """Make meshes of the bodies in a task's scene, without the robot's own, in the frames of their joints, m."""
     task = trajectory.task
     scene = scene_of(trajectory.robot, task)
     meshes: Meshes = defaultdict(list)
@@ -336,7 +336,7 @@ def scene_meshes(trajectory: Trajectory) -> Meshes:
 
 
 def _mesh_of(solid: Solid) -> trimesh.Trimesh:
-    """Make the mesh of a solid in its own axes."""
+    """Make a mesh of a solid, in the axes of the solid."""
     import trimesh
 
     shape = solid.geometry

@@ -1,4 +1,4 @@
-"""The viewer's clock, and its plots with a line at the instant shown."""
+"""The viewer's playback clock, and its plots with a line at the instant shown."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 _PIXELS = {
     "height": 165,  # of a plot
-    "left": 40,  # of the curves in it, and so on
+    "left": 40,  # margin between the plot's edge and its curves, as in the next three rows
     "right": 12,
     "above": 6,
     "below": 44,
-    "label": 16,  # of the part below
-    "outside left": 9.5,  # what viser leaves free around a plot; a test measures it
-    "outside": 18.5,  # on both sides together
+    "label": 16,  # label of the axis, which is part of the margin below
+    "outside left": 9.5,  # space that viser leaves around a plot; a test measures it
+    "outside": 18.5,  # sum of both sides
     "outside below": 12,
 }
 _FONT = "11px sans-serif"
@@ -39,14 +39,14 @@ _FONT = "11px sans-serif"
 def shown_panels(
     trajectory: Trajectory, samples: Samples, *, degrees: bool = False
 ) -> list[Panel]:
-    """Make the panels of the viewer: ratios to all limits, joints without a limit, and the tool's speed.
+    """Make the viewer's panels: ratios to all limits, joint quantities without a limit, and the tool's speed.
 
     Parameters
     ----------
     trajectory : Trajectory
     samples : Samples
     degrees : bool, optional
-        Whether angles of joints without limits are in degrees.
+        Whether angles of joints without a limit are in degrees.
     """
     ratios = at_distinct_times(limit_ratios(trajectory))
     panels = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
@@ -59,7 +59,7 @@ def shown_panels(
 
 
 def add_plot(gui: viser.GuiApi, panel: Panel) -> viser.GuiHtmlHandle:
-    """Add one plot over time; return what holds the line at the instant shown."""
+    """Add one plot over time, and return the HTML element that shows the line at the current instant."""
     data = [panel.t]
     series: list[uplot.Series] = [{"label": "time (s)"}]
     for limit, _ in panel.near_limits():
@@ -94,7 +94,7 @@ def add_plot(gui: viser.GuiApi, panel: Panel) -> viser.GuiHtmlHandle:
 def _series(
     label: str, colour: str, dash: tuple[float, ...], width: float = 1.6
 ) -> uplot.Series:
-    """Describe a line without points."""
+    """Describe a curve without point markers."""
     return {
         "label": label,
         "stroke": colour,
@@ -105,7 +105,7 @@ def _series(
 
 
 def line_at(fraction: float) -> str:
-    """Line over the plot above it, at a part of its width; a plot whose data are replaced so often would blink."""
+    """Return a line over the plot above it, at a fraction of its width; redrawing the plot would make it blink."""
     before = _PIXELS["outside left"] + _PIXELS["left"]
     around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
     offset = f"calc({before}px + {fraction:.5f} * (100% - {around}px))"
@@ -120,14 +120,14 @@ def line_at(fraction: float) -> str:
 
 
 def look(number: int) -> tuple[str, tuple[float, ...]]:
-    """Colour and dashes of the curve with this number, as figures draw it."""
+    """Return the colour and the dashes of the curve with this style number, as in the figures."""
     line = style.joint_style(number)
     _, lengths = line["linestyle"]
     return line["color"], tuple(2.0 * length for length in lengths)
 
 
 def _heading(panel: Panel) -> str:
-    """Title of a plot, and the names in the colours of their curves, as HTML."""
+    """Return the title of a plot and the names of its curves with their colours, as HTML."""
     entries = []
     for curve in panel.curves:
         colour, dashes = look(curve.style)
@@ -145,32 +145,32 @@ def _heading(panel: Panel) -> str:
 
 
 RATES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
-"""Speeds at which a motion can be played, as parts of the real one."""
+"""Playback speeds, as fractions of real time."""
 
 
 def first_rate(t_end: float) -> float:
-    """Return the largest of `RATES`, no more than the real one, at which a motion of `t_end` s takes 3 s or more."""
+    """Return the largest of `RATES` up to real time at which a motion of `t_end` s takes at least 3 s."""
     slow = [rate for rate in RATES if rate <= 1.0 and t_end / rate >= 3.0]
     return max(slow, default=RATES[0])
 
 
 @dataclass
 class Playback:
-    """A motion that is played again and again.
+    """Playback of a motion.
 
     Attributes
     ----------
     t_end : float
         End of the motion, s.
     rate : float
-        Speed, as a part of the real one.
+        Playback speed, as a fraction of real time.
     loops : bool
-        Whether the motion goes on at its end without a pause.
+        Whether the motion starts again without a pause, because it is periodic.
     repeats : bool
-        Whether it begins again at its end; otherwise it stays there.
+        Whether the playback starts again at the end of the motion; otherwise it stops there.
     playing : bool
     time : float
-        The instant that is shown, s.
+        Instant that is shown, s.
     """
 
     t_end: float
@@ -182,7 +182,7 @@ class Playback:
     _waited: float = 0.0
 
     def advance(self, elapsed: float) -> float:
-        """Go on by `elapsed` s of the spectator's time; returns the instant to show, s."""
+        """Advance by `elapsed` s of real time, and return the instant to show, s."""
         if not self.playing:
             return self.time
         if self.time < self.t_end:
@@ -197,12 +197,12 @@ class Playback:
         return self.time
 
     def go_to(self, time: float) -> None:
-        """Show one instant, s, and stay there."""
+        """Go to an instant, s, and pause there."""
         self.playing = False
         self.time = min(max(time, 0.0), self.t_end)
 
     def toggle(self) -> None:
-        """Play or pause; at the end, play from the beginning."""
+        """Switch between play and pause. At the end of the motion, play from the beginning."""
         self.playing = not self.playing
         if self.playing and self.time >= self.t_end:
             self.time = 0.0

@@ -1,4 +1,4 @@
-"""The scene in space: robot, ghost postures, path, tool trace, frames and ground."""
+"""The viewer's scene in space: robot, ghost postures, path, tool trace, frames and ground."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class ViewerScene:
     Attributes
     ----------
     samples : Samples
-        The motion at even times.
+        The motion at equidistant times.
     bodies : Bodies
     layers : dict of str to list of handles
-        What can be shown and hidden, by its name.
+        Parts of the scene that can be shown and hidden, by name.
     cell : float
         Size of the cells of the ground's grid, m.
     """
@@ -44,7 +44,7 @@ class ViewerScene:
         self.samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
         self.bodies = bodies_of(trajectory)
         self._size = float(np.linalg.norm(np.ptp(self.bodies.moving_box, axis=0)))
-        # A plain light shows pale robots on the white page better.
+        # Pale robots are easier to see on the white page with a plain light.
         self._api.configure_environment_map(None)
         self._api.add_light_hemisphere(
             "/light",
@@ -92,7 +92,7 @@ class ViewerScene:
             self._show_closest(self._cell, q)
 
     def _show_closest(self, cell: Scene, q: np.ndarray) -> None:
-        """Move the line to the closest bodies in a posture, (n,), and write their distance."""
+        """Draw the line between the closest bodies in a posture, (n,), and write their distance."""
         line, label = self.layers["closest pair"]
         if not line.visible:
             return
@@ -103,7 +103,7 @@ class ViewerScene:
         label.text = f"{cell.names(closest.pair[0])}: {distance:.1f} mm"
 
     def _frame(self, name: str, fraction: float) -> viser.FrameHandle:
-        """Add axes whose length is a part of the scene's size."""
+        """Add axes whose length is a fraction of the scene's size."""
         length = fraction * self._size
         return self._api.add_frame(
             name,
@@ -113,7 +113,7 @@ class ViewerScene:
         )
 
     def _draw_bodies(self) -> None:
-        """Hang links and skeleton on the joints' frames, one asset for each."""
+        """Attach links and skeleton to the frames of the joints, with one asset per joint and layer."""
         import trimesh
 
         layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
@@ -124,7 +124,7 @@ class ViewerScene:
                 self.layers[layer].append(handle)
 
     def _draw_ghosts(self) -> None:
-        """Draw what moves a few times, fainter, the later the darker; meshes of many faces as their convex hulls."""
+        """Draw faint copies of the moving bodies, darker at later times. Large meshes become their convex hulls."""
         import trimesh
 
         links = self.bodies.links
@@ -135,7 +135,7 @@ class ViewerScene:
         for joint, meshes in bodies.items():
             positions, quaternions = (components[:, joint] for components in frames)
             placed = np.hstack([positions, quaternions])
-            if np.ptp(placed, axis=0).max() < 1e-9:  # it stands still
+            if np.ptp(placed, axis=0).max() < 1e-9:  # the body stands still
                 continue
             coarse = [
                 mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
@@ -156,7 +156,7 @@ class ViewerScene:
             self.layers["ghost postures"].append(handle)
 
     def _draw_path(self) -> None:
-        """Draw the prescribed path with its ends."""
+        """Draw the prescribed path and mark its ends."""
         points = prescribed_path(self._trajectory, self.samples)
         self._draw_line("path", "/path", points, (30, 30, 30), 2.5)
         for name, k, colour in (("start", 0, (0, 158, 115)), ("end", -1, (213, 94, 0))):
@@ -166,7 +166,7 @@ class ViewerScene:
             self.layers["path"].append(ball)
 
     def _draw_trace(self) -> None:
-        """Draw the way of the tool in 32 colours of its speed; viser shows colours of single points too light."""
+        """Draw the tool's path in 32 colours of its speed; viser would show colours of single points too light."""
         speed = self.samples.tool_speed
         fractions = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
         shades = np.round(31.0 * fractions).astype(int)
@@ -186,7 +186,7 @@ class ViewerScene:
         thickness: float,
         drawn: np.ndarray | slice = slice(None),
     ) -> None:
-        """Draw some of the straight pieces between points, (K, 3), so many pixels thick."""
+        """Draw the chosen straight pieces between points, (K, 3), with a thickness in pixels."""
         pieces = np.stack([points[:-1], points[1:]], axis=1)[drawn]
         line = self._api.add_line_segments(
             name, pieces, colour, thickness=thickness, thickness_units="screen"
@@ -194,7 +194,7 @@ class ViewerScene:
         self.layers[layer].append(line)
 
     def _draw_ground(self) -> None:
-        """Draw a grid below everything."""
+        """Draw a grid below all bodies."""
         low, high = self.bodies.box
         self.cell = float(10.0 ** np.round(np.log10(0.06 * self._size)))
         section = 10.0 * self.cell
@@ -214,7 +214,7 @@ class ViewerScene:
         self.layers["ground"].append(grid)
 
     def _aim(self, server: viser.ViserServer) -> None:
-        """Look at the whole motion: a planar one at its plane, any other from the side to which the arm reaches."""
+        """Aim the camera: at the plane of a planar motion, otherwise from the side to which the arm reaches."""
         camera = server.initial_camera
         camera.fov = 0.75  # rad
         # 1.35 times the distance from which the motion fills the height of the picture.
@@ -237,7 +237,7 @@ class ViewerScene:
 
 
 def speed_colours(fractions: np.ndarray) -> np.ndarray:
-    """Colours (K, 3) from 0 to 255 of speeds (K,) as parts of the largest one: Matplotlib's plasma but its pale end."""
+    """Return colours, (K, 3), 0 to 255, for fractions (K,) of the largest speed: plasma without its pale end."""
     from matplotlib import colormaps
 
     return colormaps["plasma"](0.88 * fractions, bytes=True)[:, :3]

@@ -1,4 +1,4 @@
-"""The web server, on this machine alone unless asked otherwise."""
+"""The viewer's web server. By default, only this machine can reach it."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
-"""The port that is tried first if the user gives none."""
+"""Port that is tried first if the user gives none."""
 
 
 def start_server(host: str, port: int | None) -> viser.ViserServer:
-    """Start a server.
+    """Start the server.
 
     Parameters
     ----------
     host : str
-        Address or name that it listens on.
+        Address or name on which it listens.
     port : int or None
-        0 takes any free port, None the first free one from `FIRST_PORT` on.
+        0 chooses any free port. None chooses the first free port from `FIRST_PORT` on.
 
     Raises
     ------
     InputError
-        The host is not on this machine, or the port is out of range or is in use.
+        The host is not on this machine, or the port is out of range or in use.
     NotInstalledError
         viser is not installed.
     """
@@ -41,26 +41,26 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     import viser
 
     class Server(viser.ViserServer):  # type: ignore[misc]  # not read by mypy
-        """A silent server whose scene stays on this machine: with viser's own, a page can have it published."""
+        """A silent server whose scene stays on this machine. With viser's own server, a page can publish the scene."""
 
         def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT002  (viser's signature)
-            """Refuse to give the scene a public address."""
+            """Do nothing, so that the scene gets no public address."""
 
         def stop(self) -> None:
-            """Stop without a word: standard output is for results."""
+            """Stop silently, because standard output is for results."""
             with contextlib.redirect_stdout(io.StringIO()):
                 super().stop()
 
     _check(host, port or 0)
-    # Probes, such as HEAD, are refused without a word.
+    # Refuse probes, such as HEAD requests, without a message.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    first = FIRST_PORT if port is None else port  # viser takes the next free one
+    first = FIRST_PORT if port is None else port  # viser chooses the next free one
     with contextlib.redirect_stdout(io.StringIO()):
         return Server(host=host, port=first, label="brachis", verbose=False)
 
 
 def require_viser() -> None:
-    """Refuse to go on without viser.
+    """Raise an error if viser is not installed.
 
     Raises
     ------
@@ -71,13 +71,13 @@ def require_viser() -> None:
 
 
 def is_local(host: str) -> bool:
-    """Tell whether an address that was listened on is reached from this machine alone."""
+    """Return whether only this machine can reach an address that the server listens on."""
     addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     return all(ipaddress.ip_address(address[4][0]).is_loopback for address in addresses)
 
 
 def _check(host: str, port: int) -> None:
-    """Refuse an address that cannot be listened on."""
+    """Raise an error for an address on which the server cannot listen."""
     if not 0 <= port <= 65535:
         raise InputError(
             "the port is out of range", where="--port", found=port, allowed="0 to 65535"
@@ -91,6 +91,6 @@ def _check(host: str, port: int) -> None:
             "the viewer cannot listen on this address",
             where="--host, --port",
             found=f"{host}, port {port}: {reason}",
-            allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them; a free port",
+            allowed=f"an address of this machine, such as {LOOPBACK}, or 0.0.0.0 for all its addresses; a free port",
             hint="Leave out --port to use the next free port",
         ) from error

@@ -1,4 +1,4 @@
-"""Tables of the viewer's panel, as HTML; names come from files and are escaped."""
+"""Tables of the viewer's panel as HTML. Names come from files, so they are escaped."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from brachis.trajectory import PHASE_COLUMNS, Samples, Trajectory, phase_rows
 _CELL = "padding:0 0.35em;white-space:nowrap"
 _WRAPPED = "padding:0 0.35em 0.2em 0;vertical-align:top;overflow-wrap:anywhere"
 _STATE = {"position": 3, "velocity": 3, "torque": 2}
-"""What is shown of joints, and the decimals."""
+"""Joint quantities that are shown, and their numbers of decimals."""
 
 
 def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) -> str:
-    """Time, path coordinate, tool, and every joint's position, velocity and torque, if known, at one instant.
+    """Show the time, the path coordinate, the tool, and the state of every joint at one instant.
 
     Parameters
     ----------
     trajectory : Trajectory
     now : Samples
-        At one time.
+        Samples at one time.
     degrees : bool, optional
         Whether angles are in degrees.
     """
@@ -53,30 +53,30 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
 
 
 def phases_table(trajectory: Trajectory) -> str:
-    """List the phases of the motion; empty for one phase."""
+    """List the phases of the motion. The text is empty for a single phase."""
     rows = phase_rows(trajectory.phases)
     return _table(PHASE_COLUMNS, rows) if len(rows) > 1 else ""
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
-    """List what the search looked at, as `Candidate.to_dict` gives it, the fastest verified one first."""
+    """List the candidates of a search, as `Candidate.to_dict` gives them, beginning with the fastest verified one."""
     if not candidates:
         return _paragraph(
-            "The candidates of the search are not known: they are in result.json, in the folder of result.npz."
+            "The candidates of the search are unknown here; see result.json in the folder of result.npz."
         )
     rows = candidate_rows(candidates)[:60]
     omitted = len(candidates) - len(rows)
-    note = _paragraph(f"{omitted} more, slower ones") if omitted else ""
+    note = _paragraph(f"and {omitted} more, slower candidates") if omitted else ""
     return _table((*WORDS, *TIMES, STATUS), rows, cell=_WRAPPED) + note
 
 
 def paragraphs(lines: Sequence[str]) -> str:
-    """Write sentences, a paragraph each."""
+    """Write each sentence as a paragraph."""
     return "".join(_paragraph(line) for line in lines)
 
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
-    """Colour bar of the tool's speed from 0 to `fastest`, m/s; `stops` are CSS colours."""
+    """Draw a colour bar of the tool's speed from 0 to `fastest`, m/s. `stops` are CSS colours."""
     marks = "".join(
         f"<span>{fraction * fastest:.3g}</span>"
         for fraction in (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -91,7 +91,7 @@ def speed_legend(stops: Sequence[str], fastest: float) -> str:
 def summary(
     trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None
 ) -> str:
-    """End time, what is known of the verification, and what else the user should know."""
+    """Show the end time, the outcome of the verification if known, and notes for the user."""
     verdict = {
         None: "",
         True: ", verified",

@@ -1,4 +1,4 @@
-"""The viewer: a motion in the browser."""
+"""The viewer, which shows a motion in the browser."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ if TYPE_CHECKING:
 
 
 class Viewer(AbstractContextManager["Viewer"]):
-    """A motion in the browser, until it is stopped.
+    """A motion that is shown in the browser until the viewer is stopped.
 
     Parameters
     ----------
     trajectory : Trajectory
     candidates : sequence of mapping, optional
-        What the search looked at, as `Candidate.to_dict` gives it.
+        Candidates of the search, as `Candidate.to_dict` gives them.
     verified : bool, optional
-        Whether the motion passed the verification, if that is known.
+        Whether the motion passed the verification, if known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address that the server listens on; by default only this machine reaches it.
+        Address on which the server listens. By default only this machine can reach it.
     port : int, optional
-        0 takes any free port; the first free one from 8080 on if left out.
+        0 chooses any free port. Default: the first free port from 8080 on.
 
     Attributes
     ----------
     url : str
-        Where to look at it.
+        Address of the page.
     local : bool
-        Whether only this machine reaches it.
+        Whether only this machine can reach the page.
     playback : Playback
-        Which instant is shown.
+        The playback, with the instant that is shown.
 
     Raises
     ------
     InputError
-        Host or port cannot be listened on.
+        The server cannot listen on this host or port.
     NotInstalledError
         viser is not installed.
     """
@@ -106,39 +106,39 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._thread.start()
 
     def show(self) -> None:
-        """Show the instant of the playback."""
+        """Show the current instant of the playback."""
         with self._lock, self._server.atomic():
             self._scene.show(self._trajectory.position(self.playback.time))
             self._update()
 
     def wait(self) -> None:
-        """Wait until Ctrl-C, then stop."""
+        """Wait until Ctrl-C is pressed, then stop."""
         with interrupts.end_on_interrupt():
             while not self._stopped.wait(0.5):
                 interrupts.check()
         self.stop()
 
     def stop(self) -> None:
-        """Stop the server; the page says that it has lost its connection."""
+        """Stop the server. The page then says that it has lost its connection."""
         self._stopped.set()
         self._thread.join()
         self._server.stop()
 
     def __exit__(self, *_: object) -> None:
-        """Stop."""
+        """Stop the server."""
         self.stop()
 
     def __repr__(self) -> str:
-        """Say where it is."""
+        """Return a short text with the address of the viewer."""
         return f"<brachis viewer at {self.url}>"
 
     def _repr_html_(self) -> str:
-        """Show the viewer within a notebook."""
+        """Show the viewer in a notebook."""
         url = html.escape(self.url, quote=True)
         return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
 
     def _run(self) -> None:
-        """Play the motion while a page is open: 30 pictures/s of the robot, 10 of the plots and the table."""
+        """Play the motion while a page is open, with 30 pictures/s of the robot and 10 of the plots and the table."""
         before = time.monotonic()
         picture = 0
         while not self._stopped.wait(1.0 / 30.0):
@@ -175,7 +175,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._add_plots(candidates)
 
     def _update(self) -> None:
-        """Show the instant of the playback in the slider, the table and the plots."""
+        """Show the current instant in the slider, the table and the plots."""
         t = self.playback.time
         self._follow()
         now = self._trajectory.at(np.array([t]))
@@ -191,7 +191,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._button.label = "Pause" if self.playback.playing else "Play"
 
     def _add_controls(self) -> None:
-        """Add slider, button and speed."""
+        """Add the slider, the buttons and the choice of the speed."""
         t_end = self.playback.t_end
         inner = [(float(t), "") for t in self._trajectory.phase_ends[:-1]]
         ends = ((0.0, "0"), *inner, (t_end, f"{t_end:.4g}"))
@@ -205,15 +205,15 @@ class Viewer(AbstractContextManager["Viewer"]):
         first = speeds[RATES.index(self.playback.rate)]
         rates = self._gui.add_dropdown("speed", speeds, initial_value=first)
         rates.on_update(self._set_rate)
-        repeats = self._gui.add_checkbox("again and again", self.playback.repeats)
+        repeats = self._gui.add_checkbox("repeat", self.playback.repeats)
         repeats.on_update(self._set_repeats)
-        hint = "The motion as one HTML page"
+        hint = "The report on the motion as one HTML page"
         download = self._gui.add_button("Download the report", hint=hint)
         download.on_click(self._send_report)
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-        """Show what the user chose with the slider, and stay there."""
-        if event.client is not None:  # else the slider follows the playback
+        """Show the instant chosen with the slider, and pause there."""
+        if event.client is not None:  # otherwise the slider follows the playback
             self.playback.go_to(event.target.value)
             self.show()
 
@@ -228,7 +228,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self.playback.repeats = event.target.value
 
     def _send_report(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-        """Make the report for whoever asks, as a file that the browser keeps."""
+        """Make the report and send it to the browser that asked for it, as a file to save."""
         from brachis.apps.report import make_report
 
         if event.client is None:
@@ -243,7 +243,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         )
 
     def _add_switches(self) -> None:
-        """Add a box to tick for every layer of the scene."""
+        """Add a checkbox for every layer of the scene."""
         title = f"show (a cell of the grid is {self._scene.cell:g} m)"
         with self._gui.add_folder(title, expand_by_default=False):
             for name, handles in self._scene.layers.items():
@@ -258,7 +258,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._scene.set_visible(name, visible=event.target.value)
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> None:
-        """Add a panel with the plots, what holds the motion back, and the list of candidates."""
+        """Add a panel with the plots, the bottlenecks and the list of candidates."""
         panel = self._gui.add_panel()
         with panel.add_tab("limits"):
             samples = self._scene.samples
@@ -296,27 +296,27 @@ def view(
     motion : Trajectory or path
         The motion, or its result file.
     candidates : sequence of mapping, optional
-        What the search looked at, as `Result.to_dict` lists it.
+        Candidates of the search, as `Result.to_dict` lists them.
     verified : bool, optional
-        Whether the motion passed the verification, if that is known.
+        Whether the motion passed the verification, if known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address that the viewer listens on; by default only this machine reaches it.
+        Address on which the viewer listens. By default only this machine can reach it.
     port : int, optional
-        0 takes any free port; the first free one from 8080 on if left out.
+        0 chooses any free port. Default: the first free port from 8080 on.
     block : bool, optional
-        Whether to wait until Ctrl-C. If left out, a script waits, an interactive session or a notebook does not.
+        Whether to wait until Ctrl-C is pressed. By default a script waits; interactive sessions and notebooks do not.
 
     Returns
     -------
     brachis.apps.view.Viewer
-        With its ``url``; ``stop()`` ends it.
+        The viewer, with its ``url``. Its method ``stop()`` ends it.
 
     Raises
     ------
     InputError
-        Host or port cannot be listened on.
+        The server cannot listen on this host or port.
     NotInstalledError
         viser is not installed.
 

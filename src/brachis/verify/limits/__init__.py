@@ -1,6 +1,6 @@
-"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`.
+"""Ratios to limits, computed by the verification's own formulas, which share no code with `brachis.limits`.
 
-Only a user's own limit without a check is verified by its own values, and marked so.
+Only a user's own limit without a check is verified with its own values, and its check says so.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ TABLE: dict[str, LimitCheck] = {
     **MARGIN_CHECKS,
     "clearance": worst_clearance,
 }
-"""By kind, in the order of the checks."""
+"""Check of each kind of limit, in the order of the verification."""
 
 
 def check_limits(
     motion: CheckedMotion, user_limits: Sequence[LimitModel]
 ) -> list[Check]:
-    """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the user's."""
+    """Check all kinds of limits, then those of the task's ``custom_limits`` and the user's own."""
     results = [(kind.replace("_", " "), find(motion)) for kind, find in TABLE.items()]
     models = list_models(motion.task, user_limits)
     results += [_check_model(where, model, motion) for where, model in models.items()]
@@ -61,10 +61,10 @@ def check_limits(
 def _check_model(
     where: str, model: LimitModel, motion: CheckedMotion
 ) -> tuple[str, Worst]:
-    """Find the worst ratio to a limit of the user's, and its name.
+    """Find the worst ratio to one of the user's own limits, and the name of the limit.
 
-    A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), by a formula other
-    than the limit's. Without one, the limit's own values are checked densely.
+    A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), computed by a different
+    formula. Without it, the limit's own values are checked densely.
     """
     limit = bind_model(where, model, motion.robot)
     subjects = [label.subject for label in limit.labels]

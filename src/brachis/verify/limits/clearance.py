@@ -1,7 +1,8 @@
 """The smallest distance between solids on the whole motion, by branch and bound over time.
 
-Between two instants no distance shrinks faster than the joints between both solids carry one towards the other. With
-distances d_0 and d_1 at the ends of a step, joints that turn by D_i within it, and points at most r_i from their axes,
+Between two instants, a distance cannot shrink faster than the joints between both solids move one towards the other.
+Let d_0 and d_1 be the distances at the ends of a step, let joint i turn by D_i within it, and let points be at most r_i
+from its axis. Then
 
     d >= (d_0 + d_1 - sum_i r_i D_i) / 2        at all instants of the step.
 
@@ -18,19 +19,19 @@ from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import CheckedMotion, MotionStates
 
 _LOOK = 0.05
-"""Distances up to so much above the clearance are computed, m."""
+"""Distances are computed up to this much above the clearance, m."""
 _ROUNDING = 1e-5
-"""Largest gap between found and proven distance where it is about the clearance, m."""
+"""Largest gap between found and proven distance if the distance is close to the clearance, m."""
 _FINE = 1e-3
-"""Largest gap where it is well above it, m."""
+"""Largest gap if the distance is well above the clearance, m."""
 _MOST = 300_000
 """Largest number of steps that are halved."""
 _STATES = 2_000
-"""States that are looked at in one go."""
+"""Number of states that are evaluated at once."""
 
 
 def worst_clearance(motion: CheckedMotion) -> Worst | None:
-    """Find the smallest distance between solids, as a ratio: 1 at the clearance, above it where it is less."""
+    """Find the smallest distance between solids, as a ratio that is 1 at the clearance and larger below it."""
     clearance = motion.task.collisions.clearance
     scene = scene_of(motion.robot, motion.task)
     if scene is None or not len(scene.pairs):
@@ -40,6 +41,11 @@ def worst_clearance(motion: CheckedMotion) -> Worst | None:
     least = search.least
     remark = f"smallest distance {1e3 * least:.2f} mm"
     subject = scene.names(search.pair)
+    stands = (scene.pairs >= scene.robot_count) & (scene.joints[scene.pairs] == 0)
+    to_bodies = np.where(stands.any(axis=1), search.distances, np.inf)
+    nearest = int(to_bodies.argmin())
+    if nearest != search.pair and to_bodies[nearest] < clearance + _LOOK:
+        remark += f", to a body of the scene {1e3 * to_bodies[nearest]:.2f} mm ({scene.names(nearest)})"
     if least >= clearance + _LOOK:
         remark = f"nothing is closer than {1e3 * least:.0f} mm"
         subject = "scene"
@@ -57,9 +63,11 @@ class _Search:
     Attributes
     ----------
     least, time, pair : float, float, int
-        Smallest distance that was found, m, when, s, and between what.
+        Smallest distance found, m, with its time, s, and pair.
+    distances : (P,) ndarray
+        Smallest distance of each pair at the instants that were checked, m.
     proven : float
-        No distance is smaller than this and `least`, but for the gaps that are allowed, m.
+        No distance is smaller than this and `least`, apart from the allowed gaps, m.
     """
 
     def __init__(self, motion: CheckedMotion, scene: Scene, clearance: float) -> None:
@@ -73,6 +81,7 @@ class _Search:
         self.least = clearance + _LOOK
         self.time = motion.states.t[0]
         self.pair = 0
+        self.distances = np.full(len(scene.pairs), self.least)
         self.proven = np.inf
         self._halved = 0
 
@@ -83,14 +92,14 @@ class _Search:
             self._search(states.only(slice(first, first + _STATES + 1)))
 
     def _search(self, states: MotionStates) -> None:
-        """Search the states, and between them."""
+        """Search at the states and between them."""
         placed = joint_placements(self._motion.robot, states.q)
         far = self._clearance + _LOOK
         distance = np.maximum(self._scene.bounds(placed), far)
         close = self._scene.find_close(placed, far)
         distance[close.posture, close.pair] = close.distance
         self._record(close.distance, states.t[close.posture], close.pair)
-        # Both sides of a node are one instant: nothing moves between them.
+        # Both sides of a node are the same instant, so nothing moves between them.
         inside = states.index[1:] == states.index[:-1]
         step = np.where(inside, np.diff(states.u), 0.0)
         piece_of_step = states.index[:-1]
@@ -109,7 +118,7 @@ class _Search:
         ends: tuple[np.ndarray, np.ndarray],
         values: tuple[np.ndarray, np.ndarray],
     ) -> None:
-        """Halve steps of pairs, (M,), until enough is known of each."""
+        """Halve steps of pairs, (M,), until the bound of each is tight enough."""
         pieces = self._motion.pieces
         u = np.array(ends)
         d = np.array(values)
@@ -139,12 +148,13 @@ class _Search:
 
     @property
     def _goal(self) -> float:
-        """What has to be proven of a step, m."""
+        """Distance that has to be proven for a step, m."""
         near = min(self.least, self._clearance) - _ROUNDING
         return max(near, self.least - _FINE)
 
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
-        """Keep the smallest distance."""
+        """Store the smallest distance of all pairs and of each pair."""
+        np.minimum.at(self.distances, pair, distance)
         if distance.min(initial=np.inf) < self.least:
             best = np.argmin(distance)
             self.least = distance[best]
@@ -153,9 +163,9 @@ class _Search:
 
 
 def _reaches(motion: CheckedMotion, scene: Scene) -> np.ndarray:
-    """Distances that points of pairs can have from the axes of the joints between them, (n, P), m; 1 where they slide.
+    """Return how far points of pairs can be from the axes of the joints between them, (n, P), m.
 
-    Joints that move both solids of a pair, or none, have no part in it.
+    The value is 1 for a prismatic joint, and 0 for a joint that moves both solids of a pair or neither.
     """
     bodies = motion.robot.urdf_dynamics.bodies
     farthest = np.abs(motion.pieces.nodes + motion.pieces.position).max(axis=(0, 1))

@@ -1,6 +1,7 @@
-"""Ratios of the joints' motion to their limits. Positions and their derivatives are exact: they are polynomials.
+"""Ratios of the joints' motion to their limits.
 
-Torques and what follows from them are checked densely.
+Positions and their derivatives are polynomials, so their ratios are exact. Torques and quantities derived from them are
+checked densely.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from brachis.verify.report import POSITION_SCALE
 
 
 def _worst_derivative(kind: str, motion: CheckedMotion) -> Worst | None:
-    """Find the largest ratio of a derivative of the positions, anywhere; the kind names it in `Pieces`."""
+    """Find the largest ratio of a derivative of the positions at any time; `kind` is its name in `MotionPieces`."""
     lower, upper = motion.robot.limits.both_ways(kind)
     if not np.isfinite(upper).any():
         return None
@@ -35,11 +36,11 @@ def _worst_derivative(kind: str, motion: CheckedMotion) -> Worst | None:
 
 
 def _worst_position(motion: CheckedMotion) -> Worst | None:
-    """Find the position that is nearest to an end of its range, or furthest beyond, anywhere.
+    """Find the position that is closest to an end of its range, or furthest beyond it, at any time.
 
-    Inside, the ratio is the place in the range: 0 in its middle, 1 at its ends. Of a range with one end it is
-    1 minus the distance from it, rad or m, and 0 farther away. Beyond an end, a ratio of 2 is half the range away, but
-    from 1e-5 to 1 rad or m.
+    Inside the range, the ratio is the place in it: 0 in the middle and 1 at the ends. For a range with only one end, it
+    is 1 minus the distance from this end, rad or m, and 0 farther away. Beyond an end, the ratio is 1 plus the excess
+    divided by half the range; the divisor is at least 1e-5 and at most 1 rad or m.
     """
     lower, upper = motion.robot.limits.both_ways("position")
     if np.isinf(lower).all() and np.isinf(upper).all():
@@ -54,12 +55,12 @@ def _worst_position(motion: CheckedMotion) -> Worst | None:
 
 
 def _worst_in_range(motion: CheckedMotion, scale: np.ndarray) -> Worst:
-    """Find the largest ratio, where a distance of `scale`, (n,), from an end changes it by 1."""
+    """Find the largest ratio, where a distance of `scale`, (n,), from an end changes the ratio by 1."""
     lower, upper = motion.robot.limits.both_ways("position")
     pieces = motion.pieces
 
     def ratios(index: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Return the ratios to the upper and to the lower ends."""
+        """Return the ratios to the upper and the lower ends."""
         positions = pieces.nodes[index] + pieces.position[:, index]
         above = 1.0 + (positions - upper) / scale
         return above, 1.0 + (lower - positions) / scale
@@ -87,7 +88,7 @@ def _worst_quantity(
 
 
 def _worst_rms_torque(motion: CheckedMotion) -> Worst | None:
-    """Find the largest ratio of a root mean square of torques, by Simpson's rule between all states of each piece."""
+    """Find the largest ratio of an rms torque, by Simpson's rule between the states of each piece."""
     limit = motion.robot.limits.rms_torque
     states = motion.states
     if not np.isfinite(limit).any():
@@ -115,9 +116,9 @@ def _worst_total_power(motion: CheckedMotion) -> Worst | None:
 
 
 def _worst_torque_at_speed(motion: CheckedMotion) -> Worst | None:
-    """Find the torque that is furthest beyond what its joint's curve allows at its speed.
+    """Find the torque that is closest to, or furthest beyond, its joint's torque-speed curve.
 
-    The ratio is 1 on the curve; differences count as parts of the torque at rest.
+    The ratio is 1 on the curve. Differences from it are fractions of the torque at rest.
     """
     robot = motion.robot
     curves = robot.limits.torque_speed
@@ -126,7 +127,7 @@ def _worst_torque_at_speed(motion: CheckedMotion) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return 1 plus the excess over the curves, (K, c), as parts of the torques at rest."""
+        """Return 1 plus the excess over the curves, (K, c), as a fraction of the torques at rest."""
         columns = []
         for joint in joints:
             speed, torque = np.array(curves[joint]).T
@@ -160,4 +161,4 @@ JOINT_CHECKS: dict[str, LimitCheck] = {
         ),
     ),
 }
-"""The check of every row of `LIMIT_KINDS`, and of the limits of drives."""
+"""Checks of all rows of `LIMIT_KINDS`, and of the limits of drives."""

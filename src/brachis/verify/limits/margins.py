@@ -1,7 +1,7 @@
-"""Margins of a motion by the URDF's own chain: from singular postures of the arm, and from the ends of joint ranges.
+"""Margins of a motion from singular postures and from the ends of joint ranges, computed with the URDF's own chain.
 
-The columns of the Jacobian at the point p that follows the path are, of joints through o along z, z x (p - o) and z
-where they turn, z and 0 where they slide.
+Let p be the point that follows the path, and let a joint have an axis z through the point o. Its column of the Jacobian
+is z x (p - o) and z for a revolute joint, and z and 0 for a prismatic one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from brachis.verify.report import Margin
 
 
 def find_margins(motion: CheckedMotion, states: MotionStates) -> tuple[Margin, ...]:
-    """Find the smallest singular value of the arm's Jacobian, and the smallest distance from the end of a range."""
+    """Find the arm's smallest singular value, and the smallest distance of a joint from an end of its range."""
     margins: list[Margin] = []
     if not np.isfinite(states.q).all():
         return ()
@@ -38,9 +38,9 @@ def find_margins(motion: CheckedMotion, states: MotionStates) -> tuple[Margin, .
 
 
 def _singular_values(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
-    """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints.
+    """Return least singular values, (K,), of the Jacobian of the prescribed rows with respect to the arm's joints.
 
-    They are the roots of the least eigenvalues of J J^T, right to 1e-8 of the largest one.
+    They are the square roots of the least eigenvalues of J J^T, and accurate to 1e-8 of the largest one.
     """
     rotations, origins = states.joints
     tool = tool_placements(motion.robot, states.q, states.joints)[0].T
@@ -58,7 +58,7 @@ def _singular_values(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
 def _parts_of_ranges(
     motion: CheckedMotion, states: MotionStates
 ) -> tuple[np.ndarray, list[str]]:
-    """Distances from the middle of joint ranges, (K, c), 1 at their ends, and the names of these joints."""
+    """Return distances from the middle of joint ranges, (K, c), which are 1 at the ends, and the joints' names."""
     count = len(motion.robot.urdf_joints)
     ends = motion.robot.limits.both_ways("position")[:, :count]
     joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
@@ -69,27 +69,27 @@ def _parts_of_ranges(
 
 
 def _worst_singularity(motion: CheckedMotion) -> Worst | None:
-    """Find the largest of 2 - value / wanted: 1 at the margin, 2 in a singular posture."""
+    """Find the largest of 2 - value / margin, which is 1 at the margin and 2 in a singular posture."""
     margin = motion.task.margins.singularity
     if margin is None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return 2 - value / wanted, (K, 1)."""
+        """Return 2 - value / margin, (K, 1)."""
         return 2.0 - _singular_values(motion, states)[:, None] / margin
 
     return worst_between(motion, ratios, ("arm",))
 
 
 def _worst_joint_end(motion: CheckedMotion) -> Worst | None:
-    """Find the largest ratio of how far a joint is from the middle of its range to what is wanted."""
+    """Find the largest ratio of a joint's distance from the middle of its range to the allowed distance."""
     share = motion.task.margins.joint_ends
     _, names = _parts_of_ranges(motion, motion.states.only([0]))
     if share is None or not names:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the distances from the middles over what is wanted, (K, c)."""
+        """Return the distances from the middles divided by the allowed ones, (K, c)."""
         return _parts_of_ranges(motion, states)[0] / (1.0 - 2.0 * share)
 
     return worst_between(motion, ratios, names)

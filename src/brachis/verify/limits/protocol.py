@@ -1,4 +1,4 @@
-"""What the check of a kind of limit takes and gives, and how the largest ratio of a motion is found."""
+"""Interface of the checks of limits, and the search for the largest ratio of a motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from brachis.verify.motion import CheckedMotion, MotionStates, turns
 
 _AT_ONCE = 5000
-"""Steps that are looked at together: they stay in the processor's cache."""
+"""Number of steps that are handled together, so that they stay in the processor's cache."""
 
 
 class Worst(NamedTuple):
@@ -20,13 +20,13 @@ class Worst(NamedTuple):
     ----------
     ratio : float
     subject : str
-        Of what: a joint, the tool, ...
+        Joint, tool, or other subject that has this ratio.
     time : float
-        s.
+        Time at which it occurs, s.
     remark : str
         Note on the check; often empty.
     is_kept : bool
-        Whether plans keep the limit.
+        Whether the planner takes the limit into account.
     """
 
     ratio: float
@@ -37,7 +37,7 @@ class Worst(NamedTuple):
 
 
 LimitCheck = Callable[[CheckedMotion], Worst | None]
-"""Finds the worst ratio to a kind of limit; None without such a limit."""
+"""Function that finds the worst ratio to a kind of limit; it returns None if there is no such limit."""
 
 
 def worst_between(
@@ -46,11 +46,11 @@ def worst_between(
     subjects: Sequence[str],
     states: MotionStates | None = None,
 ) -> Worst:
-    """Find the largest of ratios that are not polynomials, at the states and wherever between them it may lie.
+    """Find the largest of several ratios that are not polynomials, at the states and between them.
 
-    Steps between states are halved for as long as the largest ratio may lie within one. Over a step of length h a ratio
-    that bends by c rises above the higher end by (c h - |slope|)^2 / 4 c at most, if it peaks within the step at all.
-    For c the second divided differences at both ends are taken, four times over.
+    Steps between states are halved as long as the largest ratio may lie within one of them. Over a step of length h, a
+    ratio with curvature c rises above its higher end by at most (c h - |slope|)^2 / 4 c, if it peaks within the step at
+    all. For c, four times the second divided differences at both ends are used.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def worst_between(
     ratio_at : callable
         ``ratio_at(states)`` returns the ratios, (K, c).
     subjects : sequence of str
-        What the c ratios are of.
+        Subjects of the c ratios.
     states : MotionStates, optional
-        States to begin with, unless those of the whole motion.
+        Initial states. Default: those of the whole motion.
 
     Returns
     -------
     Worst
-        If 100,000 more states are not enough, it is the largest ratio that is possible, with a remark.
+        If 100,000 more states are not enough, this is an upper bound of the ratio, with a remark.
     """
     states = motion.states if states is None else states
     most_states = len(states.t) + 100_000
@@ -77,7 +77,7 @@ def worst_between(
         if len(states.t) + len(steps) > most_states:
             k = int(np.argmax(bounds))
             column = int(np.argmax(ratio[steps[k]]))
-            remark = f"not searched to the end: {ratio.max():.6g} was found, and more than this is not possible"
+            remark = f"search stopped early: {ratio.max():.6g} was found, and this is an upper bound"
             time = states.t[steps[k]]
             return Worst(bounds[k], subjects[column], time, remark)
         middle = 0.5 * (states.u[steps] + states.u[steps + 1])
@@ -94,12 +94,12 @@ def worst_size(
     sizes: Callable[[MotionStates], np.ndarray],
     subject: str = "tool",
 ) -> Worst | None:
-    """Find the largest ratio of a size, (K,), to the largest that is allowed; None if it is not limited."""
+    """Find the largest ratio of a size, (K,), to its allowed value; None if the size is not limited."""
     if largest is None or np.isinf(largest):
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the sizes over the largest one, (K, 1)."""
+        """Return the sizes divided by the largest allowed one, (K, 1)."""
         return sizes(states)[:, None] / largest
 
     return worst_between(motion, ratios, (subject,))
@@ -108,11 +108,11 @@ def worst_size(
 def _may_hold_more(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
+    """List the steps that may contain the largest ratio of all, (S,), and upper bounds of the ratio there, (S,)."""
     highest = ratio.max()
     candidates = []
     for begin in range(0, len(ratio), _AT_ONCE):
-        # The bend at an end of a step takes the step beside it.
+        # The curvature at an end of a step needs the adjacent step.
         first = max(begin - 1, 0)
         rows = slice(first, begin + _AT_ONCE + 2)
         step, bounds = _open_steps(states.only(rows), lengths, ratio[rows], highest)
@@ -126,7 +126,7 @@ def _may_hold_more(
 def _open_steps(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray, highest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List the steps within which a ratio above the highest one that is known may lie; see `_may_hold_more`."""
+    """List the steps that may contain a ratio above the highest known one; see `_may_hold_more`."""
     inside = states.index[1:] == states.index[:-1]
     width = np.where(inside, np.diff(states.u), 1.0)
     length = (width * lengths[states.index[:-1]])[:, None]
@@ -139,7 +139,7 @@ def _open_steps(
     climb = np.maximum(bend * length - np.abs(slope), 0.0)
     rise = climb**2 / np.maximum(4.0 * bend, np.finfo(float).tiny)
     bounds = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
-    # Steps of a millionth of a piece are not halved, nor searched for an excess of 5e-6.
+    # Steps shorter than a millionth of a piece, or with a possible excess below 5e-6, are not halved.
     open_steps = inside & (width > 1e-6) & (bounds > highest + 5e-6)
     steps = np.flatnonzero(open_steps)
     return steps, bounds[steps]
@@ -148,15 +148,16 @@ def _open_steps(
 def largest(
     motion: CheckedMotion, ratios: Callable[[slice], tuple[np.ndarray, np.ndarray]]
 ) -> Worst:
-    """Find the largest value of polynomials in Bernstein form, two for every piece and joint.
+    """Find the largest value of polynomials in Bernstein form, with two polynomials for each piece and joint.
 
-    It is at an end of a piece or where a polynomial turns that has a coefficient above the values at all ends.
+    The largest value is at an end of a piece, or at an extremum of a polynomial that has a coefficient above the values
+    at all ends.
 
     Parameters
     ----------
     motion : CheckedMotion
     ratios : callable
-        ``ratios(index)`` returns the coefficients of both in some pieces, (m + 1, l, n) each.
+        ``ratios(index)`` returns the coefficients of both polynomials in some pieces, (m + 1, l, n) each.
     """
     peaks: list[tuple[float, int, float, int]] = []
     highest = -np.inf

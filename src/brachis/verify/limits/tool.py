@@ -1,7 +1,7 @@
-"""How fast the tool moves, turns and accelerates, and how far it leaves the path, over what the task allows.
+"""Ratios to limits of the tool: its speed, angular speed, acceleration, and deviation from the path.
 
-All by the URDF's own chain and the path alone. With the rotation D of the tool in the axes of the path's orientation,
-and its third column z, the tool's axis there:
+They are computed only from the URDF's chain and the path. Let D be the rotation of the tool relative to the orientation
+of the path, and z its third column, which is the tool's axis. Then
 
     tilt = acos z_z,   lead = asin z_x,   side = atan2(z_y, z_z),   roll = atan2(-D_xy, D_xx).
 """
@@ -24,11 +24,11 @@ from brachis.verify.motion import CheckedMotion, MotionStates, list_speed_tables
 
 _ANGLES = ("lead", "side", "roll")
 _SAME_S = 1e-12
-"""Path coordinates that are nearer to each other are the same."""
+"""Path coordinates that are closer to each other than this are the same."""
 
 
 def tool_sizes(robot: Robot, states: MotionStates, quantity: str) -> np.ndarray:
-    """Sizes, (K,), of the tool's ``speed``, m/s, ``angular_speed``, rad/s, or ``acceleration``, m/s^2."""
+    """Return the tool's ``speed``, m/s, ``angular_speed``, rad/s, or ``acceleration``, m/s^2, (K,)."""
     rates = (states.qdot, states.qddot)
     if quantity != "acceleration":
         rates = (np.zeros_like(states.q), states.qdot)
@@ -53,12 +53,12 @@ def _worst_speed(motion: CheckedMotion) -> Worst | None:
         return _worst_motion("speed", motion)
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the speeds over the lowest limit at each s, (K,)."""
+        """Return the speeds divided by the lowest limit at each s, (K,)."""
         s = states.s
         constant = limits.speed if isinstance(limits.speed, float) else np.inf
         limit = np.full(len(s), constant)
         for table in tables:
-            # Of both sides of a step the lower one; a table of feed rates says nothing beyond its ends.
+            # At a step, the lower side is used. A table of feed rates does not apply beyond its ends.
             sides = [
                 np.interp(s + step, table.s, table.speed)
                 for step in (-_SAME_S, _SAME_S)
@@ -72,7 +72,7 @@ def _worst_speed(motion: CheckedMotion) -> Worst | None:
 
 
 def _worst_deviation(name: str, motion: CheckedMotion) -> Worst | None:
-    """Find the largest ratio of a tilt, or of a distance from the path, to the largest that is allowed."""
+    """Find the largest ratio of the tilt, or of the distance from the path, to its allowed value."""
     tolerances = motion.task.tolerances
     is_tilt = name == "tilt"
     largest = tolerances.orientation.tilt if is_tilt else tolerances.position.sphere
@@ -80,7 +80,7 @@ def _worst_deviation(name: str, motion: CheckedMotion) -> Worst | None:
 
 
 def _worst_range(motion: CheckedMotion) -> Worst | None:
-    """Find the largest part of a range that the tool uses; None without ranges."""
+    """Find the largest fraction of a range that the tool uses; None if there are no ranges."""
     tolerances = motion.task.tolerances
     angles = {
         direction: getattr(tolerances.orientation, direction) for direction in _ANGLES
@@ -98,7 +98,7 @@ def _worst_range(motion: CheckedMotion) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the used parts of the ranges, (K, c)."""
+        """Return the used fractions of the ranges, (K, c)."""
         used = _deviations(motion, states)
         columns = []
         for direction, (low, high) in ranges.items():
@@ -112,7 +112,7 @@ def _worst_range(motion: CheckedMotion) -> Worst | None:
 
 
 def _deviations(motion: CheckedMotion, states: MotionStates) -> dict[str, np.ndarray]:
-    """Angles, degrees, and displacements, m, by which the tool is not where the path wants it, (K,) each."""
+    """Return angles, degrees, and displacements, m, between the tool and its place on the path, (K,) each."""
     joints = joint_placements(motion.robot, states.q)
     origin, rotation = real_tool_placements(motion.robot, *joints)
     target = motion.path.sample(np.clip(states.s, 0.0, 1.0)).target
