@@ -18,19 +18,19 @@ PICTURES = {
     "01": ("scara_line.gif", "The paper's line"),
     "02": ("scara_table.png", "Eight lines, three redundant joints"),
     "03": ("tx90l_rail.gif", "Six joints on a rail"),
-    "04": ("ur10_weld.png", "A welding seam with a corner and an arc"),
-    "05": ("panda_circle.png", "A seven-joint arm draws a circle"),
-    "06": ("free_roll.png", "A tool whose roll is free"),
-    "07": ("candidates.png", "The fastest of all joint paths"),
-    "08": ("cam_seam.png", "Scattered points of a CAM program"),
+    "04": ("ur10_weld.png", "A welding seam"),
+    "05": ("panda_circle.png", "A seven-joint arm"),
+    "06": ("free_roll.png", "A tool with free roll"),
+    "07": ("candidates.png", "The fastest joint path"),
+    "08": ("cam_seam.png", "Points from a CAM program"),
     "09": ("payload.png", "Payload, friction and jerk"),
-    "10": ("periodic_circle.gif", "A circle that is repeated without a stop"),
-    "11": ("joint_path.png", "The timing of a joint path, beside toppra"),
-    "12": ("today.png", "A recorded motion, and a faster one"),
-    "13": ("weld_seams.png", "Two seams at given speeds, with a stop"),
-    "14": ("round_the_post.png", "An elbow that goes round a post"),
+    "10": ("periodic_circle.gif", "A periodic motion"),
+    "11": ("joint_path.png", "A joint path"),
+    "12": ("today.png", "A recorded motion"),
+    "13": ("weld_seams.png", "Two welding seams"),
+    "14": ("round_the_post.png", "Round a post"),
     "15": ("tilted_torch.png", "A torch that may tilt"),
-    "16": ("into_the_car_body.png", "Through the window of a car body"),
+    "16": ("into_the_car_body.png", "Into a car body"),
     "ik_plugin": ("crane.png", "A closed form of your own: a crane"),
     "limit_plugin": ("coupled.png", "A limit of your own: two coupled joints"),
 }
@@ -40,20 +40,14 @@ GALLERY_HEAD = """\
 
 # Gallery
 
-Every example of the repository, with its end times. All motions are verified. To run one, use `brachis plan
+All examples of the repository, with their files and end times. All motions are verified. Run `brachis plan
 examples/NAME.yaml` or `python examples/NAME.py`.
 """
 CARD = """\
 :::{{grid-item-card}} {name}: {title}
 :img-top: figures/{picture}
 
-{about} {times}.
-:::
-"""
-SOURCE = """\
-:::{{dropdown}} {file}
-```{{literalinclude}} ../{file}
-```
+{about} {times}. {files}
 :::
 """
 BENCHMARKS_HEAD = """\
@@ -93,27 +87,24 @@ BENCHMARKS_REST = """\
 
 
 def gallery() -> str:
-    """Return the gallery: for every example a card with picture, description and end times, then all sources."""
+    """Return the gallery: for every example a card with its picture, description, end times and files."""
     recorded = json.loads(GALLERY.read_text())
     names = [name for name in PICTURES if name in recorded]
     cards = "\n".join(_card(name, recorded[name]) for name in names)
     grid = f"::::{{grid}} 1 2 2 2\n:gutter: 2\n\n{cards}::::\n"
-    sources = [
-        SOURCE.format(file=path.relative_to(ROOT))
-        for name in names
-        for path in _files(name)
-    ]
-    return "\n".join([GALLERY_HEAD, grid, "## Sources\n", *sources])
+    return f"{GALLERY_HEAD}\n{grid}"
 
 
 def _card(name: str, t_end: dict[str, float]) -> str:
     picture, title = PICTURES[name]
+    files = _files(name)
     return CARD.format(
         name=name,
         title=title,
         picture=picture,
-        about=_about(_files(name)),
+        about=_about(files),
         times=", ".join(f"{value:.3f} s ({key})" for key, value in t_end.items()),
+        files=" ".join(f"[{path.name}](../{path.relative_to(ROOT)})" for path in files),
     )
 
 

@@ -1,4 +1,4 @@
-"""The paper's example as a library call: plan, look at the figures, sample for a controller."""
+"""The paper's example in Python: plan it, print its main figures, sample it for a controller."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ HERE = Path(__file__).parent
 
 
 def main() -> brachis.Result:
-    """Plan the task of ``01_scara_line.yaml`` and print what came out."""
+    """Plan the task of ``01_scara_line.yaml`` and print the result."""
     result = brachis.plan(
         HERE.parent / "robots/scara3/robot.urdf", HERE / "01_scara_line.yaml"
     )

@@ -1,4 +1,4 @@
-"""All lines of the paper: eight angles and all three choices of the redundant joint, as a table and a figure.
+"""The paper's eight lines with each of the three redundant joints, as a table and a figure.
 
 Usage: python examples/02_scara_table.py [FIGURE.png]
 """
@@ -22,7 +22,7 @@ PUBLISHED_S = {(90, "j3"): 2.51}
 def robot_and_task(
     angle_deg: int, joint: str, intervals: int = 20
 ) -> tuple[brachis.Robot, dict[str, object]]:
-    """Return the paper's arm and one of its lines; `joint` is the redundant one, or auto."""
+    """Return the paper's arm and one of its lines; `joint` is the redundant joint, or auto."""
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
     robot = brachis.Robot.from_urdf(
         HERE.parent / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
@@ -45,7 +45,7 @@ def plan_all(intervals: int = 20) -> dict[tuple[int, str], brachis.Result]:
 
 
 def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
-    """End times in seconds, one line an angle; an unverified plan is marked."""
+    """Return a table of end times in seconds, with a line for each angle; unverified plans are marked."""
     lines = [
         "| angle | q_r = j1 | q_r = j2 | q_r = j3 | the paper |",
         "|---|---|---|---|---|",

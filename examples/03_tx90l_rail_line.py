@@ -1,4 +1,4 @@
-"""The TX90L on its linear axis: each redundant joint with a closed form, with few and many intervals, as a table."""
+"""The TX90L on its rail, with each redundant joint that has a closed form and 10 to 40 intervals, as a table."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def plan_all() -> dict[tuple[str, int], brachis.Result]:
 
 
 def markdown_table(results: dict[tuple[str, int], brachis.Result]) -> str:
-    """End times in seconds, one line a redundant joint; an unverified plan is marked."""
+    """Return a table of end times in seconds, with a line for each redundant joint; unverified plans are marked."""
     lines = [
         f"| redundant joint | {' | '.join(f'{intervals} intervals' for intervals in INTERVALS)} |",
         "|---|" + "---|" * len(INTERVALS),

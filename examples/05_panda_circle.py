@@ -1,4 +1,4 @@
-"""A seven-joint arm, straight from the package example-robot-data: the Panda draws a circle without turning its hand.
+"""The Panda, from the package example-robot-data, draws a circle without turning its hand.
 
 Needs the URDFs: pip install ".[robots]" in a clone of brachis.
 """
@@ -17,7 +17,7 @@ JOINTS = ("panda_joint4", "panda_joint5", "panda_joint6", "panda_joint7")
 
 
 def panda() -> brachis.Robot:
-    """Find the URDF, which the package unpacks beside the Python packages, and make the robot."""
+    """Find the URDF, which the package installs next to the Python packages, and return the robot."""
     for folder in map(Path, sys.path):
         if (folder / URDF).is_file():
             return brachis.Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp")
@@ -27,7 +27,7 @@ def panda() -> brachis.Robot:
 
 
 def main() -> dict[str, brachis.Result]:
-    """Plan the circle with every redundant joint that has a closed form, and print what came out."""
+    """Plan the circle with every redundant joint that has a closed form, and print the results."""
     robot = panda()
     x, y, z = robot.tool_placement(robot.posture(START, "START")).translation
     results = {}

@@ -1,4 +1,4 @@
-"""The same arc three times: the tool turns with the path, the tool keeps its orientation, its roll is free."""
+"""The same arc with three tool orientations: turning with the path, fixed, and with free roll."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ORIENTATIONS = {
 
 
 def main() -> dict[str, brachis.Result]:
-    """Plan the three, and print their end times."""
+    """Plan the three motions, and print their end times."""
     results = {}
     for name, (space, orientation) in ORIENTATIONS.items():
         task = brachis.load_task(TASK).to_dict()

@@ -1,4 +1,4 @@
-"""The paper's eight lines: each redundant joint from one usual guess, all left open, and the start left open as well.
+"""The paper's eight lines: with each redundant joint from one guess, with all joints left open, and with a free start.
 
 Usage: python examples/07_find_the_fastest.py [FIGURE.png]
 """
@@ -19,7 +19,7 @@ USUAL = {"effort": "single", "guesses": "numeric"}
 
 
 def variants(angle_deg: int) -> dict[str, dict[str, object]]:
-    """Return the tasks of one line by name."""
+    """Return all tasks of one line, by name."""
     task = brachis.load_task(TASK).to_dict()
     task["path"][0]["line"]["angle_deg"] = angle_deg
     usual = {

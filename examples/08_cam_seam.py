@@ -2,7 +2,7 @@
 
 Usage: python examples/08_cam_seam.py [FIGURE.png]
 
-It writes the seam, 08_cam_seam.csv, beside the task, with semicolons, decimal commas and a byte order mark.
+It writes the seam, 08_cam_seam.csv, next to the task, with semicolons, decimal commas and a byte order mark.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What payload, friction, a jerk limit and a speed override cost, added one by one."""
+"""How much time payload, friction, a jerk limit and a speed override cost, added one by one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEFT_OUT = {
 
 
 def main() -> dict[str, brachis.Result]:
-    """Plan all of them, and print their end times and what was in use."""
+    """Plan all variants, and print their end times and the settings in use."""
     results = {}
     for name, left_out in LEFT_OUT.items():
         task = brachis.load_task(TASK).to_dict()

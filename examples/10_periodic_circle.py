@@ -15,7 +15,7 @@ TASK = Path(__file__).with_suffix(".yaml")
 
 
 def plan_both() -> dict[str, brachis.Result]:
-    """Plan the periodic motion, and the one from rest to rest, whose posture at the end is free."""
+    """Plan the periodic motion, and the motion from rest to rest, whose end posture is free."""
     task = brachis.load_task(TASK).to_dict()
     return {
         "periodic": brachis.plan(task),

@@ -1,4 +1,4 @@
-"""The same path of joints under the same limits, timed by brachis and, if it is installed, by toppra.
+"""A joint path under the same limits, timed by brachis and, if installed, by toppra.
 
 Usage: python examples/11_from_toppra.py
 """

@@ -2,7 +2,7 @@
 
 Usage: python examples/12_today.py [FIGURE]
 
-The file has time and joint positions of the planar arm: a pseudo-inverse joint path, timed by toppra.
+The file has times and joint positions of the planar arm: a pseudo-inverse joint path, timed by toppra.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def main(figure: str | None = None) -> brachis.Comparison:
-    """Compare, print, and draw where a figure is named."""
+    """Compare the motions, print the result, and draw it if a figure is named."""
     found = brachis.compare(
         Path(__file__).with_suffix(".csv"), ROOT / "robots/scara3/robot.urdf"
     )

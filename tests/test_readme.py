@@ -336,7 +336,7 @@ def test_robots_say_where_their_figures_come_from():
 def test_the_quick_start_plans_the_task_of_its_file():
     text = (ROOT / "docs/quick_start.md").read_text()
     cell = re.findall(r"```{code-cell}\n(.*?)```", text, flags=re.DOTALL)[0]
-    assert "The same as a file is `examples/01_scara_line.yaml`" in text
+    assert "The file `examples/01_scara_line.yaml` states the same task" in text
     names = {}
     exec(compile(cell, "quick_start.md", "exec"), names)  # noqa: S102
     file = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()

@@ -1,4 +1,4 @@
-"""A family of closed forms for brachis: arms that turn, tilt and reach, for the position of their tool.
+"""A family of closed forms for the tool position of arms that turn, tilt and reach.
 
 The tilting axis n is at a right angle to the turning axis a, and S is a point on it at the distance e in front of a.
 The boom slides along d, away from S; it may lean to one side, g = d . n. For a target at the height h above S and at
