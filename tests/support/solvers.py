@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from brachis.optimise.backends import TABLE
+from brachis.optimise.backends import SOLVERS
 
-INSTALLED = tuple(name for name in TABLE if name != "ipopt" or find_spec("ipyopt"))
+INSTALLED = tuple(name for name in SOLVERS if name != "ipopt" or find_spec("ipyopt"))

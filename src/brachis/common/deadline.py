@@ -22,7 +22,7 @@ class Deadline:
     @classmethod
     def after(cls, seconds: float) -> Deadline:
         """Return the moment so many seconds from now."""
-        return cls(time.monotonic() + seconds)
+        return cls().within(seconds)
 
     @property
     def left(self) -> float:

@@ -251,12 +251,14 @@ def fit(
     Parameters
     ----------
     solver : type
-        Made from the geometry, the redundant joints, the others in an order, and what else is given; raises
-        `NotApplicableError` if it does not fit.
+        It is made from the geometry, the redundant joints, the remaining joints in one order, and the further
+        arguments. It raises `NotApplicableError` if it does not fit.
     geometry : ChainGeometry
     redundant : tuple of int
     joints : RemainingJoints
-        From the base to the tool.
+        The remaining joints, from the base to the tool.
+    *arguments
+        Further arguments of the solver.
 
     Raises
     ------

@@ -51,13 +51,12 @@ def join_nodes(nodes_by_phase: Sequence[Nodes]) -> Nodes:
         begin + nodes.times for begin, nodes in zip(begins, nodes_by_phase, strict=True)
     ]
     later = [nodes.qddot_before[1:] for nodes in nodes_by_phase]
-    return Nodes(
-        _join(times),
-        _join([nodes.q for nodes in nodes_by_phase]),
-        _join([nodes.qdot for nodes in nodes_by_phase]),
-        _join([nodes.qddot for nodes in nodes_by_phase]),
-        np.concatenate([nodes_by_phase[0].qddot_before[:1], *later]),
+    q, qdot, qddot = (
+        _join([getattr(nodes, name) for nodes in nodes_by_phase])
+        for name in ("q", "qdot", "qddot")
     )
+    before = np.concatenate([nodes_by_phase[0].qddot_before[:1], *later])
+    return Nodes(_join(times), q, qdot, qddot, before)
 
 
 def _join(arrays: Sequence[np.ndarray]) -> np.ndarray:

@@ -119,7 +119,7 @@ _MEMBERS: dict[str, tuple[str, Callable[[Any, Limit], object]]] = {
 is. It may raise TypeError or ValueError if not. The labels and the arrays of the bounds are checked before."""
 
 
-def build_user_limits(
+def build_own_limits(
     models: Mapping[str, LimitModel],
     robot: Robot,
     existing: Sequence[Limit],

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -36,30 +37,46 @@ from brachis.limits.joint import power_partials, powers
 from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot
 from brachis.robot.limits import TorqueSpeedCurve
-from brachis.task import LIMIT_KINDS, Task
+from brachis.task import LIMIT_KINDS, ROBOT_LIMITS, Task
 
 
-class TotalPowerLimit(Limit):
-    """Power that all joints together draw from a common supply, or return to it, over its limit.
+class RobotLimit(Limit):
+    """One figure of the whole robot over its limit, which is a row of `ROBOT_LIMITS`.
 
     Parameters
     ----------
     robot : Robot
+    figure : float
+        Largest size of the figure, in the unit of the row.
     """
 
-    kind = "total_power"
     longer_time = "relieves"
+    subject: str
+    """What the figure belongs to, in words."""
 
-    def __init__(self, robot: Robot) -> None:
-        figure = robot.limits.total_power
+    def __init__(self, robot: Robot, figure: float) -> None:
         self._robot = robot
         self._figure = figure
+        unit = ROBOT_LIMITS[self.kind].unit
         self.labels = (
-            Label("all joints", "total power", "W", "robot.limits.total_power"),
+            Label(self.subject, self.name, unit, f"robot.limits.{self.kind}"),
         )
         self.lower = -np.ones(1)
         self.upper = np.ones(1)
         self.bounds = (Bound(0, figure, figure, 1.0 / figure),)
+
+    @classmethod
+    def build(cls, robot: Robot, _task: Task) -> Self | None:
+        """Build the limit of a robot that has one."""
+        figure = getattr(robot.limits, cls.kind)
+        return cls(robot, figure) if np.isfinite(figure) else None
+
+
+class TotalPowerLimit(RobotLimit):
+    """Power that all joints together draw from a common supply, or return to it, over its limit."""
+
+    kind = "total_power"
+    subject = "all joints"
 
     def values(self, motion: JointStates) -> np.ndarray:
         return powers(self._robot, motion).sum(axis=1, keepdims=True) / self._figure
@@ -68,11 +85,6 @@ class TotalPowerLimit(Limit):
         return power_partials(self._robot, motion).map(
             lambda slopes: slopes.sum(axis=1, keepdims=True) / self._figure
         )
-
-
-def build_total_power(robot: Robot, _task: Task) -> TotalPowerLimit | None:
-    """Build the limit of a robot that has one."""
-    return TotalPowerLimit(robot) if np.isfinite(robot.limits.total_power) else None
 
 
 WIDTH = 0.002

@@ -59,8 +59,7 @@ class JointLimit(Limit):
         self._joints = joints
         self._ends = robot.limits.both_ways(self.kind)[:, joints]
         self._measure(*self._ends)
-        units = [robot.position_units[i] for i in joints]
-        names = [robot.joint_names[i] for i in joints]
+        named_units = [*zip(robot.joint_names, robot.position_units, strict=True)]
         ranges = {joint.name: joint.key for joint in robot.tool_joints}
         self.labels = tuple(
             Label(
@@ -70,7 +69,7 @@ class JointLimit(Limit):
                 ranges.get(name, f"robot.limits.{self.kind}.{name}"),
                 share=self.share,
             )
-            for name, unit in zip(names, units, strict=True)
+            for name, unit in (named_units[joint] for joint in joints)
         )
 
     def _measure(self, low: np.ndarray, high: np.ndarray) -> None:

@@ -74,7 +74,7 @@ class JointEndLimit(Limit):
     at_rest = "posture"
     refusal = "is not kept"
 
-    def __init__(self, robot: Robot, share: float) -> None:
+    def __init__(self, robot: Robot, _task: Task, share: float) -> None:
         count = len(robot.urdf_joints)
         lower = robot.limits.position_lower[:count]
         width = robot.limits.position_upper[:count] - lower
@@ -106,18 +106,3 @@ class JointEndLimit(Limit):
     def partials(self, motion: JointStates) -> Partials:
         shape = (len(motion.q), *self._rows.shape)
         return Partials(q=np.broadcast_to(self._rows, shape))
-
-
-def build_singularity(robot: Robot, task: Task) -> SingularityLimit | None:
-    """Build the limit of a task that keeps away from singular postures."""
-    figure = task.margins.singularity
-    return None if figure is None else SingularityLimit(robot, task, figure)
-
-
-def build_joint_ends(robot: Robot, task: Task) -> JointEndLimit | None:
-    """Build the limit of a task that keeps away from the ends of joint ranges."""
-    share = task.margins.joint_ends
-    if share is None:
-        return None
-    limit = JointEndLimit(robot, share)
-    return limit if limit.labels else None

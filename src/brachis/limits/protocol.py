@@ -1,13 +1,14 @@
-"""What a limit on the motion is: one object, which everything that plans, refines and reports takes as it is.
+"""What a limit on the motion is: one object, which is used unchanged by the search, the optimiser and the reports.
 
-A limit has c values at every moment of the motion, held between `lower` and `upper`. Most are ratios to a figure, so
-that their bounds are -1 and 1. How far a value v is beyond its bounds is its *violation*, and how near it is its
-*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own `violation_scale` k and `centre` c:
+A limit has c values at every moment of the motion, which must stay between `lower` and `upper`. Most values are ratios
+to a figure, with the bounds -1 and 1. The *violation* of a value v says how far it is outside its bounds. Its *ratio*
+says how much of the limit it uses: 1 at the upper bound, -1 at the lower bound. With the `violation_scale` k and the
+`centre` c,
 
     violation = max(k (v - upper), k (lower - v))
-    ratio     = (v - c) / (upper - c)         between c and the upper bound; towards the lower one likewise, down to -1
-              = 1 + violation                 beyond the upper bound; beyond the lower one -(1 + violation)
-              = max(1 + violation, 0)         where the only bound is the upper one; negative for a lower one
+    ratio     = (v - c) / (upper - c)         between c and the upper bound; towards the lower bound likewise, to -1
+              = 1 + violation                 above the upper bound; below the lower bound -(1 + violation)
+              = max(1 + violation, 0)         if the upper bound is the only one; its negative for a lower bound
 """
 
 from __future__ import annotations
@@ -119,15 +120,18 @@ class Bound:
     Attributes
     ----------
     column : int
-        Of the value, among the limit's c.
+        Index of the value among the limit's c values.
     figure : float
-        In the unit of the value's label.
+        The figure, in the unit of the value's label.
     full_scale : float
-        What a change by 100 % means: of most limits the figure itself, of a position the width of its range.
+        The change of the figure that counts as 100 %: for most limits the figure itself, for a position the width of
+        its range.
     per_unit : float
-        How far the bounds of the value move outwards when the figure is relaxed by one unit.
+        Distance by which the bounds of the value move outwards when the figure is relaxed by one unit: 1 / figure for
+        a ratio.
     side : {"lower", "upper"} or None
-        Which of the bounds moves; None: both.
+        The bound that the figure moves. None: it moves both bounds. An infinite bound stays infinite, so None also
+        serves for a ratio that has an upper bound only.
     """
 
     column: int
@@ -158,7 +162,7 @@ class Partials:
     @property
     def size(self) -> int:
         """Number of values, c."""
-        arrays = (*self.by_joints, self.s)
+        arrays = vars(self).values()
         return next(array.shape[1] for array in arrays if array is not None)
 
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
@@ -168,15 +172,19 @@ class Partials:
 
 
 class HasLatticeWeights(ABC):
-    """A limit by which the lattice measures joint steps between postures."""
+    """Further base class of limits by which the lattice measures joint steps between postures.
+
+    It suits limits that are linear in the joint accelerations or in the joint velocities while the arm is at rest, such
+    as torques. Other limits have no effect on the length of a step.
+    """
 
     @abstractmethod
     def lattice_weights(
         self, q: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Rows A and B, (K, c, n), in postures q, (K, n); None where they vanish.
+        """Return the rows A and B, (K, c, n), in postures q, (K, n); None for zeros.
 
-        A qddot is the part of the limit that joint accelerations take, B qdot the part that joint velocities take.
+        A qddot is the share of the limit that joint accelerations use, B qdot the share that joint velocities use.
         """
 
 
@@ -186,31 +194,34 @@ class Description:
     Attributes
     ----------
     kind : str
-        Name of the kind; not that of a built-in limit.
+        Name of the kind of limit. The names of the built-in kinds are taken.
     labels : tuple of Label
-        Of each of the c values.
+        A label for each of the c values.
     lower, upper : (c,) ndarray
-        Bounds of the values; -inf and inf where open. Values should be of the size of 1.
+        Bounds of the values; -inf and inf where there is no bound. The values should be of the order of 1.
     guarantee : Guarantee
-        Where it holds.
+        Where the limit holds.
     role : Role
-        Whose limit it is.
+        What the limit belongs to.
     longer_time : {"relieves", "neither"}
-        What a longer end time does: it relieves a velocity, acceleration or torque.
+        Effect of a longer end time on the values. It relieves everything that grows with speed, such as a velocity,
+        an acceleration or an energy.
     at_rest : {"nothing", "posture", "turns"}
-        What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or also the
-        turn of an angle (position).
+        What the limit restricts while the arm rests. "posture": the posture, where an angle and the same angle plus
+        2 pi count alike, for example the torque that holds the arm against gravity. "turns": also the number of turns,
+        for example a range of joint positions.
     breaks : (b,) ndarray
-        Path coordinates at which it changes abruptly, so that the motion must be checked exactly there.
+        Path coordinates at which the limit changes abruptly, so that the motion must be checked exactly there.
     order : int
-        Highest time derivative of q in the values: 2, or 3 for the jerk. The splines' degree must be at least as high.
+        Order of the highest time derivative of q in the values: 2, or 3 for the jerk. The degree of the splines must be
+        at least as high.
     violation_scale : (c,) ndarray or float
-        Violation of a value that is beyond its bound by 1 (see the module).
+        Factor from the distance between a value and the bound that it exceeds to its violation: 1 for ratios.
     inset : (c,) ndarray or float
-        By how much joint paths keep inside the bounds of a limit on postures, as a violation: splines leave them
-        by a little. 0 where that is not known.
+        Distance, as a violation, that joint paths keep from the bounds of a limit on postures, because splines deviate
+        slightly from joint paths. 0 if the deviation is not known.
     refusal : str
-        What a message says of an arm at rest beyond the limit, after "the ... limit".
+        Words that follow "the ... limit" in a message about an arm that violates the limit at rest.
     """
 
     kind: str
@@ -248,7 +259,7 @@ class Description:
 
     @property
     def centre(self) -> np.ndarray:
-        """Value, (c,), that uses nothing of the limit; by default the middle between two finite bounds."""
+        """Values, (c,), at which the ratios are 0; by default the middle between two finite bounds."""
         with np.errstate(invalid="ignore"):  # -inf + inf
             return 0.5 * self.lower + 0.5 * self.upper
 
@@ -283,7 +294,15 @@ def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
 
 
 class Limit(Description, ABC):
-    """c values of the joint motion at every moment, or their means over time, held between bounds."""
+    """c values of the joint motion at every moment, or their means over time, held between bounds.
+
+    Attributes
+    ----------
+    robot : Robot
+        The robot of the limit, which `bind` sets.
+    """
+
+    robot: Robot
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         """Let the methods of plug-ins name the plug-in where they fail."""
@@ -292,13 +311,60 @@ class Limit(Description, ABC):
             if name in vars(cls):
                 setattr(cls, name, _name_failures_of(vars(cls)[name]))
 
+    def bind(self, robot: Robot) -> Self:
+        """Return the limit for a robot: a copy whose `robot` it is.
+
+        Override it to check the robot, or to compute what depends on it once.
+        """
+        bound = copy.copy(self)
+        object.__setattr__(bound, "robot", robot)  # it may be frozen
+        return bound
+
     @abstractmethod
     def values(self, motion: JointStates) -> np.ndarray:
-        """Values (K, c)."""
+        """Compute the values.
+
+        Parameters
+        ----------
+        motion : JointStates
+            Motion at K moments, in rad or m, and seconds.
+
+        Returns
+        -------
+        (K, c) ndarray
+            The values, in the unit of `lower` and `upper`, of the order of 1.
+
+        Examples
+        --------
+        The speed of the first joint as a ratio to 2 rad/s:
+
+        >>> def values(self, motion):
+        ...     return motion.qdot[:, :1] / 2.0
+        """
 
     @abstractmethod
     def partials(self, motion: JointStates) -> Partials:
-        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
+        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, as if these were independent.
+
+        Parameters
+        ----------
+        motion : JointStates
+            Motion at K moments, in rad or m, and seconds.
+
+        Returns
+        -------
+        Partials
+            Derivatives with respect to q, qdot, qddot and qdddot, (K, c, n) each, per rad or m, rad/s or m/s, and so
+            on; and with respect to s, (K, c). None stands for zeros.
+
+        Examples
+        --------
+        The partials of the example of `values`:
+
+        >>> def partials(self, motion):
+        ...     first = np.eye(self.robot.n)[None, :1] / 2.0
+        ...     return Partials(qdot=np.repeat(first, len(motion.q), axis=0))
+        """
 
     def kernel_quantity(self, chain: Chain) -> Quantity | None:
         """Describe the values as what the kernel computes by itself, of a chain; None where it does not."""

@@ -70,7 +70,7 @@ class SpeedProfile:
         Ascending; a place that occurs twice is a step.
     speed : (P,) sequence of float
         m/s.
-    whole : bool, optional
+    covers_path : bool, optional
         Whether the first and the last speed hold beyond their places too; otherwise nothing does there.
 
     Attributes
@@ -182,9 +182,8 @@ class ToolMotionLimit(ToolRatios):
             for derivatives in slopes
         )
         s = -sizes[:, None] * slope / largest**2
-        if self._quantity == "acceleration":
-            return Partials(q, qdot, qddot, s=s)
-        return Partials(q, qdot, s=s)
+        by_qddot = qddot if self._quantity == "acceleration" else None
+        return Partials(q, qdot, by_qddot, s=s)
 
 
 def _label(quantity: str, unit: str) -> Label:
@@ -236,13 +235,10 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 
 
-def build_constant(
-    quantity: str, unit: str, robot: Robot, task: Task
-) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one figure for a quantity of `ToolMotionLimit`."""
-    figure = getattr(task.tool_limits, quantity.replace(" ", "_"))
-    if figure is None:
-        return None
+def constant_limit(
+    quantity: str, unit: str, robot: Robot, _task: Task, figure: float
+) -> ToolMotionLimit:
+    """Return the limit of a quantity of `ToolMotionLimit` that has one figure, in a unit."""
     table = SpeedProfile([0.0], [figure])
     return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
 
@@ -271,7 +267,7 @@ class _Size(ToolRatios):
     """In which the virtual joints move the tool on which it depends."""
     label: Label
 
-    def __init__(self, robot: Robot, figure: float) -> None:
+    def __init__(self, robot: Robot, _task: Task, figure: float) -> None:
         super().__init__([self.label], [figure])
         self._n = robot.n
         self._joints = _joints_of(robot, *self.directions)
@@ -370,18 +366,6 @@ class RangeLimit(Limit):
             by_q[axis, :, column] += 1.0
         in_world = np.einsum("kij,jkn->kin", rotations, by_q)
         return Partials(q=in_world * self._scale[:, None])
-
-
-def build_tool_tilt(robot: Robot, task: Task) -> TiltLimit | None:
-    """Build the limit of a task whose tool may tilt within a cone."""
-    figure = task.tolerances.orientation.tilt
-    return None if figure is None else TiltLimit(robot, figure)
-
-
-def build_tool_distance(robot: Robot, task: Task) -> DistanceLimit | None:
-    """Build the limit of a task whose tool may be within a sphere around the path."""
-    figure = task.tolerances.position.sphere
-    return None if figure is None else DistanceLimit(robot, figure)
 
 
 def build_tool_range(robot: Robot, task: Task) -> RangeLimit | None:

@@ -35,7 +35,7 @@ def product(first: Array, second: Array, how: str) -> Array:
 
     Parameters
     ----------
-    one, other : ndarray, shape (order + 1, ...)
+    first, second : ndarray, shape (order + 1, ...)
         Derivatives of the factors.
     how : str
         The product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.

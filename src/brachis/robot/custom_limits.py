@@ -45,12 +45,16 @@ def list_models(
     models = _make_plugins(task)
     models |= {f"own_limits[{i}]": model for i, model in enumerate(own_limits)}
     for where, model in models.items():
-        if isinstance(model, type) or not callable(getattr(model, "bind", None)):
+        is_class = isinstance(model, type)
+        if is_class or not callable(getattr(model, "bind", None)):
             raise InputError(
                 "this object is not a limit",
                 where=where,
-                found=model,
-                allowed="an object whose bind(robot) returns a brachis.limits.Limit (docs/own_limit.md)",
+                found=model
+                if is_class
+                else f"an object of the class {type(model).__name__}",
+                allowed="an object that inherits brachis.limits.Limit, or whose bind(robot) returns one "
+                "(docs/own_limit.md)",
             )
     return models
 

@@ -18,8 +18,7 @@ TURN = 2.0 * np.pi
 
 def complement(n: int, joints: Iterable[int]) -> list[int]:
     """Return the joints, out of n, that are not among `joints`, ascending."""
-    left_out = set(joints)
-    return [i for i in range(n) if i not in left_out]
+    return sorted(set(range(n)).difference(joints))
 
 
 def principal(angles: np.ndarray) -> np.ndarray:

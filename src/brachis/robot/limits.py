@@ -13,7 +13,13 @@ from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, LimitError
 from brachis.robot.tool_joints import ToolJoint
-from brachis.task import FROM_URDF, LIMIT_KINDS, LimitSpec, check_robot_settings
+from brachis.task import (
+    FROM_URDF,
+    LIMIT_KINDS,
+    ROBOT_LIMITS,
+    LimitSpec,
+    check_robot_settings,
+)
 from brachis.task.fields import LARGEST, LEAST
 from brachis.task.limit_models import map_by_joint, per_joint_values
 
@@ -26,9 +32,9 @@ MAGNITUDES = tuple(kind for kind, row in LIMIT_KINDS.items() if row.form != "ran
 """Kinds of limits that are figures around zero for each joint."""
 _ARRAYS = tuple(name for row in LIMIT_KINDS.values() for name in row.ends)
 
-_JointArrays: Any = make_dataclass(
-    "_JointArrays",
-    [(name, np.ndarray) for name in _ARRAYS],
+_Figures: Any = make_dataclass(
+    "_Figures",
+    [(name, np.ndarray) for name in _ARRAYS] + [(name, float) for name in ROBOT_LIMITS],
     frozen=True,
     repr=False,
     eq=False,
@@ -36,7 +42,7 @@ _JointArrays: Any = make_dataclass(
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Limits(_JointArrays, Summary):  # type: ignore[misc]
+class Limits(_Figures, Summary):  # type: ignore[misc]
     """Limits of every joint of the chain; infinite where a joint is not limited. The arrays are read-only.
 
     Attributes
@@ -64,7 +70,6 @@ class Limits(_JointArrays, Summary):  # type: ignore[misc]
         without a curve.
     """
 
-    total_power: float
     torque_speed: tuple[TorqueSpeedCurve, ...]
 
     def __post_init__(self) -> None:
@@ -191,8 +196,8 @@ def resolve_limits(
         A scaled limit is outside [`LEAST`, `LARGEST`]; a joint has neither a torque nor an acceleration limit; a range
         is missing, empty or ends more than 1e6 rad or m away from zero.
     InputError
-        A speed override has no velocity limit to scale; the total power is outside [`LEAST`, `LARGEST`]; a torque
-        curve is not valid or rises.
+        A speed override has no velocity limit to scale; one of `ROBOT_LIMITS` is outside [`LEAST`, `LARGEST`]; a
+        torque curve is not valid or rises.
     """
     names = list(joint_names)
     pairs = {
@@ -232,7 +237,9 @@ def resolve_limits(
     arrays: dict[str, Any] = {}
     for kind, limits in pairs.items():
         arrays |= _arrays_of(kind, limits)
-    return Limits(**arrays, total_power=_resolve_total_power(spec), torque_speed=curves)
+    for kind in ROBOT_LIMITS:
+        arrays[kind] = _resolve_figure(kind, spec)
+    return Limits(**arrays, torque_speed=curves)
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
@@ -253,15 +260,13 @@ def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     for kind, row in LIMIT_KINDS.items():
         entries: list[Any] = []
         for lower, upper in limits.both_ways(kind).T[: len(names)].tolist():
-            pair = tuple(end if np.isfinite(end) else None for end in (lower, upper))
             is_pair = row.form == "range" or lower != -upper
-            entries.append(pair if is_pair else pair[1])
+            entries.append((lower, upper) if is_pair else upper)
         spec[kind] = dict(zip(names, entries, strict=True))
     curves = zip(names, limits.torque_speed, strict=False)
     spec["torque_speed"] = {name: curve for name, curve in curves if curve} or None
-    if np.isfinite(limits.total_power):
-        spec["total_power"] = limits.total_power
-    return LimitSpec(**spec)
+    spec |= {kind: getattr(limits, kind) for kind in ROBOT_LIMITS}
+    return LimitSpec(**_leave_open(spec))
 
 
 def _spread_limits(
@@ -313,39 +318,39 @@ def _scale_limits(
     """Scale limits, (2, n), and refuse figures whose products and squares would not be accurate."""
     with np.errstate(over="ignore"):
         scaled = np.asarray(limits * factor)
-    for figures, key in (limits, kind), (scaled, f"scale.{kind}"):
+    for figures, word in (limits, ""), (scaled, "scaled "):
         sizes = figures * [[-1.0], [1.0]]
         is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))
         for end, i in np.argwhere(is_wrong):
-            word = "scaled " if figures is scaled else ""
+            key = f"scale.{kind}" if word else f"{kind}.{names[i]}"
             problem = f"{word}{kind} limit is too small or too large"
             if sizes[end, i] <= 0.0:
                 problem = f"{kind} limit in the URDF is not positive"
             raise LimitError(
                 problem,
                 joint=names[i],
-                key=f"robot.limits.{key}"
-                if word
-                else f"robot.limits.{kind}.{names[i]}",
+                key=f"robot.limits.{key}",
                 found=f"{sizes[end, i]:g}",
                 allowed=f"{LEAST:g} to {LARGEST:g} in SI units, also after robot.limits.scale, or null for no limit",
             )
     return scaled
 
 
-def _resolve_total_power(spec: LimitSpec) -> float:
-    """Return the limit of the sum of the joints' powers, W; infinite without one."""
-    if spec.total_power is None:
+def _resolve_figure(kind: str, spec: LimitSpec) -> float:
+    """Return one of `ROBOT_LIMITS`; infinite if it is not limited."""
+    row = ROBOT_LIMITS[kind]
+    stated = getattr(spec, kind)
+    if stated is None:
         return np.inf
-    scaled = spec.total_power * spec.scale.power
+    scaled = float(stated * getattr(spec.scale, row.scale, 1.0))
     if not LEAST <= scaled <= LARGEST:
         raise InputError(
-            "the total power is too small or too large",
-            where="robot.limits.total_power",
-            found=spec.total_power,
-            allowed=f"{LEAST:g} W to {LARGEST:g} W after scaling, or null for no limit",
+            f"the {kind.replace('_', ' ')} is too small or too large",
+            where=f"robot.limits.{kind}",
+            found=stated,
+            allowed=f"{LEAST:g} to {LARGEST:g} {row.unit} after scaling, or null for no limit",
         )
-    return float(scaled)
+    return scaled
 
 
 def _resolve_curve(points: Any, joint: str, factor: float) -> TorqueSpeedCurve:

@@ -14,7 +14,7 @@ from brachis.errors import UrdfError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import Limits
 from brachis.robot.urdf_bodies import UrdfDynamics
-from brachis.task import LIMIT_KINDS, RobotSettings
+from brachis.task import LIMIT_KINDS, ROBOT_LIMITS, RobotSettings
 
 
 def list_users(
@@ -32,8 +32,10 @@ def list_users(
         )
     }
     is_user |= {
+        f"limits.{kind}": np.isfinite(getattr(limits, kind)) for kind in ROBOT_LIMITS
+    }
+    is_user |= {
         "limits.torque_speed": any(limits.torque_speed),
-        "limits.total_power": np.isfinite(limits.total_power),
         "payload": settings.payload is not None,
     }
     for kind in ("armature", "viscous", "coulomb"):

@@ -400,7 +400,7 @@ class Robot(Summary):
     @property
     def revolute(self) -> np.ndarray:
         """Which joints turn, (n,) bool; the others slide."""
-        return np.array([unit == "rad" for unit in self.position_units])
+        return np.array(self.position_units) == "rad"
 
     @cached_property
     def scales(self) -> np.ndarray:

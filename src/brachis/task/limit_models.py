@@ -37,7 +37,12 @@ from brachis.task.fields import (
     must,
     plain,
 )
-from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
+from brachis.task.limit_kinds import (
+    LIMIT_KINDS,
+    ROBOT_LIMITS,
+    LimitKeywords,
+    LimitScale,
+)
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
@@ -93,8 +98,8 @@ TorqueCurve = Annotated[
 """Points [speed, torque]."""
 
 _FORMS = {"number": NumberEntry, "pair": PairEntry, "range": RangeEntry}
-_JointLimits: Any = make_dataclass(
-    "_JointLimits",
+_TabledLimits: Any = make_dataclass(
+    "_TabledLimits",
     [
         (
             row.name,
@@ -102,13 +107,21 @@ _JointLimits: Any = make_dataclass(
             None if row.form == "number" else FROM_URDF,
         )
         for row in LIMIT_KINDS.values()
+    ]
+    + [
+        (
+            name,
+            Annotated[AnyPositive | None, Field(description=row.description)],
+            None,
+        )
+        for name, row in ROBOT_LIMITS.items()
     ],
     frozen=True,
 )
 
 
 @dataclass(frozen=True)
-class LimitSpec(_JointLimits):  # type: ignore[misc]
+class LimitSpec(_TabledLimits):  # type: ignore[misc]
     """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation).
 
     They are checked when a robot is made with them, whose joints are known.
@@ -124,10 +137,10 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     acceleration, power, rms_torque, jerk, torque_rate : float, sequence, array, mapping or None, optional
         rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. One number, numbers or None as for the torque. The
         last two need ``spline.degree`` >= 3 and acceleration at rest.
-    scale : mapping or LimitScale, optional
-        Factors on limits, applied after all else.
     total_power : float or None, optional
         W.
+    scale : mapping or LimitScale, optional
+        Factors on limits, applied after all else.
     torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
         Points [speed, torque] by joint name.
 
@@ -140,8 +153,6 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
-    total_power: AnyPositive | None = None
-    """Largest sum of all joints' powers, drawn or returned, W."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
     N), the first at speed 0, torques never rising. Linear in between; the last slope continues to zero torque. It

@@ -1,6 +1,6 @@
-"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`.
+"""Ratios to limits by separate formulas of the verification, which share nothing with `brachis.limits`.
 
-Only a user's own limit without a check is verified by its own values, and marked so.
+Only a user's limit that has no `check` is verified by its own values. The check is then marked as such.
 """
 
 from __future__ import annotations
@@ -17,28 +17,31 @@ from brachis.robot.custom_limits import (
     list_models,
 )
 from brachis.verify.limits.clearance import worst_clearance
-from brachis.verify.limits.joint import JOINT_CHECKS
+from brachis.verify.limits.joint import DRIVE_CHECKS, JOINT_CHECKS
 from brachis.verify.limits.margins import MARGIN_CHECKS
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.limits.tool import TOOL_CHECKS
 from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.report import Check
 
-TABLE: dict[str, LimitCheck] = {
+LIMIT_CHECKS: dict[str, LimitCheck] = {
     **JOINT_CHECKS,
+    **DRIVE_CHECKS,
     **TOOL_CHECKS,
     **MARGIN_CHECKS,
     "clearance": worst_clearance,
 }
-"""By kind, in the order of the checks."""
+"""Checks by kind of limit, in the order in which they are reported."""
 
 
 def check_limits(
-    motion: CheckedMotion, user_limits: Sequence[LimitModel]
+    motion: CheckedMotion, own_limits: Sequence[LimitModel]
 ) -> list[Check]:
     """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the user's."""
-    results = [(kind.replace("_", " "), find(motion)) for kind, find in TABLE.items()]
-    models = list_models(motion.task, user_limits)
+    results = [
+        (kind.replace("_", " "), find(motion)) for kind, find in LIMIT_CHECKS.items()
+    ]
+    models = list_models(motion.task, own_limits)
     results += [_check_model(where, model, motion) for where, model in models.items()]
     allowed = 1.0 + motion.options.ratio_tolerance
     return [
