@@ -50,11 +50,11 @@ def join_nodes(nodes_by_phase: Sequence[Nodes]) -> Nodes:
     times = [
         begin + nodes.times for begin, nodes in zip(begins, nodes_by_phase, strict=True)
     ]
-    later = [nodes.qddot_before[1:] for nodes in nodes_by_phase]
     q, qdot, qddot = (
         _join([getattr(nodes, name) for nodes in nodes_by_phase])
         for name in ("q", "qdot", "qddot")
     )
+    later = (nodes.qddot_before[1:] for nodes in nodes_by_phase)
     before = np.concatenate([nodes_by_phase[0].qddot_before[:1], *later])
     return Nodes(_join(times), q, qdot, qddot, before)
 

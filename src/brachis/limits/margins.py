@@ -33,8 +33,7 @@ class SingularityLimit(Limit):
         self._task_map = task_map_of(robot, task.task_space)
         self._count = len(robot.urdf_joints)
         self._figure = figure
-        key = "margins.singularity"
-        self.labels = (Label("arm", "singularity", "-", key),)
+        self.labels = (Label("arm", "singularity", "-", "margins.singularity"),)
         self.lower = np.ones(1)
         self.upper = np.full(1, np.inf)
         self.bounds = (Bound(0, figure, figure, 1.0 / figure, "lower"),)
@@ -84,9 +83,8 @@ class JointEndLimit(Limit):
         self._width = width[joints]
         self._revolute = robot.revolute[joints]
         self._rows = np.eye(robot.n)[joints] / self._width[:, None]
-        kind = "range margin"
         self.labels = tuple(
-            Label(robot.joint_names[joint], kind, "-", "margins.joint_ends")
+            Label(robot.joint_names[joint], "range margin", "-", "margins.joint_ends")
             for joint in joints
         )
         self.lower = np.full(len(joints), share)

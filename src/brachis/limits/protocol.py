@@ -162,8 +162,9 @@ class Partials:
     @property
     def size(self) -> int:
         """Number of values, c."""
-        arrays = vars(self).values()
-        return next(array.shape[1] for array in arrays if array is not None)
+        return next(
+            array.shape[1] for array in vars(self).values() if array is not None
+        )
 
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
         """Return the partials by q and its derivatives, changed."""

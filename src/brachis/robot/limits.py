@@ -164,7 +164,7 @@ def _leave_open(value: Any) -> Any:
         return {key: _leave_open(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
         return tuple(map(_leave_open, value))
-    return None if isinstance(value, float) and np.isinf(value) else value
+    return None if value in {np.inf, -np.inf} else value
 
 
 def resolve_limits(
@@ -234,23 +234,21 @@ def resolve_limits(
             hint="Set robot.limits.velocity, or remove the override",
         )
     pairs["velocity"] = pairs["velocity"] * speed_override
-    arrays: dict[str, Any] = {}
+    figures: dict[str, Any] = {
+        kind: _resolve_figure(kind, spec) for kind in ROBOT_LIMITS
+    }
     for kind, limits in pairs.items():
-        arrays |= _arrays_of(kind, limits)
-    for kind in ROBOT_LIMITS:
-        arrays[kind] = _resolve_figure(kind, spec)
-    return Limits(**arrays, torque_speed=curves)
+        figures |= _arrays_of(kind, limits)
+    return Limits(**figures, torque_speed=curves)
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
     """Leave out limits of joints that do not move: they are kept."""
-    changed: dict[str, Any] = {}
-    for kind, value in vars(spec).items():
-        if isinstance(value, Mapping):
-            remaining = {
-                name: limit for name, limit in value.items() if name not in joints
-            }
-            changed[kind] = remaining
+    changed: dict[str, Any] = {
+        kind: {name: limit for name, limit in value.items() if name not in joints}
+        for kind, value in vars(spec).items()
+        if isinstance(value, Mapping)
+    }
     return replace(spec, **changed)
 
 
@@ -258,10 +256,11 @@ def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     """State limits joint by joint; joints beyond `names` are left out."""
     spec: dict[str, Any] = {}
     for kind, row in LIMIT_KINDS.items():
-        entries: list[Any] = []
-        for lower, upper in limits.both_ways(kind).T[: len(names)].tolist():
-            is_pair = row.form == "range" or lower != -upper
-            entries.append((lower, upper) if is_pair else upper)
+        ends = limits.both_ways(kind).T[: len(names)].tolist()
+        entries = [
+            (lower, upper) if row.form == "range" or lower != -upper else upper
+            for lower, upper in ends
+        ]
         spec[kind] = dict(zip(names, entries, strict=True))
     curves = zip(names, limits.torque_speed, strict=False)
     spec["torque_speed"] = {name: curve for name, curve in curves if curve} or None

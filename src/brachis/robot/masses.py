@@ -40,7 +40,7 @@ def list_users(
     }
     for kind in ("armature", "viscous", "coulomb"):
         figures = getattr(friction, kind)[: len(dynamics.bodies)]
-        is_user[f"friction.{kind}"] = np.any(figures > dynamics.friction.get(kind, 0.0))
+        is_user[f"friction.{kind}"] = np.any(figures > dynamics.friction[kind])
     return [f"robot.{key}" for key, needs_masses in is_user.items() if needs_masses]
 
 

@@ -32,8 +32,6 @@ from brachis.robot.urdf_bodies import (
     turns_about,
 )
 
-_AXES = np.eye(3)
-
 
 def tool_placements(
     robot: Robot, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray]
@@ -54,12 +52,8 @@ def tool_placements(
         for direction in ("x", "y", "z", "side", "lead", "roll")
     )
     # The path's axes in the tool frame.
-    turned = (
-        turns_about(_AXES[2], -roll)
-        @ turns_about(_AXES[1], -lead)
-        @ turns_about(_AXES[0], side)
-    )
-    rotation = rotation @ turned
+    about_x, about_y, about_z = map(turns_about, np.eye(3), (side, -lead, -roll))
+    rotation = rotation @ (about_z @ about_y @ about_x)
     return origin - np.einsum("kij,jk->ki", rotation, np.array([x, y, z])), rotation
 
 
@@ -136,8 +130,7 @@ def _rigid(
     base = placement_matrix(robot.settings.mounting)[:3, :3]
     upwards = base.T @ -np.array(robot.model.gravity.linear)
     motions = _motions(robot, q, qdot, qddot, upwards)
-    force = np.zeros((3, len(q)))
-    moment = np.zeros((3, len(q)))
+    force = moment = np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
         body = bodies[joint]
         omega, alpha, acceleration = motions[joint]
@@ -185,8 +178,7 @@ def _motions(
 
     `base_acceleration`, (3,), is in the axes of the base.
     """
-    omega = np.zeros((3, len(q)))
-    alpha = np.zeros((3, len(q)))
+    omega = alpha = np.zeros((3, len(q)))
     acceleration = np.tile(base_acceleration[:, None], len(q))
     motions = []
     for joint, body in enumerate(robot.urdf_dynamics.bodies):
