@@ -32,36 +32,36 @@ from brachis.robot.dynamics import SharedTorques
 _Found = TypeVar("_Found")
 
 _DEVIATION = 3e-5
-"""Distance by which splines leave a joint path, about, rad or m."""
+"""Approximate distance by which splines deviate from a joint path, rad or m."""
 _LARGEST_INSET = 0.1
-"""Largest violation by which joint paths keep inside a narrow range."""
+"""Largest inset of joint paths in a narrow range, as a violation."""
 
 
 class Guarantee(Enum):
-    """Where a limit holds; each value is the sentence that a user reads."""
+    """Where a limit holds. Each value is the sentence that the user reads."""
 
     AT_ALL_INSTANTS = "It holds at all instants of a verified motion."
     AT_COLLOCATION_POINTS = (
-        "It holds at the collocation points of the optimiser, and is not verified."
+        "It holds at the collocation points of the optimiser. It is not verified."
     )
     AS_MEAN = "It holds as a mean over the whole motion."
-    """The values have to be squares f^2: the optimiser derives their curvature from that (`brachis.optimise.means`)."""
+    """The values must be squares f^2: the optimiser derives their curvature from that (`brachis.optimise.means`)."""
 
     @property
     def is_mean(self) -> bool:
-        """Whether the means of the values over the motion are held, and not the values at every moment."""
+        """Whether the limit applies to the means of the values over the motion, not to the values at every moment."""
         return self is Guarantee.AS_MEAN
 
 
 class JointStates(Protocol):
-    """Joint motion at K moments; for example states of the optimiser or samples of a trajectory.
+    """Joint motion at K moments, such as states of the optimiser or samples of a trajectory.
 
     Attributes
     ----------
     q, qdot, qddot, qdddot : (K, n) ndarray
         rad or m, and per second.
     s : (K,) ndarray
-        Path coordinate; NaN without a path, or if it is not known.
+        Path coordinate; NaN without a path, or if it is unknown.
     """
 
     @property
@@ -75,17 +75,17 @@ class JointStates(Protocol):
     @property
     def s(self) -> np.ndarray: ...
     def torque(self, robot: Robot) -> np.ndarray:
-        """Joint torques, (K, n), computed once."""
+        """Return the joint torques, (K, n), which are computed once."""
         ...
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
-        """Differentiate `torque`, once."""
+        """Return the derivatives of `torque`, which are computed once."""
         ...
 
 
 @dataclass(frozen=True)
 class Moments(SharedTorques):
-    """Joint motion at K moments, made from arrays; see `JointStates`."""
+    """Joint motion at K moments, given by arrays; see `JointStates`."""
 
     q: np.ndarray
     qdot: np.ndarray
@@ -95,27 +95,27 @@ class Moments(SharedTorques):
 
     @classmethod
     def at_rest(cls, q: np.ndarray) -> Moments:
-        """Stand still in postures, (K, n), somewhere on the path."""
+        """Return the motion of an arm that rests in postures, (K, n), somewhere on the path."""
         still = np.zeros_like(q)
         return cls(q, still, still, still, np.full(len(q), np.nan))
 
 
 class Role(Enum):
-    """Whose limit it is."""
+    """What a limit belongs to."""
 
     ROBOT = "robot"
-    """A limit of drives and joints."""
+    """A limit of the drives and joints."""
     PROCESS = "process"
-    """A limit of what the tool does."""
+    """A limit of the process, on what the tool does."""
     SCENE = "scene"
-    """A limit of what stands around the robot."""
+    """A limit of the objects around the robot."""
     SAFEGUARD = "safeguard"
-    """Numerical, not physical: small violations are ignored, and the verification does not check it."""
+    """A numerical limit, not a physical one. Small violations are ignored, and the verification does not check it."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """A figure that the user could change, and how it moves the bounds of one value.
+    """A figure that the user could change, and its effect on the bounds of one value.
 
     Attributes
     ----------
@@ -143,9 +143,9 @@ class Bound:
 
 @dataclass(frozen=True)
 class Partials:
-    """Partial derivatives of a limit's c values at K moments, each (K, c, n), or None where they vanish.
+    """Partial derivatives of a limit's c values at K moments, (K, c, n) each; None stands for zeros.
 
-    `s`, (K, c), is that by the path coordinate, where a value depends on it besides.
+    `s`, (K, c), is the derivative with respect to the path coordinate, if a value depends on it directly.
     """
 
     q: np.ndarray | None = None
@@ -156,7 +156,7 @@ class Partials:
 
     @property
     def by_joints(self) -> tuple[np.ndarray | None, ...]:
-        """Partials by q, qdot, qddot and qdddot."""
+        """The derivatives with respect to q, qdot, qddot and qdddot."""
         return self.q, self.qdot, self.qddot, self.qdddot
 
     @property
@@ -167,7 +167,7 @@ class Partials:
         )
 
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
-        """Return the partials by q and its derivatives, changed."""
+        """Apply a function to the derivatives with respect to q, qdot, qddot and qdddot."""
         changed = (None if array is None else change(array) for array in self.by_joints)
         return Partials(*changed)
 
@@ -190,7 +190,7 @@ class HasLatticeWeights(ABC):
 
 
 class Description:
-    """What is known of a limit besides its values.
+    """The properties of a limit besides its values.
 
     Attributes
     ----------
@@ -240,21 +240,21 @@ class Description:
     refusal: str = "is exceeded at rest"
 
     origin: str = ""
-    """Where the user gives it, for messages; brachis sets it for limits that are not its own."""
+    """Where the user gives the limit, for messages. Only set for limits that are not built in; brachis sets it."""
 
     @property
     def name(self) -> str:
-        """The kind in words."""
+        """The kind of limit, in words."""
         return self.kind.replace("_", " ")
 
     @property
     def is_checked_at_points(self) -> bool:
-        """Whether a violation counts at single points."""
+        """Whether a violation at a single point counts."""
         return self.role is not Role.SAFEGUARD and not self.guarantee.is_mean
 
     @property
     def is_of_postures(self) -> bool:
-        """Whether it is one of postures alone, whatever the timing."""
+        """Whether the limit depends on the posture alone, whatever the timing."""
         has_posture = self.at_rest != "nothing" and self.longer_time == "neither"
         return self.is_checked_at_points and has_posture
 
@@ -266,7 +266,7 @@ class Description:
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
-        """The figures that the user could change; by default every finite bound by itself."""
+        """The figures that the user could change; by default each finite bound is a figure."""
         return tuple(
             Bound(column, level, max(abs(level), 1.0), 1.0, side)
             for side in ("lower", "upper")
@@ -276,12 +276,12 @@ class Description:
 
 
 def compute_inset(measure: np.ndarray | float) -> np.ndarray | float:
-    """Return the inset of positions whose violations are counted in a measure, rad or m."""
+    """Return the inset of positions whose violations are counted in units of `measure`, rad or m."""
     return np.minimum(_DEVIATION / measure, _LARGEST_INSET)
 
 
 def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
-    """Let a method of a limit say which plug-in's it is where it fails."""
+    """Let a method of a limit name the plug-in that it belongs to, if it fails."""
 
     @wraps(method)
     def call(limit: Limit, motion: JointStates) -> _Found:
@@ -295,7 +295,7 @@ def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
 
 
 class Limit(Description, ABC):
-    """c values of the joint motion at every moment, or their means over time, held between bounds.
+    """Bounds on c values of the joint motion at every moment, or on the means of these values over time.
 
     Attributes
     ----------
@@ -306,16 +306,16 @@ class Limit(Description, ABC):
     robot: Robot
 
     def __init_subclass__(cls, **keywords: Any) -> None:
-        """Let the methods of plug-ins name the plug-in where they fail."""
+        """Let the methods of a plug-in name the plug-in if they fail."""
         super().__init_subclass__(**keywords)
         for name in ("values", "partials"):
             if name in vars(cls):
                 setattr(cls, name, _name_failures_of(vars(cls)[name]))
 
     def bind(self, robot: Robot) -> Self:
-        """Return the limit for a robot: a copy whose `robot` it is.
+        """Return the limit for a robot: a copy with the attribute `robot`.
 
-        Override it to check the robot, or to compute what depends on it once.
+        Override this method to check the robot, or to compute in advance what depends on it.
         """
         bound = copy.copy(self)
         object.__setattr__(bound, "robot", robot)  # it may be frozen
@@ -368,26 +368,26 @@ class Limit(Description, ABC):
         """
 
     def kernel_quantity(self, chain: Chain) -> Quantity | None:
-        """Describe the values as what the kernel computes by itself, of a chain; None where it does not."""
+        """Describe the values as a quantity that the kernel computes for a chain; None if it does not compute them."""
         return None
 
     def restrict_to(self, q: np.ndarray) -> Limit | None:
-        """Return what matters of it while the motion stays close to postures, (K, n); None where nothing does."""
+        """Return the part of the limit that matters close to postures, (K, n); None if no part does."""
         return self
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), it holds within a violation of `slack` while the arm rests, (K,)."""
+        """Tell in which postures, (K, n), the resting arm violates the limit by at most `slack`, (K,) bool."""
         values = self.values(Moments.at_rest(q))
         return np.all(self.violation(values) <= slack, axis=1)
 
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell on which straight steps from postures to others, (E, n), it holds as at both ends, (E,)."""
+        """Tell for each straight step between two postures, (E, n), if the limit holds as at its ends, (E,) bool."""
         return np.ones(len(first), dtype=bool)
 
     def relax(self, bound: Bound, amount: float) -> Self:
-        """Return the limit with one figure relaxed by `amount`, in its unit."""
+        """Return the limit with one figure relaxed by `amount`, in the unit of the figure."""
         relaxed = copy.copy(self)
         step = np.zeros(len(self.lower))
         step[bound.column] = bound.per_unit * amount
@@ -398,7 +398,7 @@ class Limit(Description, ABC):
         return relaxed
 
     def keep_inside(self, ends: np.ndarray) -> Self:
-        """Return the limit with bounds that are narrower by its inset, as far as postures, (K, n), leave room."""
+        """Return the limit with bounds that are narrower by the inset, as far as the postures `ends`, (K, n), allow."""
         ends = ends[np.isfinite(ends).all(axis=1)]
         beyond = self.violation(self.values(Moments.at_rest(ends)))
         room = -beyond.max(axis=0, initial=-np.inf)
@@ -409,12 +409,12 @@ class Limit(Description, ABC):
         return narrowed
 
     def violation(self, values: np.ndarray) -> np.ndarray:
-        """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
+        """Compute the violations, (K, c), of values, (K, c); negative inside the bounds. See the module."""
         beyond = np.maximum(values - self.upper, self.lower - values)
         return beyond * self.violation_scale
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
-        """How near values, (K, c), are to their bounds; see the module."""
+        """Compute the ratios, (K, c), of values, (K, c), to their bounds; see the module."""
         above = (values - self.upper) * self.violation_scale
         below = (self.lower - values) * self.violation_scale
         outside = np.where(
@@ -429,9 +429,9 @@ class Limit(Description, ABC):
         return np.divide(away, reach, out=outside, where=inside)
 
     def ratios(self, motion: JointStates, t: np.ndarray) -> np.ndarray:
-        """How near a whole motion is to the bounds at times t, (K,), dense and ascending, s: (K, c).
+        """Compute the ratios of a whole motion to the bounds, (K, c), at dense, ascending times t, (K,), s.
 
-        A mean over the whole motion is equally near at all times.
+        The ratio of a mean over the motion is the same at all times.
         """
         values = self.values(motion)
         if self.guarantee.is_mean:

@@ -62,7 +62,7 @@ class SegmentContext:
         return np.asarray(values, dtype=float)
 
     def need_rows(self, what: str, *counts: int) -> None:
-        """Refuse a form of segment for which the task space has another number of position rows than `counts`.
+        """Refuse a form of segment unless the number of position rows is among `counts`.
 
         Raises
         ------
@@ -88,13 +88,13 @@ class SegmentContext:
     def wrong(
         self, problem: str, key: str = "", **details: Unpack[Details]
     ) -> PathError:
-        """Return the error that a key of the segment, such as ``.normal``, is wrong."""
+        """Return an error about a key of the segment, such as ``.normal``."""
         details["where"] = f"{self.key}{key}"
         return PathError(problem, **details)
 
 
 def place(rows: Sequence[str], point: Array) -> str:
-    """Return coordinates in words, to the nanometre; of a pose its position."""
+    """Write coordinates in words, to the nanometre; for a pose only its position."""
     return ", ".join(
         f"{row} = {round(value, 9) + 0.0:.6g}"
         for row, value in zip(rows, point, strict=False)
@@ -102,6 +102,6 @@ def place(rows: Sequence[str], point: Array) -> str:
 
 
 def stands_still(curve: Curve, positions: int) -> bool:
-    """Return whether the position rows, the first ones, do not move along a curve."""
+    """Return whether the position rows, which come first, do not move along a curve."""
     ends = curve.derivatives(curve.knots, 0)[0, :, :positions]
     return bool(np.ptp(ends, axis=0).max(initial=0.0) < tolerances.LENGTH)

@@ -1,7 +1,7 @@
-"""What needs dynamics, and so the masses of the robot: the one place that decides it.
+"""Which features need dynamics, and thus the masses of the robot. This is decided only here.
 
-Torques need the mass of what every joint moves. So do the limits on torques, on their rates and means and on powers, a
-payload, and friction that the task states. All else is kinematics.
+Torques need the mass of the bodies that each joint moves. The same holds for limits on torques, torque rates, mean
+torques and powers, for a payload, and for friction that the task states. Everything else is kinematics.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from brachis.task import LIMIT_KINDS, ROBOT_LIMITS, RobotSettings
 def list_users(
     dynamics: UrdfDynamics, limits: Limits, friction: Friction, settings: RobotSettings
 ) -> list[str]:
-    """List the keys of the task that need masses; a torque limit may also be an effort of the URDF."""
+    """List the keys of the task that need masses. A torque limit may also come from an effort in the URDF."""
     is_user = {
         f"limits.{kind}.{body.joint}": is_limited
         for kind, row in LIMIT_KINDS.items()
@@ -45,7 +45,7 @@ def list_users(
 
 
 def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> None:
-    """Refuse users of masses if the body that a joint moves has no mass.
+    """Refuse features that need masses if a body that a joint moves has no mass.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> N
     source : str
         Name of the URDF, for messages.
     users : sequence of str
-        What needs masses, see `list_users`; nothing is refused if it is empty.
+        Features that need masses; see `list_users`. Nothing is refused if it is empty.
 
     Raises
     ------
