@@ -123,7 +123,7 @@ def _runs(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # the process of another user, or not the number of a process
+    except (OSError, OverflowError):  # another user's process, or not a process number
         return True
     return True
 

@@ -124,7 +124,7 @@ def defer() -> Iterator[None]:
     """
     before = signal.getsignal(signal.SIGINT)
     in_main_thread = threading.current_thread() is threading.main_thread()
-    if not in_main_thread or not callable(before):  # the signal is ignored, or the handler is not Python's
+    if not in_main_thread or not callable(before):  # ignored, or not Python's
         yield
         return
     pressed = False
