@@ -6,7 +6,7 @@ the normal. With the redundant joints held, W0 is the tool with the others at ze
 
     one joint     the row's component of E_a W0 is given:                    a cosine, or a line
     two joints    E_a E_b W0 = W:                                            `move_within_plane`
-    an angle      E_a E_b E_c = D, where D turns by what is left of the angle, and brings W0 to W
+    an angle      E_a E_b E_c = D, where D turns by the rest of the angle, and moves W0 to W
 
 With an angle, one revolute joint does not move a point P of its axis, and follows from the angle. Two joints remain:
 

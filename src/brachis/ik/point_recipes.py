@@ -4,8 +4,8 @@ Each recipe solves for one joint after the other. It needs a property of a, b, c
 redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move, and B a point
 on the axis of b. Steps with two solutions are marked by *.
 
-    plane of b, c   * a: n . E_a^-1 W = n . W0 (one answer for a slide);  b and c within the plane
-    plane of a, b   * c: n . E_c W0 = n . W (one answer for a slide);  a and b within the plane
+    plane of b, c   * a: n . E_a^-1 W = n . W0 (one solution for a slide);  b and c within the plane
+    plane of a, b   * c: n . E_c W0 = n . W (one solution for a slide);  a and b within the plane
     a, b meet       * c: |E_c W0 - S| = |W - S|;  * b: a . E_b E_c W0 = a . W;  a by the angle
     b, c meet       * a: |E_a^-1 W - S| = |W0 - S|;  * c: b . E_c W0 = b . E_a^-1 W;  b by the angle
     cylinder        * g = +-sqrt(|b x (W - B)|^2 - (c . (W0 - B))^2);  * c: (b x c) . (E_c W0 - B) = g;  b by the angle;

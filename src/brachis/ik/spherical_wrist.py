@@ -7,7 +7,7 @@ Let W0 be this point with the six joints at zero. Then E_1 ... E_6 = D (`Factore
 because the last three joints u, v, w turn about it. These equations contain only the first three joints a, b, c
 (`point_recipes`). What remains is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
 
-    v    u . R_v w = u . R w, two answers
+    v    u . R_v w = u . R w, two solutions
     u    turns R_v w to R w
     w    turns R^-1 u to R_v^-1 u
 

@@ -171,7 +171,7 @@ class JointMap(ABC):
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> JointState:
-        """Joint motion at K times.
+        """Return the joint motion at K times.
 
         Parameters
         ----------

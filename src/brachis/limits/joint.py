@@ -11,7 +11,7 @@ The rate of the torque tau(q, qdot, qddot) is
 with the derivatives of tau with respect to q, qdot and qddot. With D for d/dt along the motion, the derivatives of the
 rate with respect to
 
-    by q: D(tau_q),   by qdot: D(tau_v) + tau_q,   by qddot: D(M) + tau_v,   by qdddot: M
+    q: D(tau_q),   qdot: D(tau_v) + tau_q,   qddot: D(M) + tau_v,   qdddot: M
 
 where D is computed by differences.
 """

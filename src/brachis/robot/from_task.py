@@ -46,7 +46,7 @@ def robot_from_settings(
     settings : RobotSettings
         The task's ``robot`` part.
     urdf : path, optional
-        URDF file to use in place of the one that the task names.
+        URDF file to use in place of the URDF that the task names.
     urdf_text : str, optional
         Text of the URDF, if it was saved with the task. Then nothing is read from disk.
 
