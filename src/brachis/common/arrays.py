@@ -109,7 +109,7 @@ def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
 def bisect(
     is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
 ) -> np.ndarray:
-    """Find numbers between 0 and `end`, (P,), up to which a condition holds.
+    """Find the numbers between 0 and `end`, (P,), up to which a condition holds.
 
     Parameters
     ----------

@@ -382,7 +382,7 @@ def check_kind(
     expected : str
         A `Kind`, or words for a kind that cannot be recognised.
     error : type
-        What is raised.
+        Class of the error.
 
     Raises
     ------
@@ -427,7 +427,7 @@ def read_text(
     hint : str, optional
         Advice if the file is too long; without `folder` also if it is missing.
     error : type, optional
-        What is raised.
+        Class of the error.
 
     Raises
     ------

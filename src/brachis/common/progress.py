@@ -57,7 +57,7 @@ def report_progress(
 
 
 class _Line:
-    """A line that shows the present step: below a notebook's cell, or on standard error.
+    """A line that shows the present step, below the cell of a notebook or on standard error.
 
     If standard error is not a terminal, every stage is written on a separate line.
     """

@@ -78,7 +78,7 @@ class TriedDecomposition:
 
 @dataclass(frozen=True)
 class Match(TriedDecomposition):
-    """A choice of redundant joints that has a closed form."""
+    """A choice of redundant joints with a closed form."""
 
     family: str
     solver: IKSolver

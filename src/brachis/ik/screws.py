@@ -45,7 +45,7 @@ class Screw:
 
     @property
     def inverse(self) -> Screw:
-        """The joint that undoes this one."""
+        """The joint with the inverse motion."""
         return Screw(-self.axis, self.point, self.revolute)
 
     def velocity(self, position: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ class SnappedChain:
 def snap_axes(
     geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE
 ) -> SnappedChain | None:
-    """Make axes that are almost parallel, perpendicular or meeting so exactly.
+    """Make axes that are almost parallel, perpendicular or meeting exactly so.
 
     Parameters
     ----------

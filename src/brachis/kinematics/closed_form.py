@@ -88,7 +88,7 @@ class ClosedFormMap(PathMap):
         )
 
     def along(self, path: Path, start: np.ndarray) -> Self:
-        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        """Return the same map for a part of its path that begins at, or close to, a posture, (n,)."""
         submap = super().along(path, start)
         submap.branch_of = replace(self.branch_of, start=start)
         return submap

@@ -149,7 +149,7 @@ def _measure_gaps(
 
     States alternate between nodes and middles. In the middle of a quintic Hermite piece of length h:
     q = (q0 + q1)/2 + 5h/32 (v0 - v1) + h^2/64 (a0 + a1),  qddot = 3 (v1 - v0) / (2h) - (a0 + a1)/4.
-    At its beginning qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
+    At its beginning, qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
 
     Returns
     -------

@@ -153,7 +153,7 @@ class PathMap(JointMap):
         return motion
 
     def along(self, path: Path, start: np.ndarray) -> Self:
-        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        """Return the same map for a part of its path that begins at, or close to, a posture, (n,)."""
         submap = super().along(path, start)
         submap.sample_at = LastCall(path.sample)
         return submap

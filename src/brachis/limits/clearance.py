@@ -31,7 +31,7 @@ _MOST_STRIDES = 16
 
 
 class Clearance(Limit):
-    """Distances between solids of a scene.
+    """Limit on the distances between the solids of a scene.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Clearance(Limit):
         return Clearance(self._chain, self._scene.with_pairs(pairs), self._clearance)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), no pair is too close, (K,)."""
+        """Tell in which postures, (K, n), no pair is too close, (K,) bool."""
         within = (self.lower.min(initial=np.inf) - slack) * UNIT
         close = self._scene.find_close(self._chain.place(q), within)
         return np.bincount(close.posture, minlength=len(q)) == 0

@@ -219,7 +219,7 @@ class _DynamicLimit(JointLimit):
 
     @abstractmethod
     def quantity_partials(self, motion: JointStates) -> Partials:
-        """Differentiate `quantity`, (K, n, n) each."""
+        """Return the derivatives of `quantity`, (K, n, n) each."""
 
     def partials(self, motion: JointStates) -> Partials:
         return self.quantity_partials(motion).map(self._scale_rows)

@@ -1,4 +1,4 @@
-"""Where a segment stands: its key and the point it starts from, with the checks that all builders share."""
+"""The context of a segment: its key and its start, with the checks that all builders share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from brachis.robot.task_map.protocol import position_rows
 
 @dataclass(frozen=True, eq=False)
 class SegmentContext:
-    """What the builder of a segment's curve knows beside the segment itself.
+    """The data that the builder of a segment's curve needs besides the segment itself.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class SegmentContext:
     start : ndarray, shape (m,)
         Task coordinates at which the segment starts.
     rows : tuple of str
-        Rows of the task space; of a pose its position rows.
+        Rows of the task space; for a pose its position rows.
     """
 
     key: str

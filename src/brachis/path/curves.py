@@ -46,12 +46,12 @@ class SplineCurve:
     knots: Array
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        """Return the curve and its derivatives with respect to sigma, shape (order + 1, K, m)."""
         return self.spline.derivatives(sigma, order)
 
 
 def septic(start: Array, end: Array, length: float) -> SplineCurve:
-    """Return the septic polynomial with given values and three derivatives at both ends.
+    """Return the septic polynomial with given values and first three derivatives at both ends.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class ArcCurve:
         return np.linspace(0.0, self.length, max(quarters, 1) + 1)
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        """Return the curve and its derivatives with respect to sigma, shape (order + 1, K, m)."""
         # Each derivative turns the position vector by a quarter turn and multiplies it by the angle per unit sigma.
         orders = np.arange(order + 1)[:, None, None]
         angle = self.turn * sigma[:, None] + orders * np.pi / 2

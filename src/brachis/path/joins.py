@@ -59,7 +59,7 @@ class Join:
         return min(self.first.length, self.second.length)
 
     def sides(self, distance: float = 0.0) -> tuple[Array, Array]:
-        """Return the derivatives, (4, m), of both curves at a distance before and after the join, sigma."""
+        """Return the derivatives, (4, m), of both curves at a distance, in sigma, before and after the join."""
         before = self.first.derivatives(np.array([self.first.length - distance]))
         after = self.second.derivatives(np.array([distance]))
         return before[:, 0], after[:, 0]

@@ -41,7 +41,7 @@ class Turn:
     Attributes
     ----------
     start : ndarray, shape (3, 3)
-        Rotation matrix of the tool before.
+        Rotation matrix of the tool before the turn.
     axis : ndarray, shape (3,)
         Unit vector of the axis, in the tool frame.
     angle : float
@@ -56,7 +56,7 @@ class Turn:
     smooth: bool
 
     def over(self, length: float) -> Orientation:
-        """Return the rotation spread over a range of sigma.
+        """Return the turn, spread over a range of sigma.
 
         If the turn is smooth, its angle is the septic polynomial whose first three derivatives vanish at both ends,
         ``35 u^4 - 84 u^5 + 70 u^6 - 20 u^7`` times the angle, with ``u = sigma / length``.
@@ -77,7 +77,7 @@ def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
     turning : Rotate or TurnTo
         The turn as given in the task.
     start : ndarray, shape (3, 3)
-        Rotation matrix of the tool before.
+        Rotation matrix of the tool before the turn.
     key : str
         Key of the turn, for messages.
 

@@ -94,5 +94,5 @@ class MappedCurve:
         return self.curve.knots
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        """Return the curve and its derivatives with respect to sigma, shape (order + 1, K, m)."""
         return self.function(sigma, self.curve.derivatives(sigma, order))

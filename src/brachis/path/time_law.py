@@ -132,7 +132,7 @@ class _ToolAlongPath:
         return np.stack([g, g_ds, g_dds])
 
     def rates(self, s: Array) -> Array:
-        """Return path coordinates s, (K,), and their three derivatives by time, (4, K)."""
+        """Return path coordinates s, (K,), and their first three time derivatives, (4, K)."""
         g, g_ds, g_dds = self.slopes(s)
         v = self.speed
         return np.stack(
@@ -140,7 +140,7 @@ class _ToolAlongPath:
         )
 
     def times(self, s: Array) -> Array:
-        """Return the times, (K,), s, at ascending path coordinates, from the first one on."""
+        """Return the times, (K,), s, at ascending path coordinates, counted from the first one."""
         distances = integrate(lambda nodes: self.slopes(nodes)[0], s)
         return sum_up(distances / self.speed)
 

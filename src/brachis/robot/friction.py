@@ -143,5 +143,5 @@ class Friction(Summary):
 
     @property
     def table(self) -> np.ndarray:
-        """All terms, (n, 4), in the order of the attributes."""
+        """The terms of all joints, (n, 4), in the order of the attributes."""
         return np.column_stack([self.armature, self.viscous, self.coulomb, self.v_eps])

@@ -45,7 +45,7 @@ class Issue:
     message : str
         What it looks like.
     found : str
-        The figure with its unit.
+        The figure, with its unit.
     usual : str
         The usual range of such figures.
     advice : str

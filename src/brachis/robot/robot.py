@@ -63,9 +63,9 @@ class Robot(Summary):
     limits : Limits
         Limits of the n joints.
     urdf_limits : tuple of UrdfLimit
-        Limits as the URDF states them.
+        Limits as stated in the URDF.
     urdf_dynamics : UrdfDynamics
-        Joints, bodies and friction as the URDF states them, without payload, mounting and tool offset.
+        Joints, bodies and friction as stated in the URDF, without payload, mounting and tool offset.
     friction : Friction
         Torque terms that are not in the rigid-body model.
     settings : RobotSettings
@@ -360,7 +360,7 @@ class Robot(Summary):
 
     @property
     def has_masses(self) -> bool:
-        """Whether the URDF has the masses that torques need."""
+        """Whether the URDF contains the masses that torques need."""
         return not self.urdf_dynamics.without_mass
 
     @property

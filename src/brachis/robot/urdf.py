@@ -216,7 +216,7 @@ def read_chain(
 
 
 def _check_locked_position(joint: Element, name: str, position: float) -> None:
-    """Refuse a position, rad or m, that a locked joint cannot have."""
+    """Refuse a position of a locked joint, rad or m, that is out of its range."""
     lowest, highest = (_clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST))
     if not lowest - tolerances.ANGLE <= position <= highest + tolerances.ANGLE:
         unit = _unit_of(joint)
@@ -272,7 +272,7 @@ def _lock(
 
 
 def _leader_of(joint: Element) -> str:
-    """Return the name of the joint that a joint mimics; empty if it mimics none."""
+    """Return the name of the joint that this joint mimics; empty if it mimics none."""
     mimic = joint.find("mimic")
     return "" if mimic is None else mimic.get("joint", "")
 

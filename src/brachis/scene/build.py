@@ -142,7 +142,7 @@ def find_never_free(scene: Scene, robot: Robot, clearance: float) -> Scene:
 
 
 def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:
-    """List the pairs of links that an SRDF file disables."""
+    """Return the pairs of links that an SRDF file disables."""
     if srdf is None:
         return []
     where = f"collisions.srdf: {srdf}"

@@ -46,14 +46,14 @@ def joints_of(rows: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class TaskDerivatives:
-    """Derivatives of task velocity and acceleration for K states, each (K, m, n).
+    """Derivatives of task velocity and acceleration for K states, (K, m, n) each.
 
     Attributes
     ----------
     velocity_q : (K, m, n) ndarray
         V_q = d(J qdot)/dq.
     acceleration_q, acceleration_qdot : (K, m, n) ndarray
-        A_q and A_v, of J qddot + Jdot qdot.
+        A_q and A_v, the derivatives of J qddot + Jdot qdot.
     """
 
     velocity_q: np.ndarray
