@@ -217,9 +217,9 @@ def test_no_package_has_an_import_circle_between_its_files():
 
 
 def test_every_kind_of_limit_is_checked_by_the_verification():
-    checked = {kind.replace(" ", "_") for kind in brachis.verify.limits.TABLE}
-    assert len(brachis.limits.TABLE) >= 5
-    assert set(brachis.limits.TABLE) <= checked
+    checked = {kind.replace(" ", "_") for kind in brachis.verify.limits.LIMIT_CHECKS}
+    assert len(brachis.limits.LIMIT_BUILDERS) >= 5
+    assert set(brachis.limits.LIMIT_BUILDERS) <= checked
 
 
 def compared_words(tree):
@@ -242,7 +242,7 @@ def compared_words(tree):
 
 
 def test_nobody_asks_for_a_kind_of_limit():
-    kinds = set(brachis.limits.TABLE)
+    kinds = set(brachis.limits.LIMIT_BUILDERS)
     kinds |= {kind.replace("_", " ") for kind in kinds}
     example = ast.parse("limit.kind in ('jerk', 'torque')")
     assert (1, "torque") in compared_words(example)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from brachis.kinematics import JointMap
-from brachis.optimise.bspline import clamped_uniform_knots, local_basis
+from brachis.optimise.bspline import clamped_knots, local_basis
 from brachis.planner import transcribe
 from peers.lines import INTERVALS, Answer, Line
 
@@ -34,7 +34,7 @@ def solve(line: Line) -> Answer:
     free = [line.redundant]
     others = [i for i in range(n) if i not in free]
     m = len(others)
-    knots = clamped_uniform_knots(DEGREE, INTERVALS)
+    knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, INTERVALS + 1))
     at = np.linspace(0.0, 1.0, POINTS * INTERVALS + 1)
     first, values = local_basis(knots, DEGREE, at)
     count = INTERVALS + DEGREE
@@ -233,7 +233,7 @@ def _guess(
 ) -> np.ndarray:
     """Put the joint path of the pseudo-inverse into the variables, timed by a quintic that starts and ends at rest."""
     s_path, q_path = line.joint_path()
-    knots = clamped_uniform_knots(DEGREE, INTERVALS)
+    knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, INTERVALS + 1))
     greville = np.array([knots[i + 1 : i + 1 + DEGREE].mean() for i in range(count)])
 
     def law(t: np.ndarray) -> np.ndarray:

@@ -262,6 +262,31 @@ def test_a_centre_that_is_not_between_the_bounds_is_in_the_message(centre):
         brachis.plan(LINE, own_limits=[Off(brachis.robots.scara3)])
 
 
+def test_one_class_is_enough():
+    """A limit is its own model; on every robot it is another copy."""
+
+    class Speed(Limit):
+        kind = "first_speed"
+        longer_time = "relieves"
+        labels = (Label("first joint", "speed", "rad/s"),)
+        lower, upper = -np.ones(1), np.ones(1)
+
+        def values(self, motion):
+            return motion.qdot[:, :1] / 0.1
+
+        def partials(self, motion):
+            first = np.eye(self.robot.n)[None, :1] / 0.1
+            return Partials(qdot=np.repeat(first, len(motion.q), axis=0))
+
+    speed = Speed()
+    result = brachis.plan(LINE, own_limits=[speed], **QUICK)
+    assert result.verified
+    assert check_of(result.verification, "first speed ratio").value > 0.9
+    assert not hasattr(speed, "robot")
+    robot = brachis.robots.scara3
+    assert speed.bind(robot).robot is robot
+
+
 def test_two_limits_may_have_one_kind_and_not_one_label():
     second = Given(labels=(Label("elbow", "rate", "rad/s"),))
     assert brachis.plan(LINE, own_limits=[Given(), second], effort="single").verified
@@ -373,8 +398,11 @@ class Alike:
 @pytest.mark.parametrize(
     ("own_limits", "said"),
     [
-        ([Rate], r"own_limits\[0\]: this object is not a limit"),
-        ([3.0], r"own_limits\[0\]: this object is not a limit"),
+        (
+            [Rate],
+            r"own_limits\[0\]: this object is not a limit; found <class '.*Rate'>",
+        ),
+        ([3.0], r"own_limits\[0\]: .* found an object of the class float; .* inherits"),
         (["torque"], r"own_limits\[0\]: this object is not a limit"),
         (Given(), "own_limits: this is not a list"),
         ([Alike()], r"the class Alike; allowed: .* inherits brachis\.limits\.Limit"),

@@ -6,17 +6,9 @@ import pytest
 from brachis import limits
 from brachis.optimise.program import Program
 from support.jacobians import comparable_rows, dense, differences
-from support.phases import CASES, phase_of, reachable_points
+from support.phases import CASES, PHASE_KINDS, phase_of, reachable_points
 
-OTHER_ROBOTS = (
-    "singularity",
-    "joint_ends",
-    "tool_tilt",
-    "tool_distance",
-    "tool_range",
-    "clearance",
-)
-KINDS = [*(kind for kind in limits.TABLE if kind not in OTHER_ROBOTS), "branch_margin"]
+KINDS = [*PHASE_KINDS, "branch_margin"]
 UNTIMED = ("position", "branch_margin")
 
 
@@ -82,7 +74,7 @@ def test_jacobian_equals_differences(program, points_and_differences):
             error = wrong.max() / scale
             assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
             # Every kind but positions and margins sees the end time.
-            timed = kind in limits.TABLE and kind not in UNTIMED
+            timed = kind in limits.LIMIT_BUILDERS and kind not in UNTIMED
             assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
 
 

@@ -15,7 +15,7 @@ from brachis.explain import figures_of, multipliers_of, sensitivities_at
 from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import Boundary
-from brachis.optimise.bspline import clamped_uniform_knots
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
@@ -40,9 +40,7 @@ TORQUE = TorqueLimit(ROBOT, np.array(ALONE))
 def move(start, end, *further, degree=2, intervals=8, points=3):
     """A free move of the slide from rest to rest."""
     breaks = np.linspace(0.0, 1.0, intervals + 1)
-    grid = FixedGrid(
-        clamped_uniform_knots(degree, intervals), degree, spread(breaks, points)
-    )
+    grid = FixedGrid(clamped_knots(degree, breaks), degree, spread(breaks, points))
     boundary = Boundary.at_rest(np.array([start]), np.array([end]), 1)
     return Phase(DirectJointMap(ROBOT, np.zeros(1)), [TORQUE, *further], grid, boundary)
 

@@ -1,5 +1,7 @@
 """Joint limits: where they come from, in which forms they are given, and what is refused."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -8,7 +10,9 @@ from brachis import LimitSpec
 from brachis.errors import InputError, LimitError, TaskError, UnknownNameError
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
-from brachis.task import FROM_URDF
+from brachis.robot.limits import to_spec
+from brachis.task import FROM_URDF, LIMIT_KINDS, ROBOT_LIMITS, LimitKeywords
+from brachis.task.units import unit_of
 from support.chains import Joint, chain_urdf, planar_robot
 
 INF = np.inf
@@ -276,3 +280,29 @@ def test_pairs_that_are_none_around_zero(pair):
         limits_of(torque={"j2": pair})
     with pytest.raises(TaskError, match=r"robot: limits\.acceleration\.j2: wrong type"):
         limits_of(acceleration={"j2": [-1.0, 1.0]})
+
+
+FIELDS = [entry.name for entry in fields(LimitSpec) if entry.name != "scale"]
+STATED = {
+    **dict.fromkeys([*LIMIT_KINDS, *ROBOT_LIMITS], 7.0),
+    "position": [[-1.0, 1.0]] * 3,
+    "torque_speed": {"j1": [[0.0, 7.0], [1.0, 5.0]]},
+}
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_every_limit_survives_when_it_is_stated_joint_by_joint(name):
+    assert name in STATED, "STATED of this file has no value for this limit"
+    names = ["j1", "j2", "j3"]
+    without = to_spec(limits_of(acceleration=9.0), names)
+    stated = {"acceleration": 9.0, name: STATED[name]}
+    spec = to_spec(limits_of(**stated), names)
+    assert getattr(spec, name) != getattr(without, name)
+    assert to_spec(limits_of(**vars(spec)), names) == spec
+
+
+def test_every_limit_is_a_keyword_and_has_a_unit():
+    assert set(LimitKeywords.__annotations__) == {*FIELDS, "scale"}
+    units = {name: unit_of(f"robot.limits.{name}") for name in FIELDS}
+    del units["torque_speed"]  # a table of speeds and torques
+    assert all(units.values()), units

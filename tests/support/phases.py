@@ -1,4 +1,4 @@
-"""Phases with every kind of limit at once, for tests of the nonlinear program."""
+"""Phases with every kind of limit at once but `OTHER_TASKS`, for tests of the nonlinear program."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from brachis.limits import LIMIT_BUILDERS
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.task import FROM_URDF, LimitSpec
@@ -18,6 +19,16 @@ TOOL_LIMITS = {
     "acceleration": 5.0,
     "angular_speed": 2.0,
 }
+OTHER_TASKS = (
+    "singularity",
+    "joint_ends",
+    "tool_tilt",
+    "tool_distance",
+    "tool_range",
+    "clearance",
+)
+"""They need margins, tolerances or a scene."""
+PHASE_KINDS = tuple(kind for kind in LIMIT_BUILDERS if kind not in OTHER_TASKS)
 CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
     "r0": ("RR", ["x", "z"], [0.4, 1.2], []),
     "r0_yaw": ("RRR", ["x", "z", "pitch"], [0.4, 1.8, 0.5], []),
@@ -34,7 +45,7 @@ def phase_of(
     position: Any = FROM_URDF,
     **spline: Any,
 ) -> Phase:
-    """A bent path in the vertical plane under gravity, friction, and limits of every kind that the splines can hold."""
+    """A bent path in the vertical plane under gravity, friction, and the limits that the splines can hold."""
     pattern, rows, start, redundant = CASES[case]
     friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
     settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
@@ -55,6 +66,11 @@ def phase_of(
     path = [{"spline": {"through": points, "relative": True}}]
     settings |= {"end": end, "tool_limits": TOOL_LIMITS}
     (phase,) = program_of(robot, rows, path, start, redundant, **settings).phases
+    kinds = {limit.kind for limit in phase.limits}
+    missing = set(PHASE_KINDS) - kinds - (set() if bounded else {"jerk", "torque_rate"})
+    if position is None:
+        missing.discard("position")
+    assert not missing, f"the limits above have no {missing}"
     return phase
 
 

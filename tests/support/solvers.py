@@ -7,14 +7,14 @@ from importlib.util import find_spec
 import numpy as np
 
 from brachis.optimise.backends import (
-    TABLE,
+    SOLVERS,
     NonlinearProgram,
     SolverOptions,
     solvers_for,
 )
 from brachis.optimise.backends.protocol import SolverReport
 
-INSTALLED = tuple(name for name in TABLE if name != "ipopt" or find_spec("ipyopt"))
+INSTALLED = tuple(name for name in SOLVERS if name != "ipopt" or find_spec("ipyopt"))
 
 
 def solve(program: NonlinearProgram, x: np.ndarray) -> SolverReport:

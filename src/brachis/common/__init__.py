@@ -1,1 +1,1 @@
-"""What every other part stands on: arguments, arrays, files, deadlines, interrupts, progress, summaries."""
+"""Common tools of all other parts: arguments, arrays, files, deadlines, interrupts, progress, summaries."""

@@ -1,4 +1,4 @@
-"""Arguments of public functions: wrong names and types are refused like all wrong input."""
+"""Checks of the arguments of public functions: wrong names and types are refused like any other wrong input."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _R = TypeVar("_R")
 
 
 def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function refuse keywords that it does not have by naming those that it has.
+    """Let a function refuse unknown keywords, in a message that names the existing ones.
 
     Raises
     ------
     UnknownNameError
         The keyword does not exist.
     InputError
-        One that is needed is missing, or there are too many without a name.
+        A required argument is missing, or there are too many positional arguments.
     """
     signature = inspect.signature(function)
     name = function.__name__
@@ -71,7 +71,7 @@ def check_callable(value: object, where: str) -> None:
 
 
 def check_executor(value: object) -> None:
-    """Raise an error unless the value hands work out as an executor does.
+    """Raise an error unless the value is an executor.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def check_array(
 ) -> None:
     """Raise an error unless the value is an array of real numbers with this shape.
 
-    `remark` follows the shape that was found, for example " for 2 moments".
+    `remark` is text after the shape of the value, for example " for 2 moments".
 
     Raises
     ------
@@ -166,7 +166,7 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
 
 
 def number(value: float, where: str, unit: str) -> float:
-    """Return one number as a float; see `numbers`."""
+    """Return a single number as a float; see `numbers`."""
     array = numbers(value, where, unit)
     if array.ndim:
         raise _wrong_type(value, where, f"a number, {unit}")
@@ -174,7 +174,7 @@ def number(value: float, where: str, unit: str) -> float:
 
 
 def count(value: int, where: str) -> int:
-    """Return a number of things, 1 or more.
+    """Return a count, which must be 1 or more.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def count(value: int, where: str) -> int:
 def check_most(
     value: float, largest: float, unit: str, problem: str, where: str, hint: str = ""
 ) -> None:
-    """Refuse a size or a count, in a unit, above what a plan has time and memory for.
+    """Refuse a size or a count, in a unit, that needs too much time or memory for a plan.
 
     Raises
     ------

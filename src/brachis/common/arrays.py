@@ -1,4 +1,4 @@
-"""Arrays that cannot be written to, vectors, interpolation, bisection, and rates along motions."""
+"""Read-only arrays, vectors, interpolation, bisection, and rates along motions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _Found = TypeVar("_Found")
 class LastCall(Generic[_Found]):
     """A function of an array, (K,), that remembers its last result.
 
-    A second call with the same values returns it again; it is not to be written to.
+    A second call with the same values returns the same result. Do not write to it.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class LastCall(Generic[_Found]):
         self._known: tuple[bytes, _Found] | None = None
 
     def __call__(self, values: np.ndarray) -> _Found:
-        """Return what the function gives."""
+        """Return the value of the function."""
         key = values.tobytes()
         known = self._known
         if known is None or known[0] != key:
@@ -36,12 +36,12 @@ class LastCall(Generic[_Found]):
         return known[1]
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what was computed last."""
+        """Leave out the remembered result."""
         return {**vars(self), "_known": None}
 
 
 def freeze(owner: Any, *names: str) -> None:
-    """Replace arrays of a frozen dataclass by read-only copies of its own; None stays."""
+    """Replace arrays of a frozen dataclass by read-only copies; None stays None."""
     for name in names:
         value = getattr(owner, name)
         if value is None:
@@ -52,7 +52,7 @@ def freeze(owner: Any, *names: str) -> None:
 
 
 def clear_rounding(values: np.ndarray) -> np.ndarray:
-    """Put exact zeros in the place of rounding errors, for a reader; all other values stay as they are.
+    """Replace rounding errors by exact zeros, for output; all other values stay as they are.
 
     Examples
     --------
@@ -66,35 +66,35 @@ def clear_rounding(values: np.ndarray) -> np.ndarray:
 def interpolate_columns(
     places: np.ndarray, s: np.ndarray, values: np.ndarray
 ) -> np.ndarray:
-    """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
+    """Interpolate values, (S, c), given at s, (S,), linearly at places, (P,)."""
     return np.column_stack([np.interp(places, s, column) for column in values.T])
 
 
 def cut(values: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """Take ascending numbers, (P,), that are between two others, with these as the first and the last one."""
+    """Return the ascending numbers, (P,), that lie between `begin` and `end`, with these two at both ends."""
     inside = values[(values > begin) & (values < end)]
     return np.concatenate([[begin], inside, [end]])
 
 
 def drop_near(values: np.ndarray, least: float) -> np.ndarray:
-    """Leave out ascending numbers, (P,), that are no more than `least` before the next one."""
+    """Leave out those of ascending numbers, (P,), that are at most `least` below the next number."""
     return values[np.append(np.diff(values) > least, True)]
 
 
 def count_each(counts: np.ndarray) -> np.ndarray:
-    """Count from 0 on up to each of several counts, (N,), one after the other: 2 and 3 give 0, 1, 0, 1, 2."""
+    """Count from 0 for each of several counts, (N,), one after the other: 2 and 3 give 0, 1, 0, 1, 2."""
     return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
-    """Spread numbers, such as times, evenly over every interval, with both its ends.
+    """Spread numbers, such as times, evenly over every interval, including its ends.
 
     Parameters
     ----------
     breaks : (N + 1,) ndarray
         Ends of the intervals, ascending.
     points : int or (N,) int ndarray
-        Steps into which each interval is divided.
+        Number of steps into which each interval is divided.
 
     Returns
     -------
@@ -109,12 +109,12 @@ def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
 def bisect(
     is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
 ) -> np.ndarray:
-    """Find numbers between 0 and `end`, (P,), up to which a condition holds.
+    """Find the numbers between 0 and `end`, (P,), up to which a condition holds.
 
     Parameters
     ----------
     is_before : callable
-        Tells of trial numbers, (P,), whether they come before the ones that are sought.
+        Tells for trial numbers, (P,), whether the condition still holds there.
     end : (P,) ndarray
     """
     low = np.zeros(len(end))
@@ -128,7 +128,7 @@ def bisect(
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vector product, (3, ...), of vectors with their three components along the FIRST axis; others broadcast."""
+    """Return the vector product, (3, ...), of vectors with components along the FIRST axis; other axes broadcast."""
     first = a[1] * b[2]
     product = np.empty((3, *first.shape), dtype=first.dtype)
     np.subtract(first, a[2] * b[1], out=product[0, ...])
@@ -138,7 +138,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Apply K matrices (K, i, j) to K vectors (K, j); those of `broadcast_to`, all the same, several times faster."""
+    """Apply K matrices, (K, i, j), to K vectors, (K, j); several times faster for equal matrices of `broadcast_to`."""
     if len(vectors) and matrices.strides[0] == 0:
         return vectors @ matrices[0].T
     return np.einsum("kij,kj->ki", matrices, vectors)
@@ -147,7 +147,7 @@ def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 def extrapolate(
     motion: Sequence[np.ndarray] | np.ndarray, step: np.ndarray | float
 ) -> list[np.ndarray]:
-    """Value and two time derivatives, a time after a value and three derivatives, of which the last stays constant."""
+    """Extrapolate a value and its first two derivatives by a time step, with a constant third derivative."""
     x, xdot, xddot, xdddot = motion
     return [
         x + step * (xdot + step / 2.0 * (xddot + step / 3.0 * xdddot)),
@@ -159,14 +159,14 @@ def extrapolate(
 def rates(
     evaluate: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Time derivatives of functions of a motion, by central differences along it.
+    """Compute time derivatives of functions of a motion, by central differences along the motion.
 
     Parameters
     ----------
     evaluate : callable
-        ``evaluate(x, xdot, xddot, xdddot)`` returns arrays (2 K, ...) for arrays (2 K, c).
+        ``evaluate(x, xdot, xddot, xdddot)`` returns arrays, (2 K, ...), for arrays, (2 K, c).
     motion : sequence of (K, c) ndarray
-        Value and three time derivatives at K moments.
+        Value and its first three time derivatives at K moments.
 
     Returns
     -------
@@ -191,13 +191,13 @@ def rates(
 
 
 def with_like_signs(quaternions: np.ndarray) -> np.ndarray:
-    """Return quaternions, (n, 4), of length 1, with signs such that neighbours are close; the first keeps its own."""
+    """Return unit quaternions, (n, 4), with signs that make neighbours close; the first one keeps its sign."""
     unit = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
     signs = np.cumprod(np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0))
     return np.concatenate([unit[:1], signs[:, None] * unit[1:]])
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Greville abscissae (N + d,) of a clamped knot vector: the times to which control points belong."""
+    """Return the Greville abscissae, (N + d,), of a clamped knot vector: the times to which control points belong."""
     windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
     return np.asarray(windows.mean(axis=1))

@@ -1,4 +1,4 @@
-"""A moment by which work has to end, handed on from stage to stage."""
+"""A moment by which work must end, passed on from stage to stage."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Deadline:
-    """A moment by the monotonic clock, which all processes of a machine share; by default never.
+    """A moment on the monotonic clock, which all processes of a machine share; by default never.
 
     Attributes
     ----------
@@ -21,12 +21,12 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float) -> Deadline:
-        """Return the moment so many seconds from now."""
-        return cls(time.monotonic() + seconds)
+        """Return the moment this many seconds from now."""
+        return cls().within(seconds)
 
     @property
     def left(self) -> float:
-        """Time until then, s; not negative."""
+        """Time that is left, s; not negative."""
         return max(self.at - time.monotonic(), 0.0)
 
     @property
@@ -35,15 +35,15 @@ class Deadline:
         return time.monotonic() > self.at
 
     def within(self, seconds: float) -> Deadline:
-        """Return the earlier one of this moment and so many seconds from now."""
+        """Return this moment, or the moment this many seconds from now if that is earlier."""
         return Deadline(min(self.at, time.monotonic() + seconds))
 
     def part(self, share: float) -> Deadline:
-        """Return the moment at which a part of the time that is left is over."""
+        """Return the moment at which a fraction of the remaining time is over."""
         return self.within(share * self.left)
 
     def extend(self, seconds: float) -> Deadline:
-        """Return a moment so many seconds later."""
+        """Return the moment this many seconds later."""
         return Deadline(self.at + seconds)
 
 

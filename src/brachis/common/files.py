@@ -1,7 +1,7 @@
-"""Reading files of bounded size, and writing them so that a failure never leaves half of a new one.
+"""Reading files of bounded size, and writing files so that a failure never leaves an incomplete one.
 
-What is written has a temporary name first, ``.brachis-<host>-<process>-<random>.part``, which says whose it is: a
-process that was killed cannot remove its own, so that the next one that writes into the folder does.
+A new file first has a temporary name, ``.brachis-<host>-<process>-<random>.part``, which tells which process writes it.
+A process that is killed cannot remove its temporary file; the next process that writes into the folder removes it.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from typing import BinaryIO
 from brachis.errors import InputError, TaskError
 
 LARGEST_TEXT = 16_000_000
-"""Bytes of a text file that is read."""
+"""Largest size of a text file that is read, bytes."""
 
 COMPOSED = "<!-- brachis compose -->"
-"""Second line of a composed URDF, by which it is known."""
+"""Second line of a composed URDF, by which it is recognised."""
 BEGINNINGS = {
     ".html": rb"<!doctype html>\n<!-- brachis report -->",
     ".json": rb'\{\n  "(t_end"|\$schema": "(https://json-schema[^"]+",\n  "\$id": ")?urn:brachis:)',
@@ -39,18 +39,18 @@ BEGINNINGS = {
     ".svg": rb"<\?xml|<svg",
     ".urdf": rb'<\?xml version="1\.0"\?>\n' + re.escape(COMPOSED).encode(),
 }
-"""Patterns of how files begin that brachis writes, by their suffix; `brachis.export.FORMATS` has those of exports."""
+"""Patterns for the beginnings of files that brachis writes, by suffix; for exports see `brachis.export.FORMATS`."""
 
 _TEMPORARY = re.compile(r"\.brachis-[0-9a-f]{8}-([0-9]+)-[0-9a-f]{16}\.part")
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Return whether there is a regular file; False for a name that the system refuses (`Path.is_file` raises)."""
+    """Return whether a regular file exists; False for a name that the system refuses, where `Path.is_file` raises."""
     return os.path.isfile(path)  # noqa: PTH113
 
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Return whether there is a folder; see `is_file`."""
+    """Return whether a folder exists; see `is_file`."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
@@ -60,17 +60,17 @@ def read_file(
     *,
     beginning: int | None = None,
 ) -> bytes:
-    """Read a regular file of at most `largest` bytes, or its first bytes; what would never end is refused at once.
+    """Read a regular file of at most `largest` bytes, or its first bytes. Files that never end are refused at once.
 
     Raises
     ------
     OSError
-        The file is missing, cannot be read, is not a regular file, or is longer; ``strerror`` says which.
+        The file is missing, cannot be read, is not a regular file, or is too long; ``strerror`` gives the reason.
     """
     try:
         descriptor = os.open(
             path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
-        )  # so as not to wait for a pipe's writer
+        )  # do not wait for the writer of a pipe
     except ValueError as error:
         raise OSError(errno.EINVAL, f"not the name of a file: {error}") from error
     try:
@@ -79,7 +79,7 @@ def read_file(
             text = f"it is {kind}, not a file"
             raise OSError(errno.EINVAL, text, os.fspath(path))
         with os.fdopen(descriptor, "rb", closefd=False) as stream:
-            # None: a file of the kernel has nothing to say now.
+            # None: a file of the kernel has no data at present.
             content = stream.read(beginning or largest + 1) or b""
     finally:
         os.close(descriptor)
@@ -99,11 +99,11 @@ _SPECIAL = {
 
 
 def temporary_in(folder: Path) -> Path:
-    """Return a new temporary name in a folder, from which what killed processes left there is removed.
+    """Return a new temporary name in a folder, and remove the temporary files that killed processes left there.
 
-    Only names of this program are looked at whose process is of this host and runs no more.
+    Only files of this program are removed, whose process was on this host and no longer runs.
     """
-    # Several hosts may share a folder; each knows its own process numbers only.
+    # Several hosts may share a folder; each knows only its own process numbers.
     host = hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
     with suppress(OSError):
         for path in folder.glob(f".brachis-{host}-*.part"):
@@ -123,7 +123,7 @@ def _runs(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # somebody else's, or no number of a process
+    except (OSError, OverflowError):  # another user's process, or not a process number
         return True
     return True
 
@@ -134,7 +134,7 @@ def file_name(value: object, where: str) -> Path:
     Raises
     ------
     InputError
-        It is something else.
+        The value is something else.
     """
     if not isinstance(value, str | os.PathLike):
         raise InputError(
@@ -147,7 +147,7 @@ def file_name(value: object, where: str) -> Path:
 
 
 def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
-    """Refuse a file name that ends as one of another format; one without a suffix, or in digits, may have any content.
+    """Refuse a file name with the suffix of another format. A name without a suffix, or ending in digits, is accepted.
 
     Raises
     ------
@@ -165,14 +165,14 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
 
 
 def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
-    """Refuse to replace a file that begins otherwise than those that brachis writes; an empty one may be replaced.
+    """Refuse to replace a file that does not begin like files that brachis writes. An empty file may be replaced.
 
     Parameters
     ----------
     path : path
         File to write.
     beginning : bytes
-        Pattern of how an older one begins.
+        Pattern for the beginning of an older file.
 
     Raises
     ------
@@ -196,15 +196,15 @@ def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
 def atomic_write(
     path: str | os.PathLike[str], beginning: bytes = b""
 ) -> Iterator[BinaryIO]:
-    """Open a temporary file in the folder of `path`; it takes that name once the block has ended without an error.
+    """Open a temporary file in the folder of `path`. It gets this name when the block has ended without an error.
 
     Parameters
     ----------
     path : path
-        File to write; a symbolic link is followed. Something that is not a regular file (``/dev/stdout``, a named
-        pipe) is written in place, for it must not be replaced by a file.
+        File to write; a symbolic link is followed. If it is not a regular file (``/dev/stdout``, a named pipe), it is
+        written in place, because it must not be replaced by a file.
     beginning : bytes, optional
-        Pattern of how the older file must begin that may be replaced; by default any may be.
+        Pattern for the beginning of an older file that may be replaced. Default: any file may be replaced.
 
     Yields
     ------
@@ -213,8 +213,8 @@ def atomic_write(
     Raises
     ------
     InputError
-        The folder does not exist, it or the file cannot be written, or `check_beginning` refuses the file. Other errors
-        of the block are passed on, its `OSError` among them.
+        The folder does not exist, the folder or the file cannot be written, or `check_beginning` refuses the file.
+        Other errors in the block are passed on, including an `OSError`.
     """
     check_beginning(path, beginning)
     with writing_errors(path):
@@ -224,7 +224,7 @@ def atomic_write(
             in_place = not stat.S_ISREG(target.stat().st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
-        # Unlike tempfile's, a new file has the usual permissions.
+        # Unlike a file of the module tempfile, a new file has the usual permissions.
         file = temporary.open("wb" if in_place else "xb")
     try:
         content = io.BytesIO()
@@ -244,7 +244,7 @@ def atomic_write(
 
 @contextmanager
 def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn an `OSError` of the block, or a name that holds a zero, into an `InputError`; for blocks that only write."""
+    """Turn an `OSError` of the block, or the error of a name with a zero byte, into an `InputError`."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -256,7 +256,7 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def shipped_folder(folder: str) -> Path:
-    """Return a folder of files that come with brachis: within an installed package, or in the source tree.
+    """Return a folder of files that come with brachis, in the installed package or in the source tree.
 
     Parameters
     ----------
@@ -275,12 +275,12 @@ def shipped_robots() -> tuple[str, ...]:
 
 def absolute_path(name: str, folder: Path) -> str:
     """Return the absolute path of a file relative to `folder`."""
-    # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
+    # Not Path.resolve: a linked folder keeps its name, because the URDF's meshes may be beside it.
     return os.path.abspath(folder / name)  # noqa: PTH100
 
 
 def locate_urdf(name: str, folder: Path) -> str:
-    """Return the absolute path of a URDF: a file relative to `folder`; without such a file, an included robot's."""
+    """Return the absolute path of a URDF: a file relative to `folder`, or else the URDF of an included robot."""
     local = absolute_path(name, folder)
     included = shipped_folder("robots") / name / "robot.urdf"
     is_name = Path(name).name == name and not is_file(local)
@@ -288,9 +288,9 @@ def locate_urdf(name: str, folder: Path) -> str:
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
-    """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
+    """Find a mesh file that a URDF in `folder` names as a path, ``file://`` or ``package://``; None if it is missing.
 
-    A package is looked for in the folders above the URDF, then where ROS and this Python installation have packages.
+    A package is searched for in the folders above the URDF, then in the folders of ROS and of this Python installation.
     """
     scheme, separator, within = name.partition("://")
     within = within if separator else name
@@ -300,13 +300,13 @@ def mesh_file(name: str, folder: Path) -> Path | None:
         candidates += [
             Path(place, share, within) for share in ("cmeel.prefix/share", "share")
         ]
-    if scheme == "package":  # which may be in a folder of another name
+    if scheme == "package":  # the package may be in a folder with a different name
         candidates += [place / within.partition("/")[2] for place in above]
     return next((path for path in candidates if is_file(path)), None)
 
 
 def ros_files(within: str) -> list[Path]:
-    """Name the places where ROS may have a file of a package, ``<package>/<file>``."""
+    """List the paths where ROS may have a file of a package, ``<package>/<file>``."""
 
     def places(variable: str) -> list[Path]:
         """List the folders that an environment variable names."""
@@ -323,7 +323,7 @@ def ros_files(within: str) -> list[Path]:
 TASK_SUFFIXES = (".yaml", ".yml")
 """Suffixes of task files."""
 ROBOT_SUFFIXES = (".urdf", ".xml")
-"""Suffixes of robots: URDF and MJCF."""
+"""Suffixes of robot files: URDF and MJCF."""
 
 
 class Kind(StrEnum):
@@ -346,7 +346,7 @@ _ADVICE = {
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind | None:
-    """Recognise a file by its beginning; None if it cannot be read, or is something else."""
+    """Recognise a file by its beginning; None if it cannot be read or is something else."""
     try:
         content = read_file(path, 4 * LARGEST_TEXT, beginning=16_384)
     except OSError:
@@ -374,15 +374,15 @@ def is_task_file(path: str | os.PathLike[str]) -> bool:
 def check_kind(
     path: str | os.PathLike[str], expected: str, error: type[InputError]
 ) -> None:
-    """Refuse a file that is of another kind than is expected; unknown kinds are for the reader to refuse.
+    """Refuse a file that is recognised as a different kind than expected. Unknown kinds are left to the reader.
 
     Parameters
     ----------
     path : path
     expected : str
-        A `Kind`, or any words for a kind that cannot be recognised.
+        A `Kind`, or words for a kind that cannot be recognised.
     error : type
-        What is raised.
+        Class of the error.
 
     Raises
     ------
@@ -410,29 +410,29 @@ def read_text(
     hint: str = "",
     error: type[InputError] = TaskError,
 ) -> str:
-    """Return the content of a text file in UTF-8; all line ends become newlines.
+    """Return the content of a text file in UTF-8; all line endings become newlines.
 
     Parameters
     ----------
     path : Path
         The file.
     where : str
-        Place that messages name: the file itself, or the key that asks for it.
+        Place that messages name: the file itself, or the key that names it.
     folder : Path, optional
-        What relative paths are relative to, for the message about a missing file.
+        Folder of relative paths, for the message about a missing file.
     found : str, optional
-        The file, for messages whose place is a key.
+        Name of the file, for messages whose place is a key.
     largest : int, optional
-        Longer files are refused, bytes.
+        Largest size, bytes; longer files are refused.
     hint : str, optional
-        What to try if the file is too long; without a folder also if it is missing.
+        Advice if the file is too long; without `folder` also if it is missing.
     error : type, optional
-        What is raised.
+        Class of the error.
 
     Raises
     ------
     InputError
-        Of the class `error`: the file is missing, is not a text file, too long, or cannot be read.
+        Of the class `error`: the file is missing, is not a text file, is too long, or cannot be read.
     """
     try:
         content = read_file(path, largest).decode()

@@ -1,8 +1,8 @@
-"""Ctrl-C that is never lost.
+"""Handling of Ctrl-C that never loses a press.
 
-Python raises KeyboardInterrupt wherever the program happens to be. A compiled library that is being imported may
-swallow it, or turn it into an ImportError; a finaliser may only print it. The command line therefore remembers every
-press (`SigintHandler`), and looks between its stages whether one went unheard.
+Python raises KeyboardInterrupt wherever the program happens to be. The import of a compiled library may swallow it, or
+turn it into an ImportError; a finaliser may only print it. The command line therefore remembers every press
+(`SigintHandler`), and checks between its stages whether a press was missed.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 INTERRUPTED = 130
-"""Exit code."""
+"""Exit code after an interrupt."""
 
 
 class SigintHandler:
-    """A handler of SIGINT that remembers a press until it is heard; a second one ends the program at once.
+    """A handler of SIGINT that remembers a press until it takes effect. A second press ends the program at once.
 
     Attributes
     ----------
     pending : bool
-        Whether a press was not yet heard.
+        Whether a press has not taken effect yet.
     raising : bool
         Whether a press also raises KeyboardInterrupt.
     """
 
     heard: ClassVar[int] = 0
-    """How many presses ended something early."""
+    """Number of presses that ended something early."""
     pending = False
     raising = False
 
@@ -46,7 +46,7 @@ class SigintHandler:
             raise KeyboardInterrupt
 
     def remember(self) -> None:
-        """Remember a press; end the program if one is pending already."""
+        """Remember a press; end the program if another press is pending."""
         if self.pending:
             show_cursor = b"\x1b[?25h\n" if os.isatty(2) else b""
             os.write(2, show_cursor + b"brachis: interrupted\n")
@@ -55,13 +55,13 @@ class SigintHandler:
 
 
 def install() -> None:
-    """Remember presses from now on; where SIGINT is ignored, it stays so."""
+    """Remember presses from now on. If SIGINT is ignored, it stays ignored."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, SigintHandler())
         hook = sys.unraisablehook
 
         def quiet(unraisable: UnraisableHookArgs) -> None:
-            """Hand on all but a KeyboardInterrupt in a finaliser: the press is remembered."""
+            """Pass on everything except a KeyboardInterrupt in a finaliser: that press is remembered."""
             if not issubclass(unraisable.exc_type, KeyboardInterrupt):
                 hook(unraisable)
 
@@ -69,33 +69,33 @@ def install() -> None:
 
 
 def sigint_handler() -> SigintHandler:
-    """Return the handler that remembers presses; within another program, for example, one that knows of none."""
+    """Return the handler that remembers presses; a new one if it is not installed, as inside another program."""
     handler = signal.getsignal(signal.SIGINT)
     return handler if isinstance(handler, SigintHandler) else SigintHandler()
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt if a press went unheard."""
+    """Raise KeyboardInterrupt if a press is pending."""
     if sigint_handler().pending:
         raise KeyboardInterrupt
 
 
 def clear() -> None:
-    """Forget a press that was heard, and count it."""
+    """Forget a press that took effect, and count it."""
     SigintHandler.heard += 1
     sigint_handler().pending = False
 
 
 def ignore() -> None:
-    """Let presses end nothing in this process, whose parent hears them."""
+    """Ignore presses in this process; its parent handles them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Let presses interrupt the program within this block, one before it included.
+    """Let presses interrupt the program within this block, including a press before it.
 
-    A press that was swallowed within ends the block with KeyboardInterrupt, whatever came of it otherwise.
+    If a press is swallowed within the block, the block ends with KeyboardInterrupt, whatever else happened.
     """
     handler = sigint_handler()
     handler.raising = True
@@ -109,7 +109,7 @@ def interruptible() -> Iterator[None]:
 
 @contextlib.contextmanager
 def end_on_interrupt() -> Iterator[None]:
-    """Let a press end this block, which is how it is meant to end, and nothing else."""
+    """Let a press end this block, and nothing else. The block is meant to be ended so."""
     try:
         yield
     except KeyboardInterrupt:
@@ -118,9 +118,9 @@ def end_on_interrupt() -> Iterator[None]:
 
 @contextlib.contextmanager
 def defer() -> Iterator[None]:
-    """Let a press wait for the end of this block, which raises KeyboardInterrupt then.
+    """Defer a press to the end of this block, where KeyboardInterrupt is raised.
 
-    For what must not be broken off, or might swallow it: imports of compiled libraries, finalisers.
+    For code that must not be interrupted, or might swallow a press: imports of compiled libraries, finalisers.
     """
     before = signal.getsignal(signal.SIGINT)
     in_main_thread = threading.current_thread() is threading.main_thread()
@@ -130,7 +130,7 @@ def defer() -> Iterator[None]:
     pressed = False
 
     def keep(_number: int, _frame: FrameType | None) -> None:
-        """Note a press for later."""
+        """Remember a press for later."""
         nonlocal pressed
         pressed = True
         if isinstance(before, SigintHandler):
@@ -147,9 +147,9 @@ def defer() -> Iterator[None]:
 
 @contextlib.contextmanager
 def block_in_children() -> Iterator[None]:
-    """Let processes that are started within this block never hear Ctrl-C; this one hears a press at its end."""
+    """Let processes started within this block ignore Ctrl-C; this process handles a press at the end of the block."""
     with defer():
-        # Processes inherit the mask.
+        # New processes inherit the mask.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield

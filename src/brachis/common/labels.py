@@ -1,4 +1,4 @@
-"""What a figure of a robot or a task is called, in tables, sentences and files."""
+"""Names of the figures of a robot or a task, in tables, sentences and files."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Label:
-    """What one value of a limit is.
+    """The label of one value of a limit.
 
     Attributes
     ----------
     subject : str
-        Of what: a joint's name, ``tool``, a pair of joints, ...
+        What the value belongs to: the name of a joint, ``tool``, a pair of joints, ...
     kind : str
-        What is limited, in words, for example ``torque``.
+        The limited quantity, in words, for example ``torque``.
     unit : str
-        Of the limit that the user gives.
+        Unit of the figure that the user gives.
     key : str
-        Key of the task that sets it; empty without one.
+        Key of the task that sets the figure; empty without a key.
     active_text, slack_text : str
-        Text for "the limit is active", and for the slack that a wider bound provides. If empty, both are made of
+        Text for "the limit is active", and for the slack that a wider bound provides. By default both are composed of
         subject and kind.
     share : str
-        What the ratio to the bound is, as the title of an axis. If empty, for example ``torque / limit``.
+        Title of an axis for the ratio to the bound. Default: ``<kind> / limit``, for example ``torque / limit``.
     cause : str
-        What the user would change, for example ``feed rate``, where several values have one figure in common; empty
-        where each has its own.
+        The setting that the user would change, for example ``feed rate``, if several values share one figure; empty if
+        each value has its own figure.
     """
 
     subject: str
@@ -40,14 +40,14 @@ class Label:
 
     @property
     def after(self) -> str:
-        """The unit, as it stands after a figure."""
+        """The unit, as text after a figure."""
         return "" if self.unit == "-" else f" {self.unit}"
 
     @property
     def axis(self) -> str:
-        """Title of an axis over which ratios are drawn."""
+        """Title of an axis for the ratios."""
         return self.share or f"{self.kind} / limit"
 
     def __str__(self) -> str:
-        """Return subject and kind."""
+        """Return the subject and the kind."""
         return f"{self.subject} {self.kind}"

@@ -1,4 +1,4 @@
-"""What a plan is doing: reported to a listener, to the log named ``brachis``, and on a line that changes."""
+"""Progress of a plan: reported to a listener, to the log named ``brachis``, and on a line that is updated."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from contextlib import contextmanager
 from typing import Any
 
 Listener = Callable[[str], None]
-"""Takes what the planner is doing in plain words, between iterations; may raise KeyboardInterrupt."""
+"""Receives the planner's present step in plain words, between iterations; may raise KeyboardInterrupt."""
 
 
 def ignore(_text: str) -> None:
-    """Listen to nothing."""
+    """Ignore a report."""
 
 
 class Iteration(str):
-    """A step of a stage: logged at level DEBUG, where stages are logged at INFO."""
+    """A report of a step within a stage, which is logged at level DEBUG; stages are logged at INFO."""
 
     __slots__ = ()
 
@@ -28,13 +28,13 @@ class Iteration(str):
 def report_progress(
     listener: Listener | None, progress: bool | None
 ) -> Iterator[Listener]:
-    """Give a listener that logs every step, hands it to another listener, and shows it.
+    """Provide a listener that logs every step, passes it on to another listener, and shows it.
 
     Parameters
     ----------
     listener : callable or None
     progress : bool or None
-        Whether steps are shown; None: in notebooks, unless there is a listener.
+        Whether steps are shown. None: they are shown in notebooks, unless there is a listener.
     """
     if progress is None:
         progress = listener is None and _in_notebook()
@@ -42,7 +42,7 @@ def report_progress(
     log = logging.getLogger("brachis")
 
     def report(text: str) -> None:
-        """Log a step, hand it on and show it."""
+        """Log a step, pass it on and show it."""
         level = logging.DEBUG if isinstance(text, Iteration) else logging.INFO
         log.log(level, "%s", text)
         if listener is not None:
@@ -57,9 +57,9 @@ def report_progress(
 
 
 class _Line:
-    """A line that shows the present step: below a notebook's cell, or on standard error.
+    """A line that shows the present step, below the cell of a notebook or on standard error.
 
-    Where standard error is not a terminal, every stage is a line of its own.
+    If standard error is not a terminal, every stage is written on a separate line.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class _Line:
         self._last = 0.0
 
     def show(self, text: str) -> None:
-        """Show a step in place of the one before; of iterations ten a second."""
+        """Show a step in place of the previous one; at most ten iterations per second."""
         now = time.monotonic()
         if isinstance(text, Iteration) and now - self._last < 0.1:
             return
@@ -83,7 +83,7 @@ class _Line:
         sys.stderr.flush()
 
     def clear(self) -> None:
-        """Leave nothing of the line."""
+        """Erase the line."""
         if self._display is not None:
             self._show_in_notebook("")
         elif self._width:

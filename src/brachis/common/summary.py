@@ -1,4 +1,4 @@
-"""How objects show themselves: on a few lines in a terminal, as a table in a notebook; never more than a screen."""
+"""Summaries of objects: a few lines in a terminal, a table in a notebook, never more than a screen."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from typing import TYPE_CHECKING, Any
 from brachis.errors import MissingAttributeError
 
 COLUMNS = 100
-"""Characters up to which a summary stands on one line."""
+"""Largest length of a summary on one line, characters."""
 LINES = 22
-"""Entries of a summary: with name and prompt they fit into a terminal of 24 lines."""
+"""Largest number of entries of a summary: with name and prompt they fit into a terminal of 24 lines."""
 
 
 class Summary:
-    """Base class of what shows a summary of itself: what `summary` says, a dataclass's fields unless overridden."""
+    """Base class of objects that show a summary: the entries of `summary`, by default the fields of a dataclass."""
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown, by name."""
+        """Return the entries that are shown, by name."""
         names = [entry.name for entry in fields(self) if entry.repr]  # type: ignore[arg-type]
         return {name: getattr(self, name) for name in names}
 
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Refuse a name that is not there, and name the one that may be meant."""
+            """Refuse an attribute that does not exist, and suggest a similar one."""
             if hasattr(type(self), name):  # a property that failed
                 return object.__getattribute__(self, name)
             raise MissingAttributeError(self, name)
 
     def __repr__(self) -> str:
-        """Show it on one line, or on one line for each entry."""
+        """Return the summary on one line, or with one line for each entry."""
         entries = self._entries()
         name = type(self).__name__
         line = f"{name}({', '.join(f'{key}={value}' for key, value in entries)})"
@@ -44,7 +44,7 @@ class Summary:
         )
 
     def _repr_html_(self) -> str:
-        """Show it as a table in a notebook."""
+        """Return the summary as a table for a notebook."""
         rows = "".join(
             f'<tr><td style="text-align:left"><b>{escape(key)}</b></td>'
             f'<td style="text-align:left">{escape(value)}</td></tr>'
@@ -61,7 +61,7 @@ class Summary:
 
 
 def show_value(value: Any) -> str:
-    """Show a value in 104 characters and 8 items or fewer: arrays by their shape, long sequences by their length."""
+    """Write a value in at most 104 characters and 8 items: arrays by their shape, long sequences by their length."""
     room = 104
     items = 8
     shape = getattr(value, "shape", None)
@@ -76,7 +76,7 @@ def show_value(value: Any) -> str:
         text = value
         ending = f"... ({len(text)} characters)"
         instead = text.partition("\n")[0][: room - len(ending)] + ending
-    elif type(value) in {list, tuple}:  # not those with names
+    elif type(value) in {list, tuple}:  # not named tuples
         count = len(value)
         text = f"[{', '.join(show_value(item) for item in value[:items])}]"
         instead = f"{count} items"

@@ -8,5 +8,5 @@ from threadpoolctl import ThreadpoolController
 
 
 def use_one_thread() -> AbstractContextManager[object]:
-    """Let linear algebra use one thread: batches are small, and on busy cores a second costs twenty times its gain."""
+    """Limit linear algebra to one thread: for small batches on busy cores, a second one costs 20 times its gain."""
     return ThreadpoolController().limit(limits=1, user_api="blas")

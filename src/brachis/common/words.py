@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def write_apart(value: float, *references: float, digits: int = 4) -> tuple[str, ...]:
-    """Write a number and others with as many significant digits as tell it from them, at least `digits`."""
+    """Write a number and others with enough significant digits to distinguish it from them, at least `digits`."""
     for count in range(digits, 18):
         text, *texts = (f"{number:.{count}g}" for number in (value, *references))
         if all(
@@ -18,11 +18,11 @@ def write_apart(value: float, *references: float, digits: int = 4) -> tuple[str,
 
 
 def write_count(count: int, noun: str) -> str:
-    """Write how many there are of something, as ``1 row`` or ``2 rows``."""
+    """Write a count with its noun, such as ``1 row`` or ``2 rows``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def name_first(names: Sequence[str], separator: str, count: int = 3) -> str:
-    """Join the first names, and say how many more there are."""
+    """Join the first names, followed by the number of further names."""
     ending = f" and {len(names) - count} more" if len(names) > count else ""
     return separator.join(names[:count]) + ending

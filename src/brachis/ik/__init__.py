@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry.
+"""Closed-form inverse kinematics: the protocol, the families, and the registry that finds a family by geometry.
 
 Examples
 --------

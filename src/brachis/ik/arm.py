@@ -1,8 +1,8 @@
-"""The joints that a closed form solves for: how their axes lie to each other, and where they place a point.
+"""The joints for which a closed form solves: the relations of their axes, and the points that they place.
 
-What two neighbours are to each other (parallel, meeting, at a right angle) no motion of theirs changes. Redundant
-joints between them may change it, so that a property counts as given if it holds at several random positions of these;
-the closed forms then take it as exact.
+The motion of two neighbouring joints does not change the relation of their axes (parallel, meeting, perpendicular).
+Redundant joints between them may change it. A relation is therefore accepted if it holds at several random positions of
+the redundant joints; the closed forms then take it as exact.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from brachis.robot.task_map import Pose
 
 @dataclass(frozen=True)
 class Anchor:
-    """A point that stays at its place on the axis of a joint.
+    """A point that is fixed on the axis of a joint.
 
     Attributes
     ----------
     joint : int
-        Which of the joints.
+        Index of the joint.
     offset : float
-        How far along the axis from the joint's own point, m.
+        Distance along the axis from the point of the joint's screw, m.
     """
 
     joint: int
     offset: float
 
     def at(self, screws: Sequence[Screw]) -> np.ndarray:
-        """Return its position (3, ...)."""
+        """Return the position of the point, (3, ...)."""
         return screws[self.joint].point + screws[self.joint].axis * self.offset
 
 
@@ -51,12 +51,12 @@ class RemainingJoints:
     ----------
     names : tuple of str
     joints : tuple of int
-        Their places in the chain.
+        Their indices in the chain.
     revolute : (J,) bool ndarray
     axes, points : (3, J, S) ndarray
-        As in `PosedScrews`, while they are at zero.
+        As in `PosedScrews`, with these joints at zero.
     mirrored : bool
-        Whether they are listed from the tool to the base.
+        Whether the joints are listed from the tool to the base.
     """
 
     names: tuple[str, ...]
@@ -75,7 +75,7 @@ class RemainingJoints:
         Raises
         ------
         NotApplicableError
-            Another number of joints than `count` is left over.
+            The number of remaining joints is not `count`.
         """
         non_redundant = complement(geometry.n, redundant)
         if len(non_redundant) != count:
@@ -96,15 +96,15 @@ class RemainingJoints:
     def of_pose(
         cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
     ) -> RemainingJoints:
-        """Take the six joints that are left over for a pose; raises NotApplicableError for other tasks or counts."""
+        """Return the six remaining joints for a pose; raises NotApplicableError for other tasks or counts."""
         if not isinstance(task_map, Pose):
             raise NotApplicableError("this family solves only poses")
         return cls.of(geometry, redundant, 6)
 
     def reverse(self) -> RemainingJoints:
-        """List the same joints in the reverse order: what they do seen from the tool, with their senses turned round.
+        """List the same joints in the reverse order, as seen from the tool, with reversed axes.
 
-        Their positions stay as they are.
+        Their positions do not change.
         """
         return replace(
             self,
@@ -117,26 +117,26 @@ class RemainingJoints:
         )
 
     def screws(self, screws: PosedScrews, alternatives: int = 0) -> tuple[Screw, ...]:
-        """Pick these joints, in their order and sense, out of a chain's K postures.
+        """Select these joints, in their order and sense, from the screws of a chain in K postures.
 
-        Vectors are (3, ..., K), with so many axes of length one before the samples as there are `alternatives`.
+        Vectors are (3, ..., K), with `alternatives` axes of length one before the samples.
         """
         picked = screws.pick(self.joints, alternatives)
         return tuple(screw.inverse for screw in picked) if self.mirrored else picked
 
     def are_parallel(self, first: int, *compared: int) -> bool:
-        """Whether the directions of joints, of whatever kind, are always parallel."""
+        """Tell whether the axes of joints, revolute or prismatic, are always parallel."""
         sines = cross(self.axes[:, [first]], self.axes[:, compared])
         return bool(np.abs(sines).max() < tolerances.LENGTH)
 
     def are_perpendicular(self, i: int, j: int) -> bool:
-        """Whether the directions of two joints, of whatever kind, are always at a right angle."""
+        """Tell whether the axes of two joints, revolute or prismatic, are always perpendicular."""
         return bool(
             np.abs(dot(self.axes[:, i], self.axes[:, j])).max() < tolerances.LENGTH
         )
 
     def miss(self, *places: int) -> float:
-        """Largest distance of the axes of revolute joints from the point where the first two come nearest, m."""
+        """Return the largest distance of revolute axes from the point where the first two come closest, m."""
         gaps = across(
             self.axes[:, places],
             self._nearest(*places[:2])[:, None] - self.points[:, places],
@@ -144,9 +144,9 @@ class RemainingJoints:
         return float(np.sqrt(dot(gaps, gaps).max()))
 
     def meeting(self, *places: int) -> Anchor | None:
-        """Point in which the axes of joints always meet; None without one, or if it moves along all of them.
+        """Return the point in which axes of joints always meet; None without one, or if it moves along all of them.
 
-        Of two axes that coincide it is any point.
+        If two axes coincide, it is any point on them.
         """
         if (
             not self.revolute[list(places)].all()
@@ -161,7 +161,7 @@ class RemainingJoints:
         return None
 
     def _nearest(self, i: int, j: int) -> np.ndarray:
-        """Point (3, S) on the axis of i that is nearest to that of j; any one where they are parallel."""
+        """Return the point, (3, S), on the axis of i that is closest to that of j; any point if they are parallel."""
         first = self.axes[:, i]
         second = self.axes[:, j]
         normal = cross(first, second)
@@ -174,17 +174,18 @@ class RemainingJoints:
 
 @dataclass(frozen=True)
 class Arm:
-    """Screws of the joints, while they are at zero or at postures.
+    """Screws of the joints, at zero or in postures.
 
     Attributes
     ----------
     screws : tuple of Screw
-        Joints a, b, c, which place a point; then those of the wrist that turns about it, u, v, w, where there is one.
-        Around three parallel axes in their order.
+        Joints a, b, c, which place a point; then the joints u, v, w of the wrist that turns about it, if there is one.
+        For three parallel axes, all joints in their order.
     centre : (3, ...) ndarray
-        This point, m: the wrist's centre, or the tool; or one that the joints after parallel axes leave in place.
+        This point, m: the centre of the wrist, or the tool; or a point that the joints after the parallel axes do not
+        move.
     meeting : (3, ...) ndarray
-        Where the axes of two of a, b, c meet, m; the centre where no use is made of it.
+        Point where the axes of two of a, b, c meet, m; equal to `centre` if it is not used.
     """
 
     screws: tuple[Screw, ...]

@@ -1,15 +1,16 @@
-"""Closed forms whose branches det J_nr tells apart: by its factors, or by its sign alone.
+"""Closed forms whose branches are distinguished by det J_nr: by its factors, or by its sign alone.
 
-Two answers meet only where det J_nr vanishes, so that the branches follow from its sign; divided by its largest size it
-is the branch margin. Some families have several answers of one sign: along a motion continuity tells these apart.
+Two solutions meet only where det J_nr vanishes. So the branches follow from its sign, and det J_nr divided by its
+largest magnitude is the branch margin. Some families have several solutions with the same sign. Along a motion, these
+are distinguished by continuity.
 
-Where a closed form solves for one joint after the other, factors of det J_nr appear. Each step brings a component or a
-distance of a position to a given value. The derivatives of these conditions, each with respect to its step's joint, are
-the factors, up to the sign: a step's two answers differ by the sign of its factor, and meet where it vanishes. Divided
-by their largest size the factors are the branch margins, so that a branch ends exactly where J_nr is singular.
+If a closed form solves for one joint after the other, det J_nr has factors. Each step brings a component or a distance
+of a position to a given value. The derivative of this condition with respect to the joint of the step is a factor, up
+to the sign. The two solutions of a step differ by the sign of its factor, and meet where it vanishes. The factors
+divided by their largest magnitudes are the branch margins, so a branch ends exactly where J_nr is singular.
 
-A step in which all joints slide has one answer; if its factor changes sign with the redundant joints, ``left`` and
-``right`` are two branches of which one exists at a time.
+A step in which all joints are prismatic has one solution. If the sign of its factor changes with the redundant joints,
+``left`` and ``right`` are two branches, of which only one exists at a time.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ from brachis.robot.joints import complement
 def largest_size(
     determinants: np.ndarray, geometry: ChainGeometry, redundant: Sequence[int]
 ) -> float:
-    """Return the largest size of det J_nr at random postures.
+    """Return the largest magnitude of det J_nr in random postures.
 
     Raises
     ------
     NotApplicableError
-        J_nr is singular in all of them.
+        J_nr is singular in all postures.
     """
     size = float(np.abs(determinants).max())
     if size < tolerances.LENGTH:
@@ -51,16 +52,16 @@ def largest_size(
 
 
 class DeterminantSolver(FormulaMargins):
-    """What closed forms have in common whose branches are the signs of det J_nr.
+    """Base class of closed forms whose branches are the signs of det J_nr.
 
     Parameters
     ----------
     chain : ChainGeometry
     redundant : sequence of int
     name : str
-        What the labels begin with.
+        Beginning of the labels.
     postures : (K, n) ndarray, optional
-        Random ones, by which the determinant is sized up.
+        Random postures in which the scale of the determinant is measured.
     """
 
     def __init__(
@@ -81,11 +82,11 @@ class DeterminantSolver(FormulaMargins):
         self._scale = largest_size(self._random, chain, redundant)
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
-        """Det J_nr, (K,), in postures (K, n)."""
+        """Compute det J_nr, (K,), in postures, (K, n)."""
         return self._chain.screws_at(q).determinant(self._joints)
 
     def margins(self, q: np.ndarray) -> np.ndarray:
-        """Return det J_nr, (K, 1), divided by its largest size."""
+        """Return det J_nr, (K, 1), divided by its largest magnitude."""
         return self._determinants(q)[:, None] / self._scale
 
     def margin_signs(self, branch: int) -> np.ndarray:
@@ -95,16 +96,17 @@ class DeterminantSolver(FormulaMargins):
 
 @dataclass(frozen=True)
 class Factor:
-    """A factor of det J_nr, whose sign tells the answers of one step apart.
+    """A factor of det J_nr, whose sign distinguishes the solutions of one step.
 
     Attributes
     ----------
     value : callable
-        The factor (...), from the screws at postures; analytic in complex postures.
+        Function that returns the factor, (...), from the screws in postures; analytic for complex postures.
     labels : tuple of str
-        Parts of the labels of the branches with a positive and a negative factor.
+        Parts of the branch labels for a positive and a negative factor.
     slides : tuple of int
-        If all of these joints are prismatic, the step has one answer, and the redundant joints alone set the factor.
+        If all of these joints are prismatic, the step has one solution, and the factor depends on the redundant joints
+        alone.
     """
 
     value: Callable[[Arm], np.ndarray]
@@ -113,14 +115,14 @@ class Factor:
 
 
 Steps = tuple[Arm, Sequence[np.ndarray]]
-"""The arm while its joints are at zero, and their positions, with the slots before the samples.
+"""The arm with its joints at zero, and the solutions for the joints, with the slots before the samples.
 
-A slide whose direction depends on joints that are solved for before it has that direction.
+If the direction of a slide depends on joints that were solved before, the arm has this direction.
 """
 
 
 class FactoredSolver(FormulaSolver):
-    """Closed form that solves for one joint after the other; each step has an axis of the answers, its slot.
+    """Closed form that solves for one joint after the other. Each step has an axis of the solutions, its slot.
 
     Parameters
     ----------
@@ -129,7 +131,7 @@ class FactoredSolver(FormulaSolver):
     joints : RemainingJoints
         In the order in which they are solved for.
     factors : tuple of Factor
-        Of the steps.
+        The factors of the steps.
     """
 
     def __init__(
@@ -172,11 +174,11 @@ class FactoredSolver(FormulaSolver):
 
     @abstractmethod
     def _arm(self, screws: tuple[Screw, ...], tool: np.ndarray) -> Arm:
-        """Put in the points that the joints' screws and the tool's position (3, ...) give."""
+        """Build the arm, with the points that follow from the joints' screws and the tool's position, (3, ...)."""
 
     @abstractmethod
     def _steps(self, targets: np.ndarray, q_r: np.ndarray) -> Steps:
-        """Solve for the joints at targets, (K, c), with the redundant joints held at q_r, (K, r)."""
+        """Solve for the joints at targets, (K, c), with the redundant joints at q_r, (K, r)."""
 
     def _arm_at(self, screws: PosedScrews) -> Arm:
         return self._arm(self._joints.screws(screws), screws.tool_position)
@@ -184,11 +186,11 @@ class FactoredSolver(FormulaSolver):
     def _displacement(
         self, targets: np.ndarray, q_r: np.ndarray
     ) -> tuple[tuple[Screw, ...], Poses]:
-        """State E_1 ... E_6 = D for poses, with the joints in the order in which they are solved for.
+        """Return the screws and D of the equation E_1 ... E_6 = D for poses, with the joints in the order of solution.
 
-        With redundant joints held at q_r and all others zero the tool is at M(q_r), and D = T M(q_r)^-1 for the target
-        T. E_i turns about, or slides along, the screw of the i-th joint as the held joints have placed it. In the
-        reverse order the equations are E_6^-1 ... E_1^-1 = D^-1. Redundant joints may stand anywhere in the chain.
+        With redundant joints at q_r and all others at zero, the tool is at M(q_r), and D = T M(q_r)^-1 for the target
+        T. E_i is the motion about or along the screw of the i-th joint, as placed by the redundant joints. In the
+        reverse order, the equation is E_6^-1 ... E_1^-1 = D^-1. Redundant joints may be anywhere in the chain.
         """
         screws = self._geometry.screws_with(self._redundant, q_r)
         motion = Poses.of_targets(targets) @ Poses.of_tool(screws).inverse()
@@ -200,7 +202,7 @@ class FactoredSolver(FormulaSolver):
         )
 
     def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Arrange the steps' answers; angles in (-pi, pi]."""
+        """Arrange the solutions of the steps; angles are in (-pi, pi]."""
         held, values = self._steps(targets, q_r)
         slots = [len(signs) for signs in self._signs]
         for slot in self._sided:
@@ -232,7 +234,7 @@ class FactoredSolver(FormulaSolver):
         return margins
 
     def margin_signs(self, branch: int) -> np.ndarray:
-        """Return the signs of these factors."""
+        """Return the signs of the factors that are not constant."""
         return np.array([self._choices[branch][slot] for slot in self._varying])
 
 
@@ -246,22 +248,24 @@ def fit(
     joints: RemainingJoints,
     *arguments: object,
 ) -> S:
-    """Make a solver of joints in their order or, where it does not fit, in the reverse order.
+    """Create a solver for joints in their order or, if it does not fit, in the reverse order.
 
     Parameters
     ----------
     solver : type
-        Made from the geometry, the redundant joints, the others in an order, and what else is given; raises
-        `NotApplicableError` if it does not fit.
+        It is made from the geometry, the redundant joints, the remaining joints in one order, and the further
+        arguments. It raises `NotApplicableError` if it does not fit.
     geometry : ChainGeometry
     redundant : tuple of int
     joints : RemainingJoints
-        From the base to the tool.
+        The remaining joints, from the base to the tool.
+    *arguments
+        Further arguments of the solver.
 
     Raises
     ------
     NotApplicableError
-        J_nr is singular everywhere, or the solver does not fit; says why.
+        J_nr is singular everywhere, or the solver does not fit; the message gives the reason.
     """
     determinants = geometry.random_screws.determinant(joints.joints)
     largest_size(determinants, geometry, redundant)

@@ -1,23 +1,23 @@
-"""Poses by six revolute joints whose axes are parallel or meet in places: EAIK's decomposition into subproblems.
+"""Poses of six revolute joints of which some axes are parallel or meet: EAIK's decomposition into subproblems.
 
-Redundant joints may stand anywhere. Those before the first and behind the last of the six (a rail, a turntable, the
-roll of the tool) move the base or the tool alone. With G_1 and G_2 their motions and M the tool's placement at the zero
-posture, the target T asks of the chain in between for
+Redundant joints may be anywhere in the chain. Those before the first and after the last of the six (a rail, a
+turntable, the roll of the tool) only move the base or the tool. With their motions G_1 and G_2, and the placement M of
+the tool in the zero posture, the target T requires of the chain in between
 
     E_1(q_1) ... E_6(q_6) M = G_1^-1 T (G_2 M)^-1 M,
 
-where redundant joints between the six are held at their values: these change the axes from sample to sample, and EAIK
-looks at every different value anew (about ten microseconds).
+where redundant joints between the six are held at their values. These values change the axes from sample to sample, and
+EAIK analyses every different value anew (about ten microseconds).
 
-EAIK's answers are believed only as far as they reach the target: near misses are polished, wrong and repeated answers
-dropped. EAIK's order of the answers changes along a path; here the sign of det J_nr is their branch. Answers of either
-sign are equally many: the map from postures to poses has degree zero, as some poses are out of reach.
+A solution of EAIK is accepted only if it reaches the target: near misses are polished, wrong and repeated solutions are
+dropped. The order of EAIK's solutions changes along a path; here the sign of det J_nr is the branch. Both signs have
+equally many solutions: the map from postures to poses has degree zero, because some poses are out of reach.
 
-EAIK looks for axes that are parallel or meet with a tolerance near rounding, which a URDF that writes pi/2 with ten
-digits, or a product of a few rotations, misses already; hence `exact_axes`. Joints that are held are taken out of the
-chain here, and poses are asked for one by one: EAIK's own way of fixing joints crashes on a wrong index, and its
-batches run in threads, where an error ends the process, without being faster. Of the package only the compiled part is
-loaded; the rest reads URDFs, which takes libraries for meshes.
+EAIK's tolerance for parallel and meeting axes is close to rounding. A URDF that writes pi/2 with ten digits, or a
+product of a few rotations, already exceeds it; hence `exact_axes`. Held joints are removed from the chain here, and
+EAIK is called for one pose at a time. EAIK's own function for fixed joints crashes on a wrong index. Its batches run in
+threads, where an error ends the process, and are not faster. Only the compiled part of the package is loaded; the rest
+reads URDFs, which needs libraries for meshes.
 """
 
 from __future__ import annotations
@@ -39,21 +39,21 @@ from brachis.robot.joints import TURN, complement
 from brachis.robot.task_map import Pose
 
 NOT_INSTALLED = "EAIK is not installed (pip install EAIK)"
-"""Why EAIK is not asked, where that is the reason."""
+"""Reason why EAIK is not used, if it is not installed."""
 EXACT_AXES = 1e-8
-"""Axes this near to parallel, or to meeting, are taken to do so, rad or m."""
+"""Axes this close to parallel, or to meeting, are treated as such, rad or m."""
 COARSE_AXES = 4e-5
-"""The same where EAIK makes nothing of axes that are almost parallel; such answers need polishing."""
+"""The same if EAIK fails on axes that are almost parallel; the solutions then need polishing."""
 _AMPLIFIED = 1e3
-"""How much farther than their axes answers may be off."""
+"""Factor between the error of the axes and the allowed error of solutions."""
 _KEPT = 4096
-"""How many of EAIK's robots are kept."""
+"""Largest number of EAIK's robots that are kept."""
 _PER_SIGN = 8
-"""Six revolute joints reach a pose in at most 16 ways, half of them with either sign of det J_nr."""
+"""Six revolute joints reach a pose in at most 16 ways, half of them with each sign of det J_nr."""
 
 
 def is_installed() -> bool:
-    """Whether EAIK can be imported."""
+    """Return whether EAIK can be imported."""
     try:
         _import_eaik()
     except ModuleNotFoundError:
@@ -66,14 +66,14 @@ def _import_eaik() -> Any:
 
 
 class EaikSolver(DeterminantSolver):
-    """Closed form by EAIK; see the module's formulas.
+    """Closed form by EAIK; see the formulas of the module.
 
     Parameters
     ----------
     geometry : ChainGeometry
     task_map : Pose
     redundant : tuple of int
-        The six other joints are revolute.
+        The redundant joints. The six other joints are revolute.
 
     Raises
     ------
@@ -107,11 +107,11 @@ class EaikSolver(DeterminantSolver):
             )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave EAIK's robots out, which cannot be pickled; they are made again when needed."""
+        """Leave out EAIK's robots, which cannot be pickled; they are created again when needed."""
         return {**self.__dict__, "_robots": {}}
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Return the answers that reach their targets, (K, 2, 8, 6); angles in (-pi, pi]."""
+        """Return the solutions that reach their targets, (K, 2, 8, 6); angles are in (-pi, pi]."""
         finite = np.flatnonzero(
             np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1)
         )
@@ -134,7 +134,7 @@ class EaikSolver(DeterminantSolver):
         return _arrange(wrap(q[right][:, self._joints]), groups, len(q_r))
 
     def _targets_between(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; the tool's placement is G M."""
+        """Return the targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; the placement of the tool is G M."""
         poses = Poses.of_targets(targets)
         if self._before:
             undo = self._undo(self._before, q_r[:, : self._inner.start])
@@ -145,13 +145,13 @@ class EaikSolver(DeterminantSolver):
         return poses.targets()
 
     def _undo(self, joints: list[int], positions: np.ndarray) -> Poses:
-        """Motions that undo the tool's placement with these joints alone at positions, (K, h)."""
+        """Return the inverse of the tool's placements with only these joints at positions, (K, h)."""
         return Poses.of_tool(self._chain.screws_with(joints, positions)).inverse()
 
     def _judge(
         self, q: np.ndarray, expected: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """By how much postures miss their targets, m or an element of a rotation, and det J_nr; both (N,)."""
+        """Return the error of postures, in m or in an element of a rotation, and det J_nr; (N,) each."""
         positions, rotations, twists = self._chain.tool(q, in_tool_axes=False)
         targets = np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
         columns = np.moveaxis(twists[:, :, self._joints], 0, 1)
@@ -167,16 +167,16 @@ class EaikSolver(DeterminantSolver):
         targets : (K, 12) ndarray
             Poses as task coordinates.
         values : (K, h) ndarray
-            Of the held joints, rad or m. Every different value needs a robot of its own.
+            Positions of the held joints, rad or m. Every different value needs a separate robot.
 
         Returns
         -------
         joints : (N, 6) ndarray
-            As EAIK returns them: some repeated, some wrong, in an order that means nothing.
+            Solutions as returned by EAIK: some are repeated or wrong, and their order has no meaning.
         samples : (N,) int ndarray
-            To which of the K samples they belong, ascending.
+            Index of the sample to which each solution belongs, ascending.
         slack : (N,) ndarray
-            By how much right answers may miss their target, m or rad.
+            Allowed error of correct solutions, m or rad.
         """
         robots = self._robots_at(values)
         poses = np.tile(np.eye(4), (len(targets), 1, 1))
@@ -195,7 +195,7 @@ class EaikSolver(DeterminantSolver):
         return joints[finite], samples[finite], slack[finite]
 
     def _robots_at(self, values: np.ndarray) -> list[tuple[Any, float]]:
-        """Robots with the slack of their answers at held values, (K, h)."""
+        """Return the robots for held values, (K, h), with the allowed error of their solutions."""
         keys = [tuple(row) for row in values.tolist()]
         if len(self._robots) > _KEPT:
             self._robots = {}
@@ -208,14 +208,12 @@ class EaikSolver(DeterminantSolver):
                 (robot,) = self._make_robots(np.array([key]), COARSE_AXES)
                 slack = _AMPLIFIED * COARSE_AXES
             elif "NO_PARALLEL" in robot.get_kinematic_family():
-                slack = (
-                    1e-4  # roots of quartic polynomials now and then have few digits
-                )
+                slack = 1e-4  # roots of quartic polynomials sometimes have few correct digits
             self._robots[key] = (robot, slack)
         return [self._robots[key] for key in keys]
 
     def _make_robots(self, values: np.ndarray, tolerance: float) -> list[Any]:
-        """Make EAIK's robots at held values (U, h); None where it has no decomposition."""
+        """Create EAIK's robots for held values, (U, h); None without a decomposition."""
         create = _import_eaik().Robot
         use_double_precision = True
         screws = self._chain.screws_with(self._held, values)
@@ -241,32 +239,32 @@ class EaikSolver(DeterminantSolver):
 
 
 def _calculate(robot: Any, pose: np.ndarray) -> np.ndarray:
-    """EAIK's answers for one pose, (count, 6)."""
+    """Return EAIK's solutions for one pose, (count, 6)."""
     try:
         joints = robot.calculate_IK(pose).Q if robot is not None else ()
-    except RuntimeError:  # one of its subproblems gave up
+    except RuntimeError:  # one of its subproblems failed
         joints = ()
     return np.asarray(joints).reshape(-1, 6)
 
 
 def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
-    """Arrange answers by samples and signs, without repetitions.
+    """Arrange solutions by samples and signs, without repetitions.
 
-    They are put in order by their angles, in so many cells a turn that rounding seldom changes it. The order means
-    nothing: it is there so that equal questions get equal answers.
+    They are ordered by their angles, in cells of which a turn has so many that rounding seldom changes the order. The
+    order has no meaning; it only makes equal calls return equal results.
 
     Parameters
     ----------
     joints : (N, 6) ndarray
     groups : (N,) int ndarray
-        Two a sample: 2 k for the positive sign, 2 k + 1 for the negative one.
+        Two groups per sample: 2 k for the positive sign, 2 k + 1 for the negative sign.
     count : int
         Number of samples.
 
     Returns
     -------
     (count, 2, 8, 6) ndarray
-        NaN after the last answer.
+        Solutions, followed by NaN.
     """
     marks = 0.5 + joints / TURN
     keys = np.zeros(len(joints), dtype=np.int64)
@@ -284,7 +282,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
 
 
 def _find_repetitions(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """Find answers, (N,), within 1e-5 rad of one before them in their group; marks (N, 6) are in turns."""
+    """Find solutions, (N,) bool, within 1e-5 rad of an earlier one in their group; `marks`, (N, 6), are in turns."""
     repeated = np.zeros(len(marks), dtype=bool)
     for behind in range(1, len(marks)):
         together = np.flatnonzero(groups[behind:] == groups[:-behind])
@@ -299,10 +297,10 @@ def _find_repetitions(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
 def exact_axes(
     axes: np.ndarray, points: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Make axes that are parallel, or that meet, to within a tolerance do so exactly.
+    """Make axes that are parallel, or that meet, to within a tolerance exactly parallel or meeting.
 
-    An axis that is parallel to one before it takes over its direction. An axis that meets its predecessor is moved to
-    where it does, and given by that point; a third one that meets them there is given by the very same point.
+    An axis that is parallel to an earlier one gets its direction. An axis that meets its predecessor is moved to the
+    meeting point and is given by this point. A third axis that meets them there is given by the same point.
 
     Parameters
     ----------
@@ -325,7 +323,7 @@ def exact_axes(
 
 
 def _let_meet(axes: np.ndarray, points: np.ndarray, tolerance: float) -> np.ndarray:
-    """Points (3, c, U): where an axis meets its predecessor, else the one nearest to the predecessor's point."""
+    """Return points, (3, c, U), where axes meet their predecessors, else those closest to the predecessors' points."""
     points = points.copy()
     normal = cross(axes[:, :-1], axes[:, 1:])
     size = dot(normal, normal)
@@ -354,7 +352,7 @@ def _let_meet(axes: np.ndarray, points: np.ndarray, tolerance: float) -> np.ndar
 def eaik(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> EaikSolver:
-    """Fit the family: a pose is prescribed, and six joints are left over, all revolute, which EAIK can solve."""
+    """Fit the family: a pose is prescribed, and six revolute joints remain, for which EAIK can solve."""
     if not isinstance(task_map, Pose):
         raise NotApplicableError("this family solves only poses")
     non_redundant = complement(geometry.n, redundant)

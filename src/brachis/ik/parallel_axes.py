@@ -1,11 +1,11 @@
-"""Six joints of which three in succession have parallel axes: UR arms and their like, also on a rail.
+"""Six joints of which three successive ones have parallel axes: UR arms and similar arms, also on a rail.
 
-The joints are E_1 ... E_6 = D (`FactoredSolver`), the parallel axes b, c, d run along n, and what is left of D between
-the joints before and after them is a planar motion G about n: it keeps n, and distances along n,
+The equation of the joints is E_1 ... E_6 = D (`FactoredSolver`). The parallel axes b, c, d have the direction n.
+Without the joints before and after them, D leaves a planar motion G about n, which preserves n and distances along n:
 
     G = E_pre^-1 D E_post^-1 = E_b E_c E_d,    R_pre n = R_D R_post^T n,    n . (G x - x) = 0.
 
-Let P be a point that all joints after the parallel ones leave in place, and A one on the axis a.
+Let P be a point that no joint after the parallel ones moves, and A a point on the axis a.
 
     a | b c d | e f     Axes e and f meet at P.      shoulder   n . (E_a^-1 D P) = n . P             for a (2)
                         With y = R_D^T R_a n,        wrist      e . (R_f y) = e . n                  for f (2),
@@ -16,26 +16,27 @@ Let P be a point that all joints after the parallel ones leave in place, and A o
                                                                 n . E_a^-1 (D P - s p) = n . P       for p
     a p | b c d | w     The same with                           n . (E_a^-1 D P - s p) = n . P       for p
 
-Here p slides along s, and a letter's motion R is a rotation. Then, for all of them, G turns by theta = b + c + d:
+Here p slides along s, and R with the letter of a joint is its rotation. In all cases, G turns by theta = b + c + d:
 
     theta    turns e to R_G e about n,                  G D0 = G P + R_n(theta) (D0 - P)
     elbow    |E_c D0 - B| = |G D0 - B|   for c (2),     b turns E_c D0 to G D0
 
-with B, D0 on the axes b, d, and w in the place of e if e is missing; d follows from theta. Chains whose last joints
-do what the first ones do above are solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
+with B, D0 on the axes b, d, and w in place of e if e is missing; d follows from theta. If the last joints of a chain
+have the structure of the first ones above, it is solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
 
-Branches are told apart by the signs of these factors, of which det J_nr is the product:
+Branches are distinguished by the signs of these factors, whose product is det J_nr:
 
     shoulder  front, back    n . (a x (P - A))                       rail   left, right   n . s
     elbow     up, down       (D0 - B) . (c x (D0 - C))
     wrist     noflip, flip   (e x f) . n,  with one joint after the parallel ones (a x w) . n
 
-all at the posture; the first word is that of the positive sign. Each is, up to sign, the derivative of the left side of
-the equation that has two solutions, so that the rising and the falling solution are the two branches.
+all in the posture; the first word belongs to the positive sign. Each factor is, up to its sign, the derivative of the
+left side of the equation with two solutions. So the solution at which it rises and the one at which it falls are the
+two branches.
 
 The case without a rail is in K. P. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms",
 2013, and in A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022,
-without an order of the solutions; the cases with a rail are ours.
+without an order of the solutions. The cases with a rail are new.
 """
 
 from __future__ import annotations
@@ -61,23 +62,23 @@ from brachis.ik.vectors import (
 from brachis.robot import TaskMap
 
 _SHOULDER = 0
-"""Slot of the shoulder's two answers, where there is a shoulder; then follow elbow and wrist."""
+"""Slot of the two solutions of the shoulder, if there is one; elbow and wrist follow."""
 
 
 class ParallelAxesSolver(FactoredSolver):
-    """Closed form around three parallel axes; see the module's formulas.
+    """Closed form around three parallel axes; see the formulas of the module.
 
     Parameters
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
     joints : RemainingJoints
-        In the order in which they are solved for.
+        The joints, in the order in which the solver solves for them.
 
     Raises
     ------
     NotApplicableError
-        The joints have not this structure.
+        The joints do not have this structure.
     """
 
     def __init__(
@@ -97,13 +98,13 @@ class ParallelAxesSolver(FactoredSolver):
         self._turn = before.index(True) if True in before else 0
         self._slide = before.index(False) if False in before else None
         self._parallel = (self._first, self._first + 1, self._first + 2)
-        # The wrist's factor is spanned by f, the last joint, and by e, or a if e is missing.
+        # The factor of the wrist is spanned by f, the last joint, and by e, or by a if e is missing.
         self._beside = 4 if self._first == 1 else self._turn
         self._elbow = 0 if self._slide is not None else 1
         super().__init__(geometry, redundant, joints, self._factors_of_steps())
 
     def _factors_of_steps(self) -> tuple[Factor, ...]:
-        """Return the factors of shoulder, elbow, wrist, or of elbow, wrist, rail."""
+        """Return the factors of shoulder, elbow and wrist, or of elbow, wrist and rail."""
         elbow = Factor(self._elbow_factor, ("up", "down"))
         wrist = Factor(self._wrist_factor, ("noflip", "flip"))
         if self._slide is None:
@@ -113,7 +114,7 @@ class ParallelAxesSolver(FactoredSolver):
         return elbow, wrist, rail
 
     def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
-        """Put in P, as the centre."""
+        """Build the arm, with P as its centre."""
         e, f = screws[4:]
         centre = f.point
         if self._first == 1:
@@ -121,22 +122,22 @@ class ParallelAxesSolver(FactoredSolver):
         return Arm(screws, centre, centre)
 
     def _shoulder_factor(self, arm: Arm) -> np.ndarray:
-        """Velocity that a gives P along the parallel axes."""
+        """Return the velocity of P along the parallel axes that a causes."""
         velocity = arm.screws[self._turn].velocity(arm.centre)
         return dot(arm.screws[self._first].axis, velocity)
 
     def _elbow_factor(self, arm: Arm) -> np.ndarray:
-        """Velocity that c gives the axis of d away from that of b, times its distance."""
+        """Return the velocity of the axis of d away from that of b that c causes, times the distance."""
         b, c, d = (arm.screws[place] for place in self._parallel)
         return dot(d.point - b.point, c.velocity(d.point))
 
     def _wrist_factor(self, arm: Arm) -> np.ndarray:
-        """Volume spanned by two axes and n."""
+        """Return the volume spanned by two axes and n."""
         normal = cross(arm.screws[self._beside].axis, arm.screws[5].axis)
         return dot(normal, arm.screws[self._first].axis)
 
     def _rail_factor(self, arm: Arm) -> np.ndarray:
-        """Velocity that p gives the arm along the parallel axes."""
+        """Return the velocity of the arm along the parallel axes that p causes."""
         return dot(arm.screws[self._first].axis, arm.screws[self._slide or 0].axis)
 
     def _steps(self, targets: np.ndarray, q_r: np.ndarray) -> Steps:
@@ -151,7 +152,7 @@ class ParallelAxesSolver(FactoredSolver):
         theta = angle_about(n, following, rotate(a.axis, -angle, image))
         if self._slide is not None:
             s = screws[self._slide].axis
-            if self._slide < self._turn:  # a turns its direction as well
+            if self._slide < self._turn:  # a also turns its direction
                 s = rotate(a.axis, -angle, s)
                 turned = list(screws)
                 turned[self._slide] = replace(screws[self._slide], axis=s)
@@ -169,7 +170,7 @@ class ParallelAxesSolver(FactoredSolver):
     def _solve_outer(
         self, arm: Arm, motion: Poses, place: np.ndarray
     ) -> tuple[dict[int, np.ndarray], np.ndarray, np.ndarray]:
-        """Solve for the turning joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
+        """Solve for the revolute joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
         n = arm.screws[self._first].axis
         wrist = self._elbow + 1
         a = arm.screws[self._turn]
@@ -196,7 +197,7 @@ class ParallelAxesSolver(FactoredSolver):
 
 
 def _fits(six: RemainingJoints, first: int) -> bool:
-    """Whether three joints from the place `first` on are parallel, and the others around them as they should be."""
+    """Tell whether three joints from index `first` on are parallel, and the joints around them fit."""
     if not six.revolute[first:].all():
         return False
     if not six.are_parallel(first, first + 1, first + 2):
@@ -213,6 +214,6 @@ def _fits(six: RemainingJoints, first: int) -> bool:
 def parallel_axes(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> ParallelAxesSolver:
-    """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
+    """Fit the family: a pose is prescribed, and six joints remain, three successive ones with parallel axes."""
     six = RemainingJoints.of_pose(geometry, task_map, redundant)
     return fit(ParallelAxesSolver, geometry, redundant, six)

@@ -1,24 +1,24 @@
-"""Rows of positions, and an angle: chains that move in one plane and along its normal, and joints that all slide.
+"""Rows of positions, and an angle: chains that move in one plane and along its normal; and prismatic joints only.
 
-Planar chains leave one or two joints of any kind to the closed form, or three where an angle is prescribed, and a slide
-along the normal where the height is. The height of the tool is that at zero, and what the slides along the normal add.
-With the redundant joints held, W0 is the tool while the others are at zero, and W its target in the plane:
+For planar chains, the closed form solves for one or two joints of any kind, or three if an angle is prescribed, and for
+a slide along the normal if the height is prescribed. The height of the tool is its height at zero plus the slides along
+the normal. With the redundant joints held, W0 is the tool with the others at zero, and W its target in the plane:
 
     one joint     the row's component of E_a W0 is given:                    a cosine, or a line
     two joints    E_a E_b W0 = W:                                            `move_within_plane`
-    an angle      E_a E_b E_c = D, where D turns by what is left of the angle, and brings W0 to W
+    an angle      E_a E_b E_c = D, where D turns by the rest of the angle, and moves W0 to W
 
-With an angle one revolute joint leaves a point P of its axis in place and follows from the angle. Two joints are left:
+With an angle, one revolute joint does not move a point P of its axis, and follows from the angle. Two joints remain:
 
     c revolute    E_a E_b P = D P
     a revolute    E_c^-1 E_b^-1 P = D^-1 P
     b alone       two slides: a along its direction, c along that which D gives it, bring P to D P
 
-Angles are about the plane's normal, whatever the senses of the joints. Then det J_nr is positive at the first one of
-the two answers, and negative at the second; where both joints slide there is one answer.
+Angles are about the normal of the plane, whatever the senses of the joints. Then det J_nr is positive for the first of
+the two solutions, and negative for the second. If both joints are prismatic, there is one solution.
 
-Where all non-redundant joints slide, and no angle is prescribed, the target is linear in their positions t: it is
-z(q_r, 0) + D(q_r) t, where the columns of D are their directions. Redundant joints may be of any kind.
+If all non-redundant joints are prismatic, and no angle is prescribed, the target is linear in their positions t: it is
+z(q_r, 0) + D(q_r) t, where the columns of D are the directions of the joints. Redundant joints may be of any kind.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ _LABELS = {
     "R": "swing",
     "P": "slide",
 }
-"""What branches are called after the kinds of the joints that remain when one has been given to the angle."""
+"""Names of branches by the kinds of the joints that remain after one joint follows from the angle."""
 
 
 class PlanarSolver(DeterminantSolver, FormulaSolver):
-    """Closed form of a planar chain; see the module's formulas.
+    """Closed form of a planar chain; see the formulas of the module.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
     basis : (2, 3) ndarray
         Of the plane.
     lifting : list of int
-        The joint, if any, that slides along the normal and is not redundant.
+        The joint that slides along the normal and is not redundant, if there is one.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         self._columns = np.flatnonzero(np.abs(self._heights) < 0.5)
         self._rows = rows[self._columns]
         self._senses = np.where(revolute, np.sign(geometry.axes @ self._normal), 1.0)
-        # How the slides move the tool along the normal.
+        # Motion of the tool along the normal per unit of each slide.
         self._lifts = np.where(revolute, 0.0, geometry.axes @ self._normal)
         self._lifting = lifting
         non_redundant = complement(geometry.n, redundant)
@@ -91,7 +91,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             self._angle = task_map
             self._angle_sense = np.sign(self._normal[task_map.world_axis])
             kinds = "".join(kinds.rsplit("R", 1))
-        # Heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
+        # Heights above the plane are set to zero, and the part of the rows due to the tool's height is subtracted.
         self._height = self._normal @ geometry.tool_position
         self._offset = self._rows @ self._normal * self._height
         self._lift = basis.T @ np.linalg.pinv(self._rows @ basis.T)
@@ -105,7 +105,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         super().__init__(flat, redundant, _LABELS[kinds])
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
-        """Compute det J_nr, but for the slide along the normal, from velocities in the plane and about the normal."""
+        """Compute det J_nr, without the slide along the normal, from velocities in the plane and about the normal."""
         screws = self._chain.screws_at(q * self._senses)
         columns = screws.jacobian_columns(self._planar)
         directions = self._rows if len(self._planar) == 1 else self._plane
@@ -149,7 +149,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         goal: np.ndarray,
         angle: np.ndarray,
     ) -> list[np.ndarray]:
-        """Positions of three joints that turn the tool by an angle, (K,), and bring it to its goal, both (3, 1, K)."""
+        """Solve for three joints that turn the tool by an angle, (K,), and move it to its goal; both are (3, 1, K)."""
         normal = self._normal[:, None, None]
         first, second, last = joints
         anchor = next(i for i in (2, 0, 1) if joints[i].revolute)
@@ -171,7 +171,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         return values
 
     def _arrange(self, values: Sequence[np.ndarray], q_r: np.ndarray) -> np.ndarray:
-        """Arrange answers, m of (R, K): two follow each other as the branches do, one has its determinant's sign."""
+        """Arrange solutions, m of (R, K): two are in the order of branches, one belongs to its determinant's sign."""
         answers = np.stack(values, axis=2) * self._senses[self._joints]
         revolute = self._chain.revolute[self._joints]
         answers[..., revolute] = wrap(answers[..., revolute])
@@ -185,7 +185,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
 
 
 def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
-    """Direction to which all revolute axes are parallel and each slide parallel or perpendicular."""
+    """Return the direction to which revolute axes are parallel, and slides parallel or perpendicular."""
     turning = np.flatnonzero(geometry.revolute)
     if not len(turning):
         raise NotApplicableError("no joint is revolute")
@@ -203,7 +203,7 @@ def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
 
 
 def _basis(normal: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Two orthonormal vectors of the plane, (2, 3); the rows' own axes where these span it."""
+    """Return two orthonormal vectors of the plane, (2, 3); the axes of the rows if they span it."""
     if len(rows) == 2 and np.all(np.abs(rows @ normal) < tolerances.ANGLE):
         return rows
     first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
@@ -218,7 +218,7 @@ def _basis(normal: np.ndarray, rows: np.ndarray) -> np.ndarray:
 def planar(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> PlanarSolver:
-    """Fit the family: all joints move in one plane that the prescribed rows can see."""
+    """Fit the family: all joints move in one plane, which the prescribed rows determine."""
     if len(task_map.angles) > 1:
         raise NotApplicableError("this family does not solve orientations")
     normal = _plane_normal(geometry)
@@ -257,7 +257,7 @@ def planar(
 
 
 class PrismaticSolver(DeterminantSolver, FormulaSolver):
-    """Linear solver for prismatic non-redundant joints; see the module's formula."""
+    """Linear solver for prismatic non-redundant joints; see the formula of the module."""
 
     def __init__(
         self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
@@ -292,11 +292,11 @@ class PrismaticSolver(DeterminantSolver, FormulaSolver):
         return nan_where_negative(levels[:, :, None, None], solution)
 
     def margins(self, q: np.ndarray) -> np.ndarray:
-        """Return the determinant of D; no margin where D is constant."""
+        """Return the determinant of D; no margin if D is constant."""
         return super().margins(q)[:, : len(self.branches) - 1]
 
     def margin_signs(self, branch: int) -> np.ndarray:
-        """Return the sign of the determinant, where it is a margin."""
+        """Return the sign of the determinant, if it is a margin."""
         return super().margin_signs(branch)[: len(self.branches) - 1]
 
 

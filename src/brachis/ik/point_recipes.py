@@ -1,24 +1,24 @@
-"""Three joints a, b, c that bring a point W0 to a target W: E_a E_b E_c W0 = W.
+"""Three joints a, b, c that move a point W0 to a target W: E_a E_b E_c W0 = W.
 
-Each recipe solves for one joint after the other, and fits where something holds of a, b, c at all positions of the
-redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move; B is a point
-on the axis of b. Steps that have two answers are marked by *.
+Each recipe solves for one joint after the other. It needs a property of a, b, c that holds at all positions of the
+redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move, and B a point
+on the axis of b. Steps with two solutions are marked by *.
 
-    plane of b, c   * a: n . E_a^-1 W = n . W0 (one answer for a slide);  b and c within the plane
-    plane of a, b   * c: n . E_c W0 = n . W (one answer for a slide);  a and b within the plane
+    plane of b, c   * a: n . E_a^-1 W = n . W0 (one solution for a slide);  b and c within the plane
+    plane of a, b   * c: n . E_c W0 = n . W (one solution for a slide);  a and b within the plane
     a, b meet       * c: |E_c W0 - S| = |W - S|;  * b: a . E_b E_c W0 = a . W;  a by the angle
     b, c meet       * a: |E_a^-1 W - S| = |W0 - S|;  * c: b . E_c W0 = b . E_a^-1 W;  b by the angle
     cylinder        * g = +-sqrt(|b x (W - B)|^2 - (c . (W0 - B))^2);  * c: (b x c) . (E_c W0 - B) = g;  b by the angle;
                     then the slide a along the axis of b, to which that of c is perpendicular
 
-Within a plane two joints that turn, or one that turns and one that slides, meet at a distance (*); two that slide are
-a linear system. A step that brings a position to a component or a distance tells its answers apart by the sign of that
-condition's derivative (`screws`). The factors of a recipe are these derivatives, as functions of the posture: their
-product is the determinant of the centre's Jacobian, up to its sign.
+Within a plane, two revolute joints, or a revolute and a prismatic one, follow from a distance (*); two prismatic joints
+from a linear system. The solutions of a step that sets a component or a distance of a position are distinguished by the
+sign of the derivative of this condition (`screws`). The factors of a recipe are these derivatives, as functions of the
+posture. Up to the sign, their product is the determinant of the Jacobian of the centre.
 
-Labels follow the senses of the joint axes. On an industrial arm whose axes 1, 2, 3 are z, y, y, and with these three
-joints left over to place a point (the wrist's centre, or the tool): ``front`` where it is on the side to which joint 1
-faces, ``up`` where joint 3 bends forwards.
+Labels follow the senses of the joint axes. Consider an industrial arm whose axes 1, 2, 3 are z, y, y, and whose first
+three joints place a point (the centre of the wrist, or the tool). The label is ``front`` if the point is on the side to
+which joint 1 faces, and ``up`` if joint 3 bends forwards.
 
 Sources: D. L. Pieper, The kinematics of manipulators under computer control, PhD thesis, Stanford 1968 (the wrist's
 centre first); B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985 (subproblems);
@@ -26,18 +26,18 @@ A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subprobl
 parallel or meet, beside a spherical wrist); M. Brandstoetter, A. Angerer, M. Hofbaur, "An analytical solution of the
 inverse kinematics problem of industrial serial manipulators with an ortho-parallel basis and a spherical wrist", 2014.
 
-Three joints that bring the tool to a position, whatever its orientation; all others are redundant.
+The family `positioning` has three joints that move the tool to a position, whatever its orientation. All other joints
+are redundant.
 
-With the redundant joints held, let W0 be the tool while the three joints a, b, c are at zero. They bring it to the
-target W,
+With the redundant joints held, let W0 be the tool with the three joints a, b, c at zero. They move it to the target W,
 
     E_a E_b E_c W0 = W,
 
-by one of the recipes above. Redundant joints may stand before, between and after them: these place the axes and W0,
-sample by sample. Seen from the tool the equation is E_c^-1 E_b^-1 E_a^-1 W = W0, where the first becomes the last
-joint, and target and tool change places; it serves where a recipe fits in this order alone.
+by one of the recipes above. Redundant joints may be before, between and after them: they place the axes and W0, sample
+by sample. Seen from the tool, the equation is E_c^-1 E_b^-1 E_a^-1 W = W0: the order of the joints is reversed, and
+target and tool change places. It is used if a recipe only fits in this order.
 
-Branches are told apart by the signs of the recipe's two factors.
+Branches are distinguished by the signs of the two factors of the recipe.
 """
 
 from __future__ import annotations
@@ -63,11 +63,11 @@ UP = 1
 """Slot of a recipe's second step."""
 
 Values = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Positions of a, b, c, with one or two answers along the slots, NaN where the target is out of reach."""
+"""Positions of a, b, c, with one or two solutions along the slots; NaN if the target is out of reach."""
 
 
 def solve_plane_of_last(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for a, so that b and c have to act within their plane alone."""
+    """Solve for a first; b and c then act within their plane."""
     a, b, c = arm.base
     normal = plane_normal(b, c)
     orbit = a.inverse.orbit(target)
@@ -76,7 +76,7 @@ def solve_plane_of_last(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_plane_of_first(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for c, so that a and b have to act within their plane alone."""
+    """Solve for c first; a and b then act within their plane."""
     a, b, c = arm.base
     normal = plane_normal(a, b)
     orbit = c.orbit(arm.centre)
@@ -85,7 +85,7 @@ def solve_plane_of_first(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for c by the distance from the point where a and b meet."""
+    """Solve for c first, from the distance to the point where a and b meet."""
     a, b, c = arm.base
     outer = c.orbit(arm.centre)
     away = target - arm.meeting
@@ -96,7 +96,7 @@ def solve_meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for a by the distance from the point where b and c meet."""
+    """Solve for a first, from the distance to the point where b and c meet."""
     a, b, c = arm.base
     outer = a.inverse.orbit(target)
     away = arm.centre - arm.meeting
@@ -109,7 +109,7 @@ def solve_meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_cylinder(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for the centre's place in front of, or behind, the common direction of a and b; then for c."""
+    """Solve for the centre's distance in front of, or behind, the common direction of a and b; then for c."""
     a, b, c = arm.base
     front = cross(b.axis, c.axis)
     away = target - b.point
@@ -134,9 +134,9 @@ def plane_normal(first: Screw, second: Screw) -> np.ndarray:
 def move_within_plane(
     first: Screw, second: Screw, start: np.ndarray, end: np.ndarray, slot: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve for two joints that bring `start` to `end` within the plane in which both move.
+    """Solve for two joints that move `start` to `end` within their common plane.
 
-    The two answers follow each other along the axis `slot`; two slides have one.
+    The two solutions follow each other along the axis `slot`; two slides have only one.
     """
     if first.revolute:
         orbit = second.orbit(start)
@@ -156,15 +156,15 @@ def move_within_plane(
 
 
 def _across(arm: Arm, joint: int, plane: tuple[int, int]) -> np.ndarray:
-    """Velocity that a joint gives the centre across the plane of two others."""
+    """Return the velocity of the centre normal to the plane of two other joints that a joint causes."""
     normal = plane_normal(*(arm.screws[i] for i in plane))
     return dot(normal, arm.screws[joint].velocity(arm.centre))
 
 
 def _area(arm: Arm, plane: tuple[int, int]) -> np.ndarray:
-    """Area spanned by the velocities that two joints which move in one plane give the centre, up to its sign.
+    """Return the area spanned by the velocities of the centre due to two joints of one plane, up to its sign.
 
-    For two slides it is the length of `plane_normal`, and counted there.
+    For two slides, it is the length of `plane_normal`, which already contains it.
     """
     first, second = (arm.screws[i] for i in plane)
     if first.revolute:
@@ -175,24 +175,24 @@ def _area(arm: Arm, plane: tuple[int, int]) -> np.ndarray:
 
 
 def _along(arm: Arm, joint: int, axis: int) -> np.ndarray:
-    """Velocity that a joint gives the centre along the axis of another one."""
+    """Return the velocity of the centre along the axis of another joint that a joint causes."""
     return dot(arm.screws[axis].axis, arm.screws[joint].velocity(arm.centre))
 
 
 def _approach(arm: Arm, joint: int, sign: float) -> np.ndarray:
-    """Velocity that a joint gives the centre towards, or away from, where two others meet, times its distance."""
+    """Return the velocity of the centre towards, or away from, the meeting point of two others, times the distance."""
     direction = sign * (arm.meeting - arm.centre)
     return dot(direction, arm.screws[joint].velocity(arm.centre))
 
 
 def _in_front(arm: Arm) -> np.ndarray:
-    """How far the centre is in front of the axis of b, as that of c sees it."""
+    """Return how far the centre is in front of the axis of b, as seen along the axis of c."""
     _, b, c = arm.base
     return dot(cross(b.axis, c.axis), arm.centre - b.point)
 
 
 def _to_front(arm: Arm) -> np.ndarray:
-    """Velocity that c gives the centre to the front."""
+    """Return the velocity of the centre to the front that c causes."""
     _, b, c = arm.base
     return dot(cross(b.axis, c.axis), c.velocity(arm.centre))
 
@@ -204,13 +204,13 @@ class Recipe:
     Attributes
     ----------
     fits : callable or None
-        Whether it applies to joints; None where axes have to meet.
+        Tells whether the recipe fits joints; None if axes must meet.
     meets : tuple of int
-        Two joints whose axes have to meet, in `Arm.meeting`; empty where none have to.
+        Two joints whose axes must meet, in `Arm.meeting`; empty if no axes must meet.
     solve : callable
-        Positions of a, b, c from the screws while the joints are at zero, and the target of their centre.
+        Returns the positions of a, b, c from the screws at zero and the target of the centre.
     factors : tuple of Factor
-        Of the slots `FRONT` and `UP`.
+        Factors of the slots `FRONT` and `UP`.
     """
 
     fits: Callable[[RemainingJoints], bool] | None
@@ -220,7 +220,7 @@ class Recipe:
 
 
 def _are_coplanar(joints: RemainingJoints, i: int, j: int) -> bool:
-    """Whether two joints move positions in planes of one and the same direction."""
+    """Tell whether two joints move positions in parallel planes."""
     if joints.revolute[i] and joints.revolute[j]:
         return joints.are_parallel(i, j)
     if joints.revolute[i] or joints.revolute[j]:
@@ -229,7 +229,7 @@ def _are_coplanar(joints: RemainingJoints, i: int, j: int) -> bool:
 
 
 def _are_cylindrical(joints: RemainingJoints) -> bool:
-    """Whether the first joint slides along the second's axis, and the third's is perpendicular to it."""
+    """Tell whether the first joint slides along the axis of the second, and the third axis is perpendicular."""
     return (
         joints.revolute[:3].tolist() == [False, True, True]
         and joints.are_parallel(0, 1)
@@ -284,17 +284,17 @@ RECIPES = (
         (Factor(_in_front, _FRONT), Factor(_to_front, _UP)),
     ),
 )
-"""The first one that fits is taken."""
+"""All recipes; the first one that fits is used."""
 
 
 def choose_recipe(point: str, joints: RemainingJoints) -> tuple[Recipe, Anchor | None]:
-    """Find the recipe by which the first three joints place a point, which is called so in messages.
+    """Find the recipe by which the first three joints place a point; `point` is its name for messages.
 
     Returns
     -------
     recipe : Recipe
     meeting : Anchor or None
-        Where two of their axes meet, if it matters.
+        Point where two of the axes meet, if the recipe needs it.
 
     Raises
     ------
@@ -314,16 +314,16 @@ def choose_recipe(point: str, joints: RemainingJoints) -> tuple[Recipe, Anchor |
 
 
 class PositioningSolver(FactoredSolver):
-    """Closed form of three joints for the tool's position; see the module's formulas.
+    """Closed form of three joints for the position of the tool; see the formulas of the module.
 
     Parameters
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
     joints : RemainingJoints
-        In the order in which they are solved for.
+        The joints, in the order in which the solver solves for them.
     rows : sequence of int
-        World axes (0, 1, 2) of the target's coordinates.
+        Indices of the world axes (0, 1, 2) of the target's coordinates.
 
     Raises
     ------
@@ -361,7 +361,7 @@ class PositioningSolver(FactoredSolver):
 def positioning(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> PositioningSolver:
-    """Fit the family: the tool's position alone is prescribed, and three joints are left over for it."""
+    """Fit the family: only the position of the tool is prescribed, and three joints remain."""
     if task_map.angles or len(task_map.axes) != 3:
         raise NotApplicableError("this family solves only the position: x, y and z")
     three = RemainingJoints.of(geometry, redundant, 3)

@@ -1,4 +1,4 @@
-"""What a closed-form inverse kinematics solver is, and how a family of them is declared."""
+"""The protocol of solvers for closed-form inverse kinematics, and the declaration of families of solvers."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class IKSolver(ABC):
     Attributes
     ----------
     branches : tuple of str
-        Labels of the B branches, each different. A label names a geometric choice (elbow to one side or the other), so
-        that a continuous joint curve keeps its label until a branch margin reaches zero.
+        Labels of the B branches, all different. A label names a geometric choice (the elbow on one side or the other).
+        A continuous joint curve keeps its label until a branch margin reaches zero.
     alternatives : int
-        How many answers a branch may have, A: those that no geometric choice tells apart. Along a curve they are told
-        apart by continuity alone. One, unless a family says otherwise.
+        Largest number of solutions of a branch, A. No geometric choice distinguishes them; along a curve, they are
+        distinguished by continuity alone. Default: 1.
     """
 
     branches: tuple[str, ...]
@@ -33,32 +33,33 @@ class IKSolver(ABC):
 
     @abstractmethod
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Non-redundant joints of every branch.
+        """Solve for the non-redundant joints in every branch.
 
         Parameters
         ----------
         targets : (K, c) ndarray
             Task coordinates; see `TaskMap` (for poses c = 12: position, then the rotation matrix row by row).
         q_r : (K, r) ndarray
-            Redundant joints, chain order.
+            Redundant joints, in chain order.
 
         Returns
         -------
         (K, B, A, m) ndarray
-            Chain order; angles in (-pi, pi] or any other turn; NaN without an answer, and after the last one.
+            Non-redundant joints, in chain order. Angles may be in any turn. NaN without a solution, and after the last
+            one.
         """
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
-        """Non-redundant joints of one branch, (K, A, m); see `solve`. Families to which this saves work override it."""
+        """Solve for one branch, (K, A, m); see `solve`. Override this method if it saves work."""
         return self.solve(targets, q_r)[:, branch]
 
     @abstractmethod
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Smooth functions of the posture that are positive inside a branch and zero at its boundary.
+        """Return smooth functions of the posture that are positive inside a branch and zero at its boundary.
 
-        They must be analytic and accept complex postures: their derivatives are taken by complex steps.
+        They must be analytic and accept complex postures, because their derivatives are computed by complex steps.
 
         Parameters
         ----------
@@ -70,20 +71,20 @@ class IKSolver(ABC):
         Returns
         -------
         (K, k) ndarray
-            Dimensionless, of the order of one in the middle of the branch.
+            Dimensionless margins, of the order of one in the middle of the branch.
         """
 
     def branch_formula(self, branch: int, *counts: int) -> Formula | None:
-        """Return the formula of `solve_branch`, of so many task coordinates and redundant joints.
+        """Return the formula of `solve_branch`, for given numbers of task coordinates and redundant joints.
 
-        None but in `FormulaSolver`: the planner then asks `solve_branch`.
+        None except in a `FormulaSolver`; the planner then calls `solve_branch`.
         """
         return None
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
-        """Return the formulas of margins and slopes in postures of n joints.
+        """Return the formulas of the margins and their slopes in postures of n joints.
 
-        None but in `FormulaMargins`: the planner then asks `branch_margins` and `margin_gradient`.
+        None except in `FormulaMargins`; the planner then calls `branch_margins` and `margin_gradient`.
         """
         return None
 
@@ -98,19 +99,19 @@ class IKSolver(ABC):
 
 
 class FormulaMargins(IKSolver):
-    """Closed form whose margins are formulas, which the compiled library evaluates.
+    """Closed form whose margins are formulas that the compiled library evaluates.
 
-    They are written with NumPy, and recorded when they are first needed: see `brachis.kernel.formula` for what they may
-    do.
+    They are written with NumPy, and recorded when they are first needed. See `brachis.kernel.formula` for the allowed
+    operations.
     """
 
     @abstractmethod
     def margins(self, q: np.ndarray) -> np.ndarray:
-        """Branch margins, (K, k), before they are multiplied by `margin_signs`."""
+        """Compute the branch margins, (K, k), before the multiplication by `margin_signs`."""
 
     @abstractmethod
     def margin_signs(self, branch: int) -> np.ndarray:
-        """Signs of the margins in a branch, (k,)."""
+        """Return the signs of the margins in a branch, (k,)."""
 
     @cached_property
     def _formulas(self) -> dict[object, Formula]:
@@ -119,7 +120,7 @@ class FormulaMargins(IKSolver):
     def _formula(
         self, key: object, make: Callable[..., Formula], *arguments: Any
     ) -> Formula:
-        """Return the formula of a key; it is made if it has not been."""
+        """Return the formula of a key, which is recorded if necessary."""
         if key not in self._formulas:
             self._formulas[key] = make(*arguments)
         return self._formulas[key]
@@ -131,7 +132,7 @@ class FormulaMargins(IKSolver):
         return self._formula(("slopes", n), Formula.gradient, self.margins, n)
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
-        """Return margins and slopes with the branch's signs; None where a subclass computes one of them itself."""
+        """Return margins and slopes with the signs of a branch; None if a subclass computes one of them itself."""
         solver_type = type(self)
         if solver_type.branch_margins is not FormulaMargins.branch_margins:
             return None
@@ -151,11 +152,11 @@ class FormulaMargins(IKSolver):
 
 
 class FormulaSolver(FormulaMargins):
-    """Closed form whose answers are formulas too."""
+    """Closed form whose solutions are formulas, too."""
 
     @abstractmethod
     def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Non-redundant joints, (K, B, A, m), as of `solve`; one of them is not finite where there is no answer."""
+        """Compute the joints as in `solve`, (K, B, A, m); without a solution, one of them is not finite."""
 
     def _of_all(self, *counts: int) -> Formula:
         make = partial(Formula.of, discards_incomplete=True)
@@ -166,25 +167,25 @@ class FormulaSolver(FormulaMargins):
         return self._formula(key, self._of_all(*counts).select, branch)
 
     def branch_formula(self, branch: int, *counts: int) -> Formula | None:
-        """Return the part of a branch of the answers; None where a subclass has a `solve_branch` of its own."""
+        """Return the formula of the solutions in one branch; None if a subclass overrides `solve_branch`."""
         if type(self).solve_branch is not FormulaSolver.solve_branch:
             return None
         return self._of_branch(branch, *counts)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Evaluate the answers of all branches."""
+        """Evaluate the solutions of all branches."""
         return self._of_all(targets.shape[1], q_r.shape[1])(targets, q_r)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
-        """Evaluate the answers of one branch."""
+        """Evaluate the solutions of one branch."""
         counts = targets.shape[1], q_r.shape[1]
         return self._of_branch(branch, *counts)(targets, q_r)
 
 
 class NotApplicableError(Exception):
-    """A family does not fit a decomposition; the message is the reason, shown to the user."""
+    """A family does not fit a decomposition. The message is the reason, which is shown to the user."""
 
 
 Build = Callable[[ChainGeometry, TaskMap, tuple[int, ...]], IKSolver]
@@ -201,7 +202,7 @@ class Family:
         ``build(geometry, task_map, redundant)`` returns a solver for the redundant joints with these indices, or
         raises `NotApplicableError` with the reason.
     source : str
-        Where the formulas come from.
+        Source of the formulas.
     """
 
     name: str
@@ -212,6 +213,6 @@ class Family:
 def ik_family(name: str, *, source: str) -> Callable[[Build], Family]:
     """Declare a function as a family (decorator).
 
-    The result is handed to `brachis.ik.find`, or published by another package in the entry-point group ``brachis.ik``.
+    Pass the result to `brachis.ik.find`, or publish it from another package in the entry-point group ``brachis.ik``.
     """
     return partial(Family, name, source=source)

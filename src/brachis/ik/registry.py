@@ -1,10 +1,11 @@
-"""Finding a closed form for a choice of redundant joints, by geometry.
+"""Search for a closed form for a choice of redundant joints, by geometry.
 
-The families are listed in `BUILTIN`; other packages add theirs through the entry-point group ``brachis.ik``, whose
-entries are `Family` objects (see `ik_family`). No answer is believed: a solver is returned only after its answers have
-been put into the chain's forward kinematics (`check_answers`).
+The families are listed in `BUILTIN`. Other packages add theirs through the entry-point group ``brachis.ik``, whose
+entries are `Family` objects (see `ik_family`). A solver is returned only after its solutions have been checked with the
+forward kinematics of the chain (`check_answers`).
 
-Where no family fits the chain as it is, the ideal one is tried that it almost is (`snap_axes`); answers are polished.
+If no family fits the chain itself, the families are tried on the ideal chain that is closest to it (`snap_axes`). The
+solutions are then polished.
 """
 
 from __future__ import annotations
@@ -43,29 +44,29 @@ BUILTIN: tuple[Family, ...] = (
     parallel_axes,
     eaik,
 )
-"""In the order in which they are tried."""
+"""The built-in families, in the order in which they are tried."""
 _FAILED = "its code failed"
 NO_CLOSED_FORM = (
     "no choice of redundant joints has a closed form: "
     "motions are planned from differential inverse kinematics"
 )
-"""What is said of a robot and a task space without any closed form."""
+"""Message for a robot and a task space without any closed form."""
 
 
 @dataclass(frozen=True)
 class TriedDecomposition:
-    """One choice of redundant joints and what is known of its closed form.
+    """One choice of redundant joints, and the result of the search for its closed form.
 
     Attributes
     ----------
     redundant_joints : tuple of str
     family : str or None
-        The family that fits, None where none does.
+        The family that fits; None if none does.
     solver : IKSolver or None
     reasons : dict of str to str
-        Why the other families that were tried do not fit.
+        Reasons why the other families that were tried do not fit.
     remark : str
-        What else there is to know of the solver; empty where there is nothing.
+        Remark about the solver; empty without one.
     """
 
     redundant_joints: tuple[str, ...]
@@ -77,14 +78,14 @@ class TriedDecomposition:
 
 @dataclass(frozen=True)
 class Match(TriedDecomposition):
-    """A choice of redundant joints that has a closed form."""
+    """A choice of redundant joints with a closed form."""
 
     family: str
     solver: IKSolver
 
 
 def check_families(families: Sequence[Family]) -> None:
-    """Refuse what is not a list of families with names of their own.
+    """Refuse anything except a list of families with unique names.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def check_families(families: Sequence[Family]) -> None:
 
 
 def _refuse_name(name: object, taken: Collection[str]) -> str | None:
-    """Say why a family cannot have a name; None if it can."""
+    """Return the reason why a family cannot have a name; None if it can."""
     if not isinstance(name, str) or not name.strip():
         return "a family needs a name"
     return "a family of this name exists already" if name in taken else None
@@ -123,7 +124,7 @@ def _refuse_name(name: object, taken: Collection[str]) -> str | None:
 
 @cache
 def plugin_families() -> tuple[Family, ...]:
-    """Families of other packages, from the entry-point group ``brachis.ik``; a broken one says so when it is tried."""
+    """Return the families of the entry-point group ``brachis.ik``; a broken one is reported when it is tried."""
     return tuple(
         _load(entry) for entry in importlib.metadata.entry_points(group="brachis.ik")
     )
@@ -144,7 +145,7 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
             reason = problem
 
     def refuse(*_arguments: object) -> IKSolver:
-        """Say why the family cannot be used."""
+        """Raise the reason why the family cannot be used."""
         raise NotApplicableError(reason)
 
     return Family(entry.name, refuse, entry.value)
@@ -164,9 +165,9 @@ def find(
     robot : Robot
     task_map : TaskMap
     redundant_joints : sequence of str
-        As many as the robot has joints more than the task space has rows.
+        The redundant joints. Their number is that of the robot's joints minus the rows of the task space.
     families : sequence of Family, optional
-        Tried before the built-in and installed ones.
+        Families to try before the built-in and installed ones.
 
     Returns
     -------
@@ -177,7 +178,8 @@ def find(
     UnknownNameError
         A redundant joint does not exist.
     DecompositionError
-        The number of redundant joints is wrong, or no family fits; lists the reasons and the choices that have one.
+        The number of redundant joints is wrong, or no family fits. The error lists the reasons, and the choices that
+        have a closed form.
     """
     names = tuple(redundant_joints)
     _check_names(robot, task_map, names)
@@ -197,7 +199,7 @@ def find(
 
 
 def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> None:
-    """Refuse redundant joints that do not exist, or that are too many or too few.
+    """Refuse redundant joints that do not exist, and a wrong number of them.
 
     Raises
     ------
@@ -230,7 +232,7 @@ def find_all(
 ) -> list[TriedDecomposition]:
     """Try every choice of redundant joints; see `find`. Paths of joints need no closed form.
 
-    A virtual joint of the tool that has a range is always among them: closed forms know no ranges.
+    A virtual joint of the tool with a range is always redundant, because closed forms do not respect ranges.
     """
     r = robot.n - task_map.m
     if r < 0 or isinstance(task_map, JointSpace):
@@ -243,7 +245,7 @@ def find_all(
 
 
 class _Matcher:
-    """The families to try on a robot, and the ideal arms that it almost is.
+    """The families to try on a robot, and the ideal arms close to it.
 
     Parameters
     ----------
@@ -262,17 +264,17 @@ class _Matcher:
 
     @cached_property
     def _ideal(self) -> SnappedChain | None:
-        """The ideal arm within the tolerance; redundant joints have no part in it."""
+        """The ideal arm within the tolerance; it does not depend on the redundant joints."""
         return snap_axes(self._geometry, self._task_map)
 
     @cached_property
     def _rough(self) -> SnappedChain | None:
-        """The ideal arm whose axes are so near (rad, m) that they may be meant to be there."""
+        """The ideal arm within a large tolerance (rad, m), which may be the intended one."""
         return snap_axes(self._geometry, self._task_map, 2e-3)
 
     @cached_property
     def _content(self) -> bytes:
-        """All that the answer depends on, apart from the families."""
+        """Everything on which the result depends, except the families."""
         geometry = self._geometry
         task_map = self._task_map
         content = (
@@ -285,7 +287,7 @@ class _Matcher:
         return pickle.dumps(content)
 
     def match(self, names: tuple[str, ...]) -> TriedDecomposition:
-        """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
+        """Try every family on one choice; if none fits, try them on the ideal arm close to the robot."""
         redundant = tuple(sorted(self._robot.joint_names.index(name) for name in names))
         key = (redundant, self._content, *map(id, self._families))
         if key in _KNOWN:
@@ -295,7 +297,7 @@ class _Matcher:
             if len(_KNOWN) >= _MOST_KNOWN:
                 _KNOWN.clear()
             reasons = tried.reasons.values()
-            # Not where a library is missing, or code of another package failed: that may change.
+            # Not if a library is missing, or if code of another package failed: that may change.
             if not any(
                 reason.startswith((NOT_INSTALLED, _FAILED)) for reason in reasons
             ):
@@ -320,7 +322,7 @@ class _Matcher:
         reasons: dict[str, str],
         ideal: SnappedChain | None,
     ) -> Match | None:
-        """Find the first family that fits the robot or the ideal arm; put down the others' reasons."""
+        """Find the first family that fits the robot or the ideal arm; record the reasons of the others."""
         geometry = ideal.geometry if ideal else self._geometry
         remark = ""
         for family in self._families:
@@ -348,7 +350,7 @@ class _Matcher:
     def _name_rounding(
         self, redundant: tuple[int, ...], reasons: dict[str, str]
     ) -> None:
-        """Put down which families would fit if the axes were nearer to the ideal arm's."""
+        """Record which families would fit if the axes were closer to those of the ideal arm."""
         rough = self._rough
         if rough is None or max(rough.turned, rough.shifted) < TOLERANCE:
             return
@@ -364,23 +366,23 @@ class _Matcher:
 
 
 _MOST_KNOWN = 256
-"""Choices of redundant joints whose closed forms are kept."""
+"""Largest number of choices of redundant joints whose closed forms are cached."""
 _KNOWN: dict[tuple[object, ...], tuple[tuple[Family, ...], TriedDecomposition]] = {}
-"""Closed forms, for their formulas have to be recorded once only; and families, whose ids are in the keys."""
+"""Closed forms, whose formulas are thus recorded only once; and families, whose ids are in the keys."""
 
 
 def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:
-    """Say which choices of redundant joints EAIK might add, and how to get it.
+    """Describe the choices of redundant joints that EAIK might add, and how to install it.
 
     Parameters
     ----------
     tried : sequence of TriedDecomposition
-        All choices, as `find_all` returns them.
+        All choices, as returned by `find_all`.
 
     Returns
     -------
     str
-        A sentence without its full stop; empty where EAIK is installed or would add nothing.
+        A sentence without its full stop; empty if EAIK is installed or would add nothing.
     """
     further = [
         choice.redundant_joints
@@ -397,9 +399,9 @@ def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:
 
 
 def default_task_space(robot: Robot) -> str | list[str]:
-    """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves.
+    """Return the default task space: a whole pose, three rows, or the rows of the plane in which a robot moves.
 
-    Where all joints that turn are along one axis of the world, the angle about it is the fourth row.
+    If all revolute joints are along one axis of the world, the angle about it is the fourth row.
     """
     geometry = ChainGeometry.of(robot)
     sizes = np.abs(geometry.axes)

@@ -1,16 +1,15 @@
-"""One joint as a screw, and the circle or line on which it moves a position.
+"""A joint as a screw, and the circle or line on which it moves a position.
 
-A step of a closed form puts a condition on a position that one joint moves: a component along a direction, or a
-distance. On a circle either is ``a cos + b sin = c`` with two roots; on a line a component is linear and a distance
-quadratic. Roots are told apart by the sign of the condition's derivative, so that a root keeps its place along any
-continuous curve until the two meet: see Subproblems 1 to 4 of A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse
-kinematics using subproblem decomposition", 2022, whose solutions are in no such order.
+A step of a closed form has a condition for a position that one joint moves: a component along a direction, or a
+distance. On a circle, both conditions have the form ``a cos + b sin = c``, with two roots. On a line, a component is
+linear and a distance quadratic. Roots are distinguished by the sign of the condition's derivative, so a root keeps its
+place along any continuous curve until the two meet. See Subproblems 1 to 4 of A. J. Elias, J. T. Wen, "IK-Geo: unified
+robot inverse kinematics using subproblem decomposition", 2022, where the solutions have no such order.
 
-Vectors have their components along the first axis, then come the alternatives (one axis for each step with
-two of them) and the samples; joint positions have alternatives and samples alone.
+Vectors have their components along the first axis, followed by the alternatives (one axis for each step with two
+solutions) and the samples. Joint positions only have alternatives and samples.
 
-`ChainGeometry` has the screw axes of a chain, taken from the Pinocchio model; the closed forms match and compute with
-these alone.
+`ChainGeometry` has the screw axes of a chain, from the Pinocchio model. The closed forms only use these axes.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ class Screw:
     axis : (3, ...) ndarray
         Unit direction.
     point : (3, ...) ndarray
-        m; without meaning for a slide.
+        A point on the axis, m; without meaning for a slide.
     revolute : bool
     """
 
@@ -46,7 +45,7 @@ class Screw:
 
     @property
     def inverse(self) -> Screw:
-        """The joint that undoes this one."""
+        """The joint with the inverse motion."""
         return Screw(-self.axis, self.point, self.revolute)
 
     def velocity(self, position: np.ndarray) -> np.ndarray:
@@ -54,7 +53,7 @@ class Screw:
         return cross(self.axis, position - self.point) if self.revolute else self.axis
 
     def orbit(self, position: np.ndarray) -> Circle | Line:
-        """Where the joint moves a position."""
+        """Return the circle or line on which the joint moves a position."""
         if not self.revolute:
             return Line(position, self.axis)
         circle = Circle.of(self.axis, position - self.point)
@@ -76,16 +75,16 @@ class Circle:
         return cls(middle, vector - middle, cross(axis, vector))
 
     def at(self, angle: np.ndarray) -> np.ndarray:
-        """Position at an angle, (3, ...)."""
+        """Return the position at an angle, (3, ...)."""
         turned = self.arm * formula.cos(angle) + self.across * formula.sin(angle)
         return turned + self.middle
 
     def component(
         self, direction: np.ndarray, level: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Angles at which ``direction . position = level``: growing with the angle at the first, falling at the second.
+        """Return the angles at which ``direction . position = level``: it rises at the first, falls at the second.
 
-        The two follow each other along the axis `slot`; NaN where the level is out of reach.
+        The two angles follow each other along the axis `slot`. They are NaN if the level is out of reach.
         """
         level = level - dot(direction, self.middle)
         return cosine_roots(
@@ -95,7 +94,7 @@ class Circle:
     def distance(
         self, position: np.ndarray, squared: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Angles at a distance from another position: approaching it at the first, leaving it at the second."""
+        """Return the angles at a distance from another position: approaching it first, leaving it second."""
         away = position - self.middle
         level = 0.5 * (dot(away, away) + dot(self.arm, self.arm) - squared)
         return cosine_roots(dot(away, self.arm), dot(away, self.across), level, slot)
@@ -114,19 +113,19 @@ class Line:
     axis: np.ndarray
 
     def at(self, slide: np.ndarray) -> np.ndarray:
-        """Position after a slide, (3, ...)."""
+        """Return the position after a slide, (3, ...)."""
         return self.start + self.axis * slide
 
     def component(
         self, direction: np.ndarray, level: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Return the slide at which ``direction . position = level``; it is the only one, so `slot` is not used."""
+        """Return the slide at which ``direction . position = level``. It is the only one, so `slot` is not used."""
         return (level - dot(direction, self.start)) / dot(direction, self.axis)
 
     def distance(
         self, position: np.ndarray, squared: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Slides at a distance from another position: approaching it at the first, leaving it at the second."""
+        """Return the slides at a distance from another position: approaching it first, leaving it second."""
         away = position - self.start
         nearest = dot(self.axis, away)
         root = formula.sqrt(nearest * nearest - dot(away, away) + squared)
@@ -135,7 +134,7 @@ class Line:
 
 @dataclass(frozen=True)
 class PosedScrews:
-    """Screw axes of a chain at K postures, in the world frame; components along the first axis (see `vectors`).
+    """Screw axes of a chain in K postures, in the world frame; components are along the first axis (see `vectors`).
 
     Attributes
     ----------
@@ -156,7 +155,7 @@ class PosedScrews:
     revolute: np.ndarray
 
     def jacobian_columns(self, joints: Sequence[int]) -> np.ndarray:
-        """Columns (6, len(joints), K) of the tool's Jacobian: linear, then angular velocity, in world axes."""
+        """Return columns of the tool's Jacobian, (6, len(joints), K): linear, then angular velocity, in world axes."""
         chosen = list(joints)
         axes = self.axes[:, chosen]
         turns = self.revolute[chosen][:, None]
@@ -166,7 +165,7 @@ class PosedScrews:
         )
 
     def pick(self, joints: Sequence[int], alternatives: int) -> tuple[Screw, ...]:
-        """Pick joints; vectors are (3, ..., K), with `alternatives` axes of length one before the postures."""
+        """Select joints; vectors are (3, ..., K), with `alternatives` axes of length one before the postures."""
         spread = (slice(None), *[None] * alternatives)
         return tuple(
             Screw(
@@ -178,13 +177,13 @@ class PosedScrews:
         )
 
     def determinant(self, joints: Sequence[int]) -> np.ndarray:
-        """Compute det J_nr (K,) of six joints for a pose, or of three for a position; real or complex, and analytic."""
+        """Compute det J_nr, (K,), of six joints for a pose, or three for a position; real or complex, and analytic."""
         return determinants(self.jacobian_columns(joints)[: len(joints)])
 
 
 @dataclass(frozen=True)
 class Poses:
-    """N poses, or the motions that bring the origin there; components along the first axis (see `vectors`).
+    """N poses, or the motions that move the origin there; components are along the first axis (see `vectors`).
 
     Attributes
     ----------
@@ -198,7 +197,7 @@ class Poses:
 
     @classmethod
     def of_targets(cls, targets: np.ndarray) -> Poses:
-        """Return the poses that task coordinates, (N, 12), stand for."""
+        """Return the poses given by task coordinates, (N, 12)."""
         return cls(
             targets[:, :3].T, np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2)
         )
@@ -209,21 +208,21 @@ class Poses:
         return cls(screws.tool_position, screws.tool_rotation)
 
     def targets(self) -> np.ndarray:
-        """Task coordinates, (N, 12)."""
+        """Return the task coordinates, (N, 12)."""
         rotations = np.moveaxis(self.rotation, 2, 0).reshape(-1, 9)
         return np.concatenate([self.position.T, rotations], axis=1)
 
     def move(self, point: np.ndarray) -> np.ndarray:
-        """Move points, (3, ...), as these poses move the origin's frame."""
+        """Move points, (3, ...), by these poses as motions."""
         return apply(self.rotation, point) + self.position
 
     def __matmul__(self, moved: Poses) -> Poses:
-        """Move other poses as these ones move the origin; N or 1 of each."""
+        """Move other poses by these poses as motions; N or 1 of each."""
         rotation = np.einsum("ij...,jk...->ik...", self.rotation, moved.rotation)
         return Poses(self.move(moved.position), rotation)
 
     def inverse(self) -> Poses:
-        """Return the motions that undo these."""
+        """Return the inverse motions."""
         return Poses(
             -apply_inverse(self.rotation, self.position),
             np.swapaxes(self.rotation, 0, 1),
@@ -243,45 +242,46 @@ class ChainGeometry(Chain):
 
     @classmethod
     def of(cls, robot: Robot) -> ChainGeometry:
-        """Take the screws of a robot's chain."""
+        """Return the geometry of a robot's chain."""
         chain = robot.chain
         arrays = {entry.name: getattr(chain, entry.name) for entry in fields(chain)}
         return cls(**arrays, joint_names=robot.joint_names)
 
     @cached_property
     def _generators(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """For each axis the matrices (3, 3) of Rodrigues' formula that sine and 1 - cosine of the angle go with.
+        """For each axis the two (3, 3) matrices of Rodrigues' formula, for the sine and for 1 - cosine of the angle.
 
-        They act from the left on the columns' index of rotation matrices (3, 3, K or 1): one product for all samples.
+        They are multiplied from the left onto the columns of rotation matrices, (3, 3, K or 1): one product for all
+        samples.
         """
         skews = [np.cross(axis, np.eye(3)) for axis in self.axes]
         return [(skew, skew @ skew) for skew in skews]
 
     @cached_property
     def random_screws(self) -> PosedScrews:
-        """Screws at random postures, which are the same every time: by them closed forms size up what varies."""
+        """Screws in random postures, always the same ones. Closed forms use them to see what varies."""
         rng = np.random.default_rng(1)
         return self.screws_at(rng.uniform(-np.pi, np.pi, (256, self.n)))
 
     def screws_at(self, q: np.ndarray) -> PosedScrews:
-        """Screw axes and tool placement at K postures, by the product of exponentials.
+        """Return screw axes and tool placement in K postures, by the product of exponentials.
 
         Parameters
         ----------
         q : (K, n) ndarray
-            Real, or complex for complex-step derivatives.
+            Postures, real, or complex for complex-step derivatives.
         """
         return self.screws_with(range(self.n), q)
 
     def screws_with(self, joints: Sequence[int], positions: np.ndarray) -> PosedScrews:
-        """Screw axes and tool placement where some joints are held at given positions and all others are zero.
+        """Return screw axes and tool placement with some joints at given positions and all others at zero.
 
         Parameters
         ----------
         joints : sequence of int
-            The joints that are held, ascending.
+            The joints at given positions, ascending.
         positions : (K, h) ndarray
-            Of these, rad or m.
+            Positions of these joints, rad or m.
         """
         count = len(positions)
         moving = dict(zip(joints, positions.T, strict=True))

@@ -1,13 +1,14 @@
-"""Chains whose axes are parallel, at right angles, or meet but for a rounded figure, as in rpy="1.5708 0 0".
+"""Chains whose axes are parallel, perpendicular or meeting up to rounded figures, as in rpy="1.5708 0 0".
 
-The ideal chain follows the given one from the base to the tool. What no joint turns against a joint's direction are the
-revolute joint before it and the slides in between. A direction that is parallel to one of these to within a tolerance
-becomes so; else one that is at a right angle to some of them. A revolute axis that meets the one before it, or nearly
-coincides with it, is moved there; where that one meets its own predecessor nearby, into the same point. Whatever is
-turned or moved carries the rest of the chain and the tool along, so that errors do not add up along the chain, and what
-follows from neighbours, as that all of three axes are parallel or meet in one point, holds for the others too.
+The ideal chain follows the given one from the base to the tool. The direction of a joint is compared with those that no
+joint turns relative to it: the direction of the revolute joint before it, and of the slides in between. If it is
+parallel to one of these to within a tolerance, it becomes exactly parallel. Otherwise, if it is perpendicular to some
+of them, it becomes exactly perpendicular. A revolute axis that meets the previous one, or nearly coincides with it, is
+moved there; if the previous axis meets its own predecessor nearby, it is moved into the same point. Every rotation or
+shift carries the rest of the chain and the tool along, so errors do not add up along the chain. Relations that follow
+from neighbours, such as three parallel axes or three axes that meet in one point, then hold exactly.
 
-Closed forms of the ideal chain miss the targets of the given one by little: Newton's method does the rest.
+The solutions of the ideal chain's closed forms are close to those of the given chain. Newton's method refines them.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4
-"""Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
+"""Axes this close to parallel or perpendicular (rad), or to meeting (m), are assumed to be intended so."""
 _SKEW = 1e-2
-"""Axes at a smaller angle (rad) have no point where they meet that could be trusted."""
+"""Axes at a smaller angle (rad) have no reliable meeting point."""
 
 
 @dataclass(frozen=True)
 class SnappedChain:
-    """A chain with exactly parallel, perpendicular and meeting axes near a given one.
+    """A chain with exactly parallel, perpendicular and meeting axes, close to a given one.
 
     Attributes
     ----------
     geometry : ChainGeometry
     turned : float
-        Largest angle by which an axis of the given chain misses its direction to those before it, rad.
+        Largest angle between an axis of the given chain and its ideal direction relative to the axes before it, rad.
     shifted : float
-        Largest distance by which one misses its place, m.
+        Largest distance between an axis and its ideal place, m.
     """
 
     geometry: ChainGeometry
@@ -52,27 +53,27 @@ class SnappedChain:
 
     @property
     def miss(self) -> str:
-        """How far the axes of the given chain are from the ideal ones, for messages."""
+        """Deviation of the given chain's axes from the ideal ones, for messages."""
         return f"{self.turned:.1e} rad and {self.shifted:.1e} m"
 
 
 def snap_axes(
     geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE
 ) -> SnappedChain | None:
-    """Make axes that are almost parallel, perpendicular or meeting so exactly.
+    """Make axes that are almost parallel, perpendicular or meeting exactly so.
 
     Parameters
     ----------
     geometry : ChainGeometry
     task_map : TaskMap
-        For positions the world's axes, and a tool on the last axis of rotation, matter as well.
+        For positions, the axes of the world and a tool on the last axis of rotation are taken into account as well.
     tolerance : float, optional
         rad for directions, m for points.
 
     Returns
     -------
     SnappedChain or None
-        None where the chain is ideal as it is.
+        None if the chain is already ideal.
     """
     pose = isinstance(task_map, Pose)
     chain = _Chain([] if pose else list(np.eye(3)), tolerance)
@@ -99,12 +100,12 @@ def snap_axes(
 
 
 class _Chain:
-    """What is known of the ideal chain up to some joint, and how it carries the rest of the given one.
+    """The ideal chain up to some joint, and the motion that it applies to the rest of the given chain.
 
     Parameters
     ----------
     fixed : list of (3,) ndarray
-        Directions in the world that matter to the first joints.
+        Directions in the world to which the first joints are compared.
     tolerance : float
     """
 
@@ -120,13 +121,13 @@ class _Chain:
         self._meets = False
 
     def carry(self, point: np.ndarray) -> np.ndarray:
-        """Carry a point of the given chain along."""
+        """Apply the motion to a point of the given chain."""
         return self.rotation @ point + self.offset
 
     def snap_direction(
         self, axis: np.ndarray, point: np.ndarray, *, revolute: bool
     ) -> np.ndarray:
-        """Direction of the next joint; turns the rest of the chain about its axis' point that is nearest."""
+        """Return the next joint's ideal direction; turn the rest of the chain about the closest point on its axis."""
         direction = self.rotation @ axis
         ideal = _nearest_ideal(direction, self._fixed, self._tolerance)
         pivot = (
@@ -140,7 +141,7 @@ class _Chain:
         return ideal
 
     def snap_point(self, axis: np.ndarray, point: np.ndarray) -> np.ndarray:
-        """Point on the axis of the next revolute joint; moves the rest of the chain to where the axis should be."""
+        """Return a point on the next revolute axis; move the rest of the chain to where the axis should be."""
         before, here = self._nearest(axis, self.carry(point))
         meets = False
         if self._axis is not None and np.linalg.norm(here - before) < self._tolerance:
@@ -157,7 +158,7 @@ class _Chain:
         return here
 
     def snap_tool(self, position: np.ndarray) -> None:
-        """Move the tool onto the last axis of rotation if it is meant to be there."""
+        """Move the tool onto the last axis of rotation if it is close to it."""
         if self._axis is not None:
             gap = self.carry(position) - self._point
             gap -= self._axis * (self._axis @ gap)
@@ -171,7 +172,7 @@ class _Chain:
     def _nearest(
         self, axis: np.ndarray, point: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points where the last axis and another one are nearest; where they are parallel, beside the last point."""
+        """Return the points where the last axis and another one are closest; beside the last point if parallel."""
         if self._axis is None:
             return point, point
         before = self._point
@@ -183,7 +184,7 @@ class _Chain:
 def _nearest_ideal(
     axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
-    """Direction exactly parallel to one of some others, else perpendicular to one or two of them, if it almost is."""
+    """Make a direction exactly parallel to one of others, else perpendicular to one or two, if it almost is."""
     for fixed_axis in fixed:
         if np.linalg.norm(np.cross(axis, fixed_axis)) < tolerance:
             return fixed_axis * np.sign(axis @ fixed_axis)
@@ -200,22 +201,22 @@ def _nearest_ideal(
 
 
 def _least_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Rotation (3, 3) that turns a direction to another one nearby the shortest way."""
+    """Return the shortest rotation, (3, 3), that turns a direction into another one close to it."""
     skew = np.cross(np.eye(3), np.cross(start, end))
     return np.eye(3) + skew + skew @ skew / (1.0 + start @ end)
 
 
 class PolishedSolver(IKSolver):
-    """Closed form of an ideal chain, made exact for the given one by Newton's method.
+    """Closed form of an ideal chain, refined for the given chain by Newton's method.
 
-    Answers are those of the ideal chain as far as the method leads from them to one beside them; labels and margins of
-    the branches are the ideal chain's. Where its margins are smaller than about the square root of how far the given
-    chain is from it, answers may be missing.
+    A solution of the ideal chain is used if the method leads from it to a solution next to it. Labels and margins of
+    the branches are those of the ideal chain. If its margins are smaller than about the square root of the deviation of
+    the given chain, solutions may be missing.
 
     Parameters
     ----------
     solver : IKSolver
-        Of the ideal chain.
+        Closed form of the ideal chain.
     geometry : ChainGeometry
         The given chain.
     task_map : TaskMap
@@ -242,20 +243,20 @@ class PolishedSolver(IKSolver):
         self._rest = complement(geometry.n, redundant)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Polish the answers of the ideal chain."""
+        """Polish the solutions of the ideal chain."""
         return self._polish(self.ideal.solve(targets, q_r), targets, q_r)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
-        """Polish the answers of one branch."""
+        """Polish the solutions of one branch."""
         answers = self.ideal.solve_branch(targets, q_r, branch)
         return self._polish(answers, targets, q_r)
 
     def _polish(
         self, answers: np.ndarray, targets: np.ndarray, q_r: np.ndarray
     ) -> np.ndarray:
-        """Polish answers (K, ..., m)."""
+        """Polish solutions, (K, ..., m)."""
         exists = np.isfinite(answers).all(axis=-1)
         sample = np.nonzero(exists)[0]
         q = np.empty((len(sample), len(self._redundant) + len(self._rest)))

@@ -1,4 +1,4 @@
-"""The check of a closed form before it is used: its answers and the slopes of its margins in random postures."""
+"""The check of a closed form before it is used: its solutions, and the slopes of its margins, in random postures."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import complement, difference
 
 _SLOPES = 10
-"""Postures inside a branch in which the slopes of its margins are checked."""
+"""Number of postures inside a branch in which the slopes of its margins are checked."""
 
 
 def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Branch margins, (K, k), without recording a formula: a single call is faster that way.
+    """Compute branch margins, (K, k), without recording a formula: this is faster for a single call.
 
     Raises
     ------
     NotApplicableError
-        They have another shape.
+        The margins have the wrong shape.
     """
     if isinstance(solver, FormulaMargins):
         return solver.margins(q) * solver.margin_signs(branch)
@@ -39,7 +39,7 @@ def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray
 def _compute_answers(
     solver: IKSolver, targets: np.ndarray, q_r: np.ndarray
 ) -> np.ndarray:
-    """Answers of all branches, (K, B, A, m), without recording a formula."""
+    """Compute the solutions of all branches, (K, B, A, m), without recording a formula."""
     if not isinstance(solver, FormulaSolver):
         return solver.solve(targets, q_r)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -52,9 +52,9 @@ def check_answers(
     redundant: tuple[int, ...],
     solver: IKSolver,
 ) -> None:
-    """Put a solver's answers for random postures into Pinocchio's forward kinematics.
+    """Check a solver's solutions for random postures with Pinocchio's forward kinematics.
 
-    Postures beside a branch's boundary are left out: there it is a matter of rounding whether there is an answer.
+    Postures next to the boundary of a branch are left out: there, rounding decides whether a solution exists.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ def check_answers(
     Raises
     ------
     NotApplicableError
-        Two branches have one label, an answer misses its target by more than 1e-8 m or rad, none of the answers is the
-        posture itself, or the slopes of the branch margins are wrong.
+        Two branches have the same label, a solution misses its target by more than 1e-8 m or rad, none of the solutions
+        is the posture itself, or the slopes of the branch margins are wrong.
     """
     if not isinstance(solver, IKSolver):
         raise NotApplicableError(f"it returned {solver!r:.60}, not an IKSolver")
@@ -106,14 +106,14 @@ def check_answers(
 
 
 def _check_slopes(solver: IKSolver, q: np.ndarray) -> None:
-    """Compare the slopes of the branch margins with central differences, in postures (K, n).
+    """Compare the slopes of the branch margins with central differences, in postures, (K, n).
 
-    Slopes that are derived from formulas need no check, and recording them takes long.
+    Slopes that are derived from formulas need no check, and recording them takes time.
 
     Raises
     ------
     NotApplicableError
-        They have the wrong shape, or are wrong in most postures inside a branch.
+        The slopes have the wrong shape, or are wrong in most postures inside a branch.
     """
     if isinstance(solver, PolishedSolver):
         solver = solver.ideal
@@ -154,7 +154,7 @@ def _postures_inside(robot: Robot, solver: IKSolver) -> np.ndarray:
     Raises
     ------
     NotApplicableError
-        No posture does.
+        No posture lies inside a branch.
     """
     low, high = ranges_to_check(robot)
     q = np.random.default_rng(1).uniform(low, high, (100, robot.n))
@@ -171,9 +171,9 @@ def _postures_inside(robot: Robot, solver: IKSolver) -> np.ndarray:
 
 
 def ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is.
+    """Return whole turns for angles, and ranges for slides: a boom need not be defined for negative lengths.
 
-    Of far ranges what is within 20 m of zero: positions in kilometres are not precise to the tolerances.
+    Large ranges are cut to 20 m around zero, because positions in kilometres are not accurate to the tolerances.
     """
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper

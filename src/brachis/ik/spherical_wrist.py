@@ -1,21 +1,21 @@
 """Six joints of which the last three, or the first three, have axes that meet in one point.
 
-Let W0 be this point while the six joints are at zero. Then E_1 ... E_6 = D (`FactoredSolver`) moves it to
+Let W0 be this point with the six joints at zero. Then E_1 ... E_6 = D (`FactoredSolver`) moves it to
 
     W = E_a E_b E_c W0 = D W0,
 
-for the last three, u, v, w, turn about it: equations for the first three, a, b, c, alone (`point_recipes`). What is
-left is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
+because the last three joints u, v, w turn about it. These equations contain only the first three joints a, b, c
+(`point_recipes`). What remains is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
 
-    v    u . R_v w = u . R w, two answers
+    v    u . R_v w = u . R w, two solutions
     u    turns R_v w to R w
     w    turns R^-1 u to R_v^-1 u
 
-If the first three meet instead (an arm with a spherical shoulder), the reverse equation E_6^-1 ... E_1^-1 = D^-1 is of
-the same form. Redundant joints may stand anywhere, even between axes that meet, if the point where they do stays at its
-place on one of them.
+If the first three axes meet instead (an arm with a spherical shoulder), the reverse equation E_6^-1 ... E_1^-1 = D^-1
+has the same form. Redundant joints may be anywhere, even between axes that meet, if the meeting point is fixed on one
+of these axes.
 
-Branches are told apart by the signs of the two factors of a recipe and of u . (w x v).
+Branches are distinguished by the signs of the two factors of a recipe and of u . (w x v).
 
 Source: D. L. Pieper, The kinematics of manipulators under computer control, PhD thesis, Stanford 1968; for the first
 three joints see `point_recipes`.
@@ -37,11 +37,11 @@ from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
 from brachis.robot import TaskMap
 
 _FLIP = 2
-"""Slot of the wrist's two answers, behind those of the recipe."""
+"""Slot of the two solutions of the wrist, after the slots of the recipe."""
 
 
 def _wrist_factor(arm: Arm) -> np.ndarray:
-    """Volume spanned by the axes of u, w, v."""
+    """Return the volume spanned by the axes of u, w, v."""
     u, v, w = arm.screws[3:]
     return dot(u.axis, cross(w.axis, v.axis))
 
@@ -50,14 +50,14 @@ _WRIST = Factor(_wrist_factor, ("noflip", "flip"))
 
 
 class SphericalWristSolver(FactoredSolver):
-    """Closed form of six joints with a spherical wrist or shoulder; see the module's formulas.
+    """Closed form of six joints with a spherical wrist or shoulder; see the formulas of the module.
 
     Parameters
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
     six : RemainingJoints
-        The last three have axes that meet.
+        The six joints; the axes of the last three meet.
 
     Raises
     ------
@@ -126,6 +126,6 @@ def _solve_wrist(
 def spherical_wrist(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> SphericalWristSolver:
-    """Fit the family: a pose, and six joints left over of which the last or the first three axes meet in a point."""
+    """Fit the family: a pose is prescribed, and six joints remain, whose last or first three axes meet in a point."""
     six = RemainingJoints.of_pose(geometry, task_map, redundant)
     return fit(SphericalWristSolver, geometry, redundant, six)

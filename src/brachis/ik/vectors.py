@@ -1,7 +1,7 @@
-"""Vectors with their three components along the FIRST axis, and the subproblems that closed forms are made of.
+"""Vectors with their three components along the FIRST axis, and the subproblems of closed forms.
 
-Arrays have shape (3, ...); the other axes broadcast (samples, then branches). Complex numbers stay analytic: there are
-no conjugates and no absolute values.
+Arrays have the shape (3, ...); the other axes broadcast (samples, then branches). Functions of complex numbers are
+analytic: there are no conjugates and no absolute values.
 
 Subproblems as in B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985, and A. J. Elias,
 J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022.
@@ -18,12 +18,12 @@ from brachis.kernel import formula
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Scalar product, shape (...)."""
+    """Return the scalar product, shape (...)."""
     return np.einsum("i...,i...->...", a, b)
 
 
 def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Part of a vector that is perpendicular to a unit axis, shape (3, ...)."""
+    """Return the component of a vector perpendicular to a unit axis, shape (3, ...)."""
     return vector - axis * dot(axis, vector)
 
 
@@ -38,9 +38,9 @@ def apply_inverse(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Angle in [-pi, pi] that turns `start` towards `end` about a unit axis, whatever their parts along it, (...).
+    """Return the angle in [-pi, pi], (...), that turns `start` towards `end` about a unit axis.
 
-    These parts are taken off first: what is left may be small, and its direction is all that matters.
+    Components along the axis are subtracted first: the remainder may be small, and only its direction matters.
     """
     start = across(axis, start)
     end = across(axis, end)
@@ -48,10 +48,10 @@ def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndar
 
 
 def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.ndarray:
-    """Angles in [-2 pi, 2 pi] at which ``a cos + b sin = c``.
+    """Return the angles in [-2 pi, 2 pi] at which ``a cos + b sin = c``.
 
-    The two follow each other along the axis `slot`: the left side's derivative ``b cos - a sin`` is positive at the
-    first one, negative at the second. NaN where c is out of reach.
+    The two angles follow each other along the axis `slot`: the derivative of the left side, ``b cos - a sin``, is
+    positive at the first one and negative at the second. They are NaN if c is out of reach.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         half = formula.arccos(c / formula.sqrt(a * a + b * b))
@@ -62,7 +62,7 @@ def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.n
 def meeting_point(
     axis: np.ndarray, point: np.ndarray, second_axis: np.ndarray, through: np.ndarray
 ) -> np.ndarray:
-    """Position on the line through `point` along `axis` that is nearest to a second line, (3, ...)."""
+    """Return the position on the line through `point` along `axis` that is closest to a second line, (3, ...)."""
     normal = cross(axis, second_axis)
     return point + axis * (
         dot(cross(through - point, second_axis), normal) / dot(normal, normal)
@@ -80,7 +80,7 @@ def sign(value: np.ndarray) -> np.ndarray:
 
 
 def nan_where_negative(level: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the values; NaN where the level is negative."""
+    """Return the values, or NaN where the level is negative."""
     root = formula.sqrt(level)
     return values + (root - root)
 
@@ -88,7 +88,7 @@ def nan_where_negative(level: np.ndarray, values: np.ndarray) -> np.ndarray:
 def determinants(matrices: np.ndarray) -> np.ndarray:
     """Compute determinants (K,) of matrices (m, m, K); real or complex, and analytic.
 
-    By Laplace's expansion: without a division, and each minor once.
+    Laplace's expansion is used: it has no division, and computes each minor once.
     """
     minors = {0: np.ones_like(matrices[0, 0])}
     for row in matrices:

@@ -1,4 +1,4 @@
-"""Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
+"""Joint maps: joint motion and its derivatives from curves y, for example y = (s, q_r)."""
 
 from brachis.ik.newton import Newton, solve_each
 from brachis.kinematics.chart import (

@@ -1,15 +1,16 @@
 """Joint motion along a path as a function of y = (s, sigma), in a chart around a known joint path.
 
 The rows C of sigma = C(s) q - p(s) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is
-regular there, and as far around it as its least singular value stays away from zero. Where one C does for the whole
-path, it is constant and p = 0. Postures follow by Newton's method. The formulas of the motion stand in `path_map`.
+regular there, and also around it as far as its least singular value stays away from zero. If one C suffices for the
+whole path, it is constant and p = 0. Postures follow from Newton's method. For the formulas of the motion see
+`path_map`.
 
-The self-motion at a posture is the null space of the task Jacobian, with an orthonormal basis N (n, r). Rows C are
-transversal where C N is regular; with orthonormal rows the least singular value of C N is 1 where they span the null
-space itself and 0 where they miss a part of it. The best constant rows are the leading eigenvectors of the mean of
-N N^T. Where these are not transversal enough, rows follow the null space, continued from place to place by the rotation
-that brings its basis nearest to the one before (orthogonal Procrustes problem; P. H. Schoenemann, Psychometrika 31,
-1966).
+The self-motion at a posture is the null space of the task Jacobian, with an orthonormal basis N, (n, r). Rows C are
+transversal if C N is regular. For orthonormal rows, the least singular value of C N is 1 if they span the null space
+itself, and 0 if they are orthogonal to a part of it. The best constant rows are the leading eigenvectors of the mean of
+N N^T. If these are not transversal enough, the rows follow the null space. Its basis is then continued from place to
+place by the rotation that brings it closest to the previous basis (orthogonal Procrustes problem; P. H. Schoenemann,
+Psychometrika 31, 1966).
 """
 
 from __future__ import annotations
@@ -29,15 +30,15 @@ from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
 CHART = "chart"
-"""Label in the place of a branch's."""
+"""Label of a chart, in place of the label of a branch."""
 DEGREE = 5
-"""Of the splines through rows that follow the null space."""
+"""Degree of the splines through rows that follow the null space."""
 _SINGULAR = 1e-9
-"""A reference with a smaller least singular value is singular all along; its chart has no margin anywhere."""
+"""A reference with a smaller least singular value is singular everywhere; its chart has no margin anywhere."""
 _ENOUGH = 0.35
-"""Least transversality of rows along the reference."""
+"""Required transversality of the rows along the reference."""
 _PLACES = (9, 17, 33, 65, 129)
-"""Numbers of places through which rows that follow the null space are led, as few as are enough."""
+"""Numbers of places for the splines of rows that follow the null space; the first one that suffices is used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +48,10 @@ class ChartRows:
     Attributes
     ----------
     coefficients : (B, r, n + 1) ndarray
-        Of [C, p]: one where they are constant, else the control points of splines of degree 5.
+        Coefficients of [C, p]: a single entry if they are constant, otherwise the control points of splines of degree
+        5.
     knots : (B + 6,) ndarray
-        Empty where they are constant.
+        Knots of the splines; empty if the rows are constant.
     """
 
     coefficients: np.ndarray
@@ -57,12 +59,12 @@ class ChartRows:
 
     @classmethod
     def constant(cls, rows: np.ndarray) -> ChartRows:
-        """Take the same rows, (r, n), along the whole path, and p = 0."""
+        """Use the same rows, (r, n), along the whole path, with p = 0."""
         return cls(np.concatenate([rows, np.zeros((len(rows), 1))], axis=1)[None])
 
     @classmethod
     def along(cls, s: np.ndarray, rows: np.ndarray, reference: np.ndarray) -> ChartRows:
-        """Lead splines through rows, (S, r, n), and C q_ref = p, with reference postures (S, n), at S places."""
+        """Interpolate rows, (S, r, n), and p = C q_ref for reference postures, (S, n), at S places by splines."""
         offset = np.einsum("sij,sj->si", rows, reference)
         values = np.concatenate([rows, offset[:, :, None]], axis=2)
         spline = Spline.through(s, values, DEGREE)
@@ -75,12 +77,12 @@ class ChartRows:
 
     @property
     def is_constant(self) -> bool:
-        """Whether rows are the same along the path; then so is sigma of a posture."""
+        """Whether the rows are the same along the path. Then sigma of a posture is the same, too."""
         return not len(self.knots)
 
     @property
     def selected(self) -> tuple[int, ...]:
-        """The joints that the rows select, ascending; none where they are other rows than unit rows."""
+        """The joints that the rows select, ascending; none unless all rows are unit vectors."""
         rows = self.coefficients[0, :, :-1]
         joints = np.argmax(rows, axis=1)
         selects = self.is_constant and np.array_equal(
@@ -97,11 +99,11 @@ class ChartRows:
         return LastCall(self._orders)
 
     def _orders(self, s: np.ndarray) -> np.ndarray:
-        """[C, p] and three derivatives by s, (4, K, r, n + 1), where they are splines."""
+        """Return [C, p] and its first three derivatives with respect to s, (4, K, r, n + 1), for splines."""
         return np.array([self._spline(s, order) for order in range(4)])
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """C, (K, r, n), and p, (K, r), at path coordinates (K,)."""
+        """Return C, (K, r, n), and p, (K, r), at path coordinates, (K,)."""
         values = (
             self.coefficients.repeat(len(s), axis=0)
             if self.is_constant
@@ -110,12 +112,12 @@ class ChartRows:
         return values[:, :, :-1], values[:, :, -1]
 
     def values(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Sigma, (K, r), in postures (K, n) at path coordinates (K,)."""
+        """Return sigma, (K, r), in postures, (K, n), at path coordinates, (K,)."""
         rows, offset = self.at(s)
         return apply_each(rows, q) - offset
 
     def kernel_inputs(self, s: np.ndarray) -> dict[str, np.ndarray]:
-        """Return [C, p] at path coordinates (K,), and three derivatives by s, as the kernel takes them."""
+        """Return [C, p] at path coordinates, (K,), and its derivatives, in the form that the kernel needs."""
         if self.is_constant:
             return {"rows": self.coefficients[0]}
         orders = self._orders_at(s)
@@ -123,7 +125,7 @@ class ChartRows:
 
 
 class ChartMap(PathMap):
-    """Robot, path and chart put together: the `JointMap` with y = (s, sigma).
+    """The `JointMap` of a robot, a path and a chart, with y = (s, sigma).
 
     Parameters
     ----------
@@ -135,7 +137,7 @@ class ChartMap(PathMap):
     s : (S,) ndarray
         Path coordinates of the reference, from 0 to 1.
     reference : (S, n) ndarray
-        Postures q_ref there, so near each other that straight lines join them.
+        Postures q_ref there, so close to each other that straight lines can join them.
     """
 
     branch_label = CHART
@@ -161,7 +163,7 @@ class ChartMap(PathMap):
         self.reference = reference
         self._newton = Newton(task_map)
         null = null_spaces(self._newton.task_coordinates(reference)[1])
-        across = rows.at(s)[0] @ null  # not regular throughout
+        across = rows.at(s)[0] @ null  # it may be singular in places
         self_motion = null @ np.linalg.pinv(across, rcond=_SINGULAR)
         sigma = rows.values(s, reference)
         table = np.column_stack([reference, sigma, self_motion.reshape(len(s), -1)])
@@ -173,43 +175,43 @@ class ChartMap(PathMap):
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
         self._typical = max(float(np.median(least)), _SINGULAR)
         self._start_margin = float(least[0]) / self._typical
-        # A determinant of zero has no side: then nothing is on it.
+        # A determinant of zero has no side; then no posture is on it.
         self.side = float(np.sign(np.linalg.det(augmented[0]))) or np.nan
 
     def _augmented_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """J_aug, (K, n, n), in postures (K, n) at path coordinates (K,)."""
+        """Return J_aug, (K, n, n), in postures, (K, n), at path coordinates, (K,)."""
         return np.concatenate(
             [self._newton.task_coordinates(q)[1], self.rows.at(s)[0]], axis=1
         )
 
     def _between(self, s: np.ndarray) -> np.ndarray:
-        """Postures, sigma and dq/dsigma of the reference, (K, n + r + n r), by straight lines in between."""
+        """Interpolate postures, sigma and dq/dsigma of the reference linearly, (K, n + r + n r)."""
         return self._lines(s.clip(self.s[0], self.s[-1]))
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
-        """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN where that is NaN."""
+        """Return y = (s, sigma), (1 + r,), in a posture, (n,); NaN if the posture is NaN."""
         return self.curves(np.array([s]), q[None])[0]
 
     def curves(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Values of y, (K, 1 + r), in postures (K, n) at path coordinates (K,)."""
+        """Return y, (K, 1 + r), in postures, (K, n), at path coordinates, (K,)."""
         return np.column_stack([s, self.rows.values(s, q)])
 
     def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
-        """Return targets, rows, and the reference, from which Newton's method sets out."""
+        """Return the targets, the rows, and the reference, where Newton's method starts."""
         s = y[:, 0]
         inputs = {"targets": sample.target, "reference": self._reference_at(s)}
         return inputs | self.rows.kernel_inputs(s)
 
     def start_margins(self) -> np.ndarray:
-        """Margin of the reference at its beginning."""
+        """Return the margin of the reference at its beginning."""
         return np.array([self._start_margin])
 
     def margins(self, state: PathState) -> np.ndarray:
-        """Least singular value of J_aug, (K, 1), as a part of its median along the reference."""
+        """Return the least singular value of J_aug, (K, 1), relative to its median along the reference."""
         return state.least_singular[0][:, None] / self._typical
 
     def margin_gradient(self, state: PathState) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate the margins by q, (K, 1, n), and by s, (K, 1)."""
+        """Differentiate the margins with respect to q, (K, 1, n), and s, (K, 1)."""
         by_q, by_s = state.motion.singular_slopes(*state.least_singular)
         return by_q[:, None] / self._typical, by_s[:, None] / self._typical
 
@@ -221,18 +223,18 @@ def chart_around(
     reference: np.ndarray,
     rows: ChartRows | None = None,
 ) -> ChartMap:
-    """Lay a chart around a joint path.
+    """Build a chart around a joint path.
 
     Parameters
     ----------
     task_map : TaskMap
     path : Path
     s : (S,) ndarray
-        Path coordinates from 0 to 1; where they do not grow, the first one counts, and at 1 the last one.
+        Path coordinates from 0 to 1. Of places with equal coordinates the first one is used, or the last one at 1.
     reference : (S, n) ndarray
         Postures there.
     rows : ChartRows, optional
-        Chosen here if not given.
+        Rows of the chart. By default they are chosen.
 
     Returns
     -------
@@ -241,7 +243,7 @@ def chart_around(
     Raises
     ------
     UnreachableError
-        The null space turns faster than rows can follow, as it does beside singularities of the arm.
+        The null space turns faster than the rows can follow, as happens close to singularities of the arm.
     """
     growing = _growing(s)
     s = s[growing]
@@ -272,7 +274,7 @@ def chart_around(
 
 
 def _growing(s: np.ndarray) -> np.ndarray:
-    """Return where path coordinates (S,) have grown since the one before, and the first and the last place."""
+    """Return the indices at which path coordinates, (S,), have grown, with the first and the last index."""
     furthest = np.maximum.accumulate(s)
     apart = 1e-7
     grown = np.append(True, np.diff(furthest) > apart) & (s < s[-1] - apart)
@@ -281,9 +283,9 @@ def _growing(s: np.ndarray) -> np.ndarray:
 
 
 def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
-    """Least singular value of C N, (K,), of rows (K, r, n) and bases (K, n, r); infinite without redundancy.
+    """Return the least singular values of C N, (K,), for rows (K, r, n) and bases (K, n, r); inf without redundancy.
 
-    Both are as of `Newton.self_motions`, in the scales of the joints.
+    Both are in the scales of the joints, as in `Newton.self_motions`.
     """
     if not null.shape[2]:
         return np.full(len(null), np.inf)
@@ -291,7 +293,7 @@ def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
 
 
 def moving_most(null: np.ndarray) -> np.ndarray:
-    """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
+    """Select by pivoting the r joints, (K, r), ascending, whose rows of null spaces, (K, n, r), span the most."""
     residual = null.copy()
     chosen = []
     for _ in range(null.shape[2]):
@@ -309,7 +311,7 @@ def moving_most(null: np.ndarray) -> np.ndarray:
 
 
 def _continue_bases(null: np.ndarray) -> np.ndarray:
-    """Turn each basis, (S, n, r), within its null space to be nearest to the one before."""
+    """Rotate each basis, (S, n, r), within its null space so that it is closest to the previous one."""
     turned = null.copy()
     for k in range(1, len(null)):
         u, _, vt = np.linalg.svd(null[k].T @ turned[k - 1])

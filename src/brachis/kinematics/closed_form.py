@@ -1,7 +1,7 @@
 """Joint motion along a path as a function of y = (s, q_r): the joint space decomposition.
 
-The non-redundant joints follow from the closed form, q_nr = IK(z(s), q_r). With J = [J_r | J_nr] the task Jacobian
-and xi = dz/ds, the formulas of `path_map` become
+The non-redundant joints follow from the closed form, q_nr = IK(z(s), q_r). With the task Jacobian J = [J_r | J_nr] and
+xi = dz/ds, the formulas of `path_map` become
 
     G = dq/dy:        G_r = (0, I),  G_nr = J_nr^-1 [xi, -J_r]
     qdot            = G ydot
@@ -10,7 +10,7 @@ and xi = dz/ds, the formulas of `path_map` become
     dqddot_nr/dydot = J_nr^-1 ([2 xi_ds sdot, 0] - A_v G)
     dqddot_nr/dy    = J_nr^-1 ([xi_dds sdot^2 + xi_ds sddot, 0] - A_q G - A_v dqdot/dy)
 
-Rows of redundant joints are constant: their derivatives vanish.
+The rows of redundant joints are constant, so their derivatives vanish.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from brachis.robot.joints import complement
 
 
 class ClosedFormMap(PathMap):
-    """Robot, path, closed form and branch, put together: the `JointMap` with y = (s, q_r).
+    """The `JointMap` of a robot, a path, a closed form and a branch, with y = (s, q_r).
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ClosedFormMap(PathMap):
     branch : int
         Index into ``solver.branches``.
     start : (n,) ndarray
-        Start posture; turns of its angles by 2 pi are chosen to begin nearest to it.
+        Start posture. The turns of angles by 2 pi are chosen so that the motion begins as close to it as possible.
     """
 
     branch_of: Branch
@@ -88,43 +88,43 @@ class ClosedFormMap(PathMap):
         )
 
     def along(self, path: Path, start: np.ndarray) -> Self:
-        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        """Return the same map for a part of its path that begins at, or close to, a posture, (n,)."""
         submap = super().along(path, start)
         submap.branch_of = replace(self.branch_of, start=start)
         return submap
 
     def branch_margins(self, q: np.ndarray) -> np.ndarray:
-        """Margins of the branch, (K, b), in postures (K, n)."""
+        """Return the margins of the branch, (K, b), in postures, (K, n)."""
         return self.solver.branch_margins(q, self.branch)
 
     def start_margins(self) -> np.ndarray:
-        """Margins of the branch at the start."""
+        """Return the margins of the branch at the start."""
         return self.branch_margins(self.start[None])[0]
 
     def margins(self, state: JointState) -> np.ndarray:
-        """Margins of the branch."""
+        """Return the margins of the branch."""
         return self.branch_margins(state.q)
 
     def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
-        """Differentiate the margins of the branch; they do not depend on s."""
+        """Differentiate the margins of the branch, which do not depend on s."""
         return self.solver.margin_gradient(state.q, self.branch), None
 
     def margin_quantity(self) -> FormulaQuantity | None:
-        """Return the margins as the kernel takes them."""
+        """Return the margins in the form that the kernel needs."""
         return self.solver.margin_formulas(self.branch, self.robot.n)
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
-        """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""
+        """Return y = (s, q_r), (1 + r,), in a posture, (n,)."""
         return np.append(s, q[self.redundant])
 
     def kernel_inputs(
         self, _y: np.ndarray, sample: PathSample
     ) -> dict[str, np.ndarray]:
-        """Return targets, and rows that each select a redundant joint."""
+        """Return the targets, and rows that each select a redundant joint."""
         return {"targets": sample.target, "rows": self._rows}
 
     def write_answers(self, motion: PathMotion) -> None:
-        """Write the answers where the kernel has no formula of them."""
+        """Write the solutions, if the kernel has no formula for them."""
         if self.branch_of.answers_of is None:
             targets = motion.inputs["targets"]
             q_r = motion.inputs["y"][:, 1:]

@@ -1,10 +1,10 @@
-"""A joint motion as nodes between which quintic polynomials meet the closed form to rounding.
+"""A joint motion as nodes, between which quintic polynomials agree with the closed form up to rounding.
 
-A saved trajectory must be evaluated without the closed form (its family may be a plug-in, and the verification must
-not depend on it). Joint positions, velocities and accelerations at the nodes define quintic Hermite pieces, which join
-with continuous acceleration where the curves have one (splines of degree 2 have not, at knots). Nodes are added until
-the pieces agree with the closed form in between, and their jerk with its jerk where they begin: there, the third
-derivative of a quintic's error is largest.
+It must be possible to evaluate a saved trajectory without the closed form: its family may be a plug-in, and the
+verification must not depend on it. Joint positions, velocities and accelerations at the nodes define quintic Hermite
+pieces. They join with continuous acceleration if the curves have it, which splines of degree 2 do not have at knots.
+Nodes are added until the pieces agree with the closed form in between, and until their jerks agree at the beginnings of
+the pieces, where the third derivative of a quintic's error is largest.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from brachis.kinematics.joint_map import JointMap, JointState
 Curves = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
 _POSITION_TOLERANCE = 1e-11
-"""Gap between pieces and closed form that is small enough, rad or m."""
+"""Allowed gap between pieces and closed form, rad or m."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Nodes:
     Attributes
     ----------
     times : (L + 1,) ndarray
-        s, ascending from 0 to t_end.
+        Times, ascending from 0 to t_end, s.
     q, qdot, qddot : (L + 1, n) ndarray
     qddot_before : (L + 1, n) ndarray
-        Acceleration just before the nodes; differs from `qddot` where it jumps.
+        Acceleration just before the nodes. It differs from `qddot` where the acceleration jumps.
     """
 
     times: np.ndarray
@@ -45,30 +45,29 @@ class Nodes:
 
 
 def join_nodes(nodes_by_phase: Sequence[Nodes]) -> Nodes:
-    """Put nodes of one phase after the other together; where they meet, those of the later one count."""
+    """Join the nodes of successive phases. Where two phases meet, the nodes of the later one are used."""
     begins = np.cumsum([0.0, *(nodes.times[-1] for nodes in nodes_by_phase[:-1])])
     times = [
         begin + nodes.times for begin, nodes in zip(begins, nodes_by_phase, strict=True)
     ]
-    later = [nodes.qddot_before[1:] for nodes in nodes_by_phase]
-    return Nodes(
-        _join(times),
-        _join([nodes.q for nodes in nodes_by_phase]),
-        _join([nodes.qdot for nodes in nodes_by_phase]),
-        _join([nodes.qddot for nodes in nodes_by_phase]),
-        np.concatenate([nodes_by_phase[0].qddot_before[:1], *later]),
+    q, qdot, qddot = (
+        _join([getattr(nodes, name) for nodes in nodes_by_phase])
+        for name in ("q", "qdot", "qddot")
     )
+    later = (nodes.qddot_before[1:] for nodes in nodes_by_phase)
+    before = np.concatenate([nodes_by_phase[0].qddot_before[:1], *later])
+    return Nodes(_join(times), q, qdot, qddot, before)
 
 
 def _join(arrays: Sequence[np.ndarray]) -> np.ndarray:
-    """Put arrays together, each without its last row but the last one."""
+    """Join arrays, without the last row of each array except the last."""
     return np.concatenate([*(array[:-1] for array in arrays[:-1]), arrays[-1]])
 
 
 def interpolate(
     joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jumps: bool
 ) -> Nodes:
-    """Place nodes so densely that quintic pieces stand for the closed form.
+    """Place nodes so densely that quintic pieces can replace the closed form.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def interpolate(
     UnreachableError
         The motion leaves the branch between the breaks.
     """
-    # Two pieces in the longest interval; shorter ones have one: rounding shows in the jerk of short pieces.
+    # Two pieces in the longest interval, one in shorter intervals: the jerk of short pieces shows rounding.
     steps = np.ceil(2 * np.diff(breaks) / np.diff(breaks).max()).astype(int)
     times = spread(breaks, steps)
     inherited = np.full(len(times) - 1, np.inf)
@@ -103,7 +102,7 @@ def interpolate(
         gaps, noises = _measure_gaps(times, state, before, orders=2 if jumps else 3)
         excess = gaps.max(axis=0)
         noise = noises.max(axis=0)
-        # What halving did not lessen by half, and what is as small as noise, is noise.
+        # A gap that halving did not reduce by half, or that is as small as noise, is noise.
         bad = (excess > 1.0) & ((excess > noise) | (excess < 0.5 * inherited))
         if not bad.any():
             break
@@ -111,7 +110,7 @@ def interpolate(
         inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
     if _POSITION_TOLERANCE * gaps[0].max() > 1e-9:
         raise UnreachableError("the motion is too sharp for polynomial pieces")
-    # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
+    # The middles are exact as well; using them as nodes reduces the error by another factor of 64.
     q = _sum_positions(joint_map, curves, merged, state, before)
     return Nodes(merged, q, state.qdot, state.qddot, before)
 
@@ -123,10 +122,10 @@ def _sum_positions(
     state: JointState,
     before: np.ndarray,
 ) -> np.ndarray:
-    """Sum up positions, (L + 1, n), so that every piece has the closed form's jerk in its middle.
+    """Sum up positions, (L + 1, n), so that every piece has the jerk of the closed form in its middle.
 
-    The closed form's own are some 1e-15 rad off, each by itself: over 0.1 ms that is a jerk of 0.1 rad/s^3.
-    What the sum is off at the end is shared by the pieces so that it adds the same jerk to each.
+    Each position of the closed form has an independent error of about 1e-15 rad. Over 0.1 ms, this is a jerk of 0.1
+    rad/s^3. The error of the sum at the end is distributed over the pieces so that it adds the same jerk to each.
     """
     h = np.diff(times)[:, None]
     jerk = joint_map.state(*curves(spread(times, 2))).qdddot[1::2]
@@ -146,16 +145,16 @@ def _sum_positions(
 def _measure_gaps(
     times: np.ndarray, state: JointState, before: np.ndarray, orders: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Largest gaps of every piece in position, acceleration and jerk, and their noise, in units of tolerances.
+    """Return the largest gaps of every piece in position, acceleration and jerk, and their noise, in tolerances.
 
     States alternate between nodes and middles. In the middle of a quintic Hermite piece of length h:
     q = (q0 + q1)/2 + 5h/32 (v0 - v1) + h^2/64 (a0 + a1),  qddot = 3 (v1 - v0) / (2h) - (a0 + a1)/4.
-    At its beginning qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
+    At its beginning, qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
 
     Returns
     -------
     gaps, noises : (orders, L) ndarray
-        Of 2 or 3 orders.
+        Gaps and noise of 2 or 3 orders.
     """
     h = np.diff(times)[:, None]
     q = state.q[::2]
@@ -165,8 +164,8 @@ def _measure_gaps(
     position += h**2 / 64.0 * ends - state.q[1::2]
     acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends - state.qddot[1::2]
     largest = 1.0 + np.abs(state.qddot).max()
-    # Of each order the gap, its noise, and the tolerance.
-    # Positions near a branch boundary have a noise of 1e-12 rad or m at most.
+    # For each order the gap, its noise, and the tolerance.
+    # Positions close to a branch boundary have a noise of at most 1e-12 rad or m.
     measures = [
         (np.abs(position), 1e-12 + 0.0 * h, _POSITION_TOLERANCE),
         (np.abs(acceleration), 6e-12 / h**2, 1e-6 * largest),

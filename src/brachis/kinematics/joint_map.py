@@ -1,7 +1,7 @@
-"""What a joint map is: curves y(t) in, joint motion and its exact derivatives out.
+"""The protocol of joint maps: from curves y(t) to joint motion and its exact derivatives.
 
-With qddot = f(y, ydot, yddot) the third order needs no formulas of its own. Where D is d/dt along the motion,
-d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
+With qddot = f(y, ydot, yddot), the third order needs no separate formulas. With D for d/dt along the motion, d(D f)/dy
+= D(df/dy), d(D f)/dydot = D(df/dydot) + df/dy, and so on. Hence
 
     qdddot            = f_y ydot + f_ydot yddot + G ydddot
     dqdddot/dydddot   = G
@@ -9,11 +9,11 @@ d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
     dqdddot/dydot     = 3 dqddot/dy
     dqdddot/dy        = D(dqddot/dy)
 
-of which only the last is new; it is taken by differences along the motion.
+Only the last line is new; it is computed by differences along the motion.
 
-Along a path of the tool y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
-(`chart`); along a path of all joints y = (s), and without a path y = q. Everything that lays down, solves and refines
-a program takes any of them.
+Along a path of the tool, y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
+(`chart`). Along a path of all joints, y = (s); without a path, y = q. The code that builds, solves and refines programs
+accepts any of these maps.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class JointState(SharedTorques):
     Attributes
     ----------
     joint_map : JointMap
-        That gave it.
+        The map that computed the motion.
     y, ydot, yddot, ydddot : (K, c) ndarray
-        The c curves that are chosen freely, and their time derivatives.
+        The c freely chosen curves and their time derivatives.
     q, qdot, qddot : (K, n) ndarray
     gradient : (K, n, c) ndarray
         G = dq/dy.
@@ -67,7 +67,7 @@ class JointState(SharedTorques):
 
     @property
     def curves(self) -> tuple[np.ndarray, ...]:
-        """Value y and three time derivatives of the curves, each (K, c)."""
+        """The curves y and their first three time derivatives, (K, c) each."""
         return self.y, self.ydot, self.yddot, self.ydddot
 
     @cached_property
@@ -77,11 +77,11 @@ class JointState(SharedTorques):
 
     @property
     def slopes(self) -> MotionSlopes:
-        """The exact derivatives as the kernel takes them, but for those of the jerk."""
+        """The exact derivatives except those of the jerk, in the form that the kernel needs."""
         return MotionSlopes(self.gradient, *self.derivatives)
 
     def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
-        """Compute values of limits, (K, size) of each group; nothing is set where a group has partials."""
+        """Compute the values of limits, (K, size) for each group; unset for a group with partials."""
         states = [self.q, self.qdot, self.qddot]
         if groups.has_jerk:
             states.append(self.qdddot)
@@ -100,18 +100,18 @@ class JointState(SharedTorques):
 
     @cached_property
     def qdddot_y(self) -> np.ndarray:
-        """Differentiate the jerk by y, (K, n, c): the rate of dqddot/dy; raises UnreachableError as `state` does."""
+        """The derivative of the jerk with respect to y, (K, n, c); raises UnreachableError as `state` does."""
         near = np.tile(self.q, (2, 1))
 
         def slopes(*curves: np.ndarray) -> tuple[np.ndarray]:
-            """Return dqddot/dy, (2 K, n, c), at moments nearby."""
+            """Return dqddot/dy, (2 K, n, c), at neighbouring moments."""
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
         return rates(slopes, self.curves)[0]
 
 
 class JointDerivatives(NamedTuple):
-    """Derivatives of a `JointState`, each (K, n, c); dqdot/dydot = dqddot/dyddot = G are not repeated.
+    """Derivatives of a `JointState`, (K, n, c) each, without dqdot/dydot = dqddot/dyddot = G.
 
     Attributes
     ----------
@@ -130,15 +130,15 @@ class JointMap(ABC):
     ----------
     robot : Robot
     start : (n,) ndarray
-        Posture at, or near, the beginning; it decides about turns of 2 pi.
+        Posture at, or close to, the beginning, which decides about turns by 2 pi.
     path : Path or None
-        The path along which y[0] is the path coordinate s; None without a path: then y has no s.
+        Path whose path coordinate s is y[0]. None without a path; then y does not contain s.
     r : int
-        Number of joints that are chosen freely.
+        Number of freely chosen joints.
     redundant_joints : tuple of str
-        Names of the joints that are curves themselves.
+        Names of the joints that are themselves curves.
     branch_label : str
-        What the branch is called whose margins `margins` gives; empty without margins.
+        Label of the branch to which `margins` belong; empty without margins.
     """
 
     robot: Robot
@@ -150,7 +150,7 @@ class JointMap(ABC):
 
     @property
     def curve_names(self) -> tuple[str, ...]:
-        """Names of the curves: s along a path, then the redundant joints, or sigma_1, sigma_2, ... of a chart."""
+        """Names of the curves: s along a path, then the redundant joints, or sigma_1, sigma_2, ... in a chart."""
         if self.path is None:
             return self.redundant_joints
         sigma = (f"sigma_{number}" for number in range(1, 1 + self.r))
@@ -158,11 +158,11 @@ class JointMap(ABC):
 
     @abstractmethod
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
-        """Value of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""
+        """Return the values of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""
 
     @abstractmethod
     def postures(self, y: np.ndarray) -> np.ndarray:
-        """Joint positions, (K, n), at successive times with curves (K, c); NaN where the curves cannot be met."""
+        """Return joint positions, (K, n), for curves, (K, c), at successive times; NaN if there is no posture."""
 
     @abstractmethod
     def state(
@@ -171,48 +171,48 @@ class JointMap(ABC):
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> JointState:
-        """Joint motion at K times.
+        """Return the joint motion at K times.
 
         Parameters
         ----------
         *curves : (K, c) ndarray
             y, ydot, yddot and ydddot.
         t : (K,) ndarray, optional
-            The times, ascending from the start on, s; by them turns are counted.
+            The times, ascending from the start, s. They are used to count turns.
         near : (K, n) ndarray, optional
-            Postures known to be near, which decide about turns; the times may then be any.
+            Postures known to be close, which decide about turns. The times may then be arbitrary.
 
         Raises
         ------
         UnreachableError
-            The curves cannot be met at one of the times.
+            There is no posture for the curves at one of the times.
         """
 
     @abstractmethod
     def derivatives(self, state: Any) -> JointDerivatives:
-        """Exact derivatives of a state that this map gave."""
+        """Return the exact derivatives of a state that this map computed."""
 
     def along(self, path: Path, start: np.ndarray) -> Self:
-        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        """Return the same map for a part of its path that begins at, or close to, a posture, (n,)."""
         submap = copy.copy(self)
         submap.path = path
         submap.start = start
         return submap
 
     def start_margins(self) -> np.ndarray:
-        """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""
+        """Return the margins, (b,), of the start, which vanish where the map ends; b = 0 if it ends nowhere."""
         return np.empty(0)
 
     def margins(self, state: Any) -> np.ndarray:
-        """Margins, (K, b), of a state that this map gave; see `start_margins`."""
+        """Return the margins, (K, b), of a state that this map computed; see `start_margins`."""
         return np.empty((len(state.q), 0))
 
     def margin_quantity(self) -> FormulaQuantity | None:
-        """Return the margins as the kernel computes them by itself; None where it does not."""
+        """Describe the margins as a quantity of the kernel; None if the kernel does not compute them."""
         return None
 
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
-        """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
+        """Differentiate `margins` with respect to q, (K, b, n), and s, (K, b); None stands for zeros."""
         return np.empty((len(state.q), 0, self.robot.n)), None
 
 
@@ -224,9 +224,9 @@ class JointSpaceState(JointState):
 
 
 class JointSpaceMap(JointMap):
-    """A path of all joints, q = q(s), as a `JointMap`: only s(t) is chosen, y = (s).
+    """The `JointMap` of a path of all joints, q = q(s). Only s(t) is chosen: y = (s).
 
-    With q_ds, q_dds and q_ddds the path's derivatives by s,
+    With the derivatives q_ds, q_dds and q_ddds of the path with respect to s,
 
         G = q_ds,    qdot = q_ds sdot,    qddot = q_ds sddot + q_dds sdot^2
         dqdot/ds = q_dds sdot,    dqddot/dsdot = 2 q_dds sdot,    dqddot/ds = q_dds sddot + q_ddds sdot^2
@@ -235,7 +235,7 @@ class JointSpaceMap(JointMap):
     ----------
     robot : Robot
     path : Path
-        Its target are the joint positions.
+        The path; its targets are joint positions.
     """
 
     path: Path
@@ -246,15 +246,15 @@ class JointSpaceMap(JointMap):
         self.start = path.sample(np.zeros(1)).target[0]
 
     def coordinates(self, s: float, _q: np.ndarray) -> np.ndarray:
-        """Return s as the only curve."""
+        """Return s, the only curve."""
         return np.array([s])
 
     def postures(self, y: np.ndarray) -> np.ndarray:
-        """Return the path's target."""
+        """Return the targets of the path."""
         return self.path.sample(y[:, 0]).target
 
     def state(self, *curves: np.ndarray, **_options: object) -> JointSpaceState:
-        """Return the motion along the path; in which turns joints are, it says itself."""
+        """Return the motion along the path, which also prescribes the turns of the joints."""
         y, ydot, yddot, ydddot = curves
         path = self.path.sample(y[:, 0])
         qdot = path.xi * ydot

@@ -4,8 +4,8 @@ The self-motion of the arm is measured by r functions of the joints, which are l
 
     sigma = C(s) q - p(s).
 
-J_aug = [J; C], with the task Jacobian J, has to be regular. With xi = dz/ds and derivatives by s alone, e = C' q - p'
-and e' = C'' q - p'':
+J_aug = [J; C], with the task Jacobian J, must be regular. With xi = dz/ds, and primes for derivatives with respect to s
+alone, e = C' q - p' and e' = C'' q - p'':
 
     G = dq/dy       = J_aug^-1 [xi, 0; -e, I]
     qdot            = G ydot
@@ -20,9 +20,9 @@ and, by differentiating J_aug qdot and J_aug qddot,
                                 -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G
                                 - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0])
 
-with V_q, A_q, A_v the derivatives of task velocity and acceleration (`TaskMap`). Where C is constant the lower parts
-vanish. The decomposition of the paper is the case of rows of C that each select a joint (`closed_form`): then
-G_nr = J_nr^-1 [xi, -J_r], and so on.
+with the derivatives V_q, A_q, A_v of task velocity and acceleration (`TaskMap`). If C is constant, the lower parts
+vanish. The decomposition of the paper is the case in which each row of C selects a joint (`closed_form`): then G_nr =
+J_nr^-1 [xi, -J_r], and so on.
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ class PathState(JointState):
 
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least singular values (K,) of J_aug, and their right singular vectors (K, n)."""
+        """The least singular values of J_aug, (K,), and their right singular vectors, (K, n)."""
         return find_least_singular(self.motion.inverse)
 
 
 class PathMap(JointMap):
-    """A path of the tool and a measure of self-motion as a `JointMap`.
+    """The `JointMap` of a path of the tool and a measure of self-motion.
 
     Parameters
     ----------
@@ -74,18 +74,19 @@ class PathMap(JointMap):
         Of the robot.
     path : Path
     start : (n,) ndarray
-        Posture at, or near, the beginning.
+        Posture at, or close to, the beginning.
 
     Attributes
     ----------
     branch_of : Branch or None
-        What the kernel needs to know of the branch; None in a chart.
+        Description of the branch for the kernel; None in a chart.
     side : float
-        Sign that det J_aug must have; 0: either.
+        Required sign of det J_aug; 0 if both are allowed.
     faults : dict of Fault to str
-        What a message says of each.
+        Text of the message for each fault.
     sample_at : LastCall
-        Samples the path; over the path all iterates have the same s.
+        Function that samples the path and remembers its last result: in a program over the path, all iterates have the
+        same s.
     """
 
     path: Path
@@ -103,31 +104,31 @@ class PathMap(JointMap):
 
     @abstractmethod
     def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
-        """Return what the kernel needs to find postures; see `PathMotion`.
+        """Return the arrays from which the kernel finds postures; see `PathMotion`.
 
         Parameters
         ----------
         y : (K, 1 + r) ndarray
         sample : PathSample
-            The path there.
+            The path at these points.
         """
 
     def write_answers(self, motion: PathMotion) -> None:
-        """Write answers that the kernel cannot compute itself to a motion that is prepared."""
+        """Write solutions that the kernel cannot compute to a prepared motion."""
 
     def postures(self, y: np.ndarray, *, near: np.ndarray | None = None) -> np.ndarray:
-        """Joint positions, (K, n), where the curves are y, (K, 1 + r), at successive times.
+        """Return joint positions, (K, n), for curves y, (K, 1 + r), at successive times.
 
         Parameters
         ----------
         y : (K, 1 + r) ndarray
         near : (K, n) ndarray, optional
-            Postures known to be near; the times may then be any.
+            Postures known to be close. The times may then be arbitrary.
 
         Returns
         -------
         (K, n) ndarray
-            NaN where the curves cannot be met.
+            Joint positions; NaN if there is no posture for the curves.
         """
         sample = self.path.sample(y[:, 0])
         inputs = {"y": y}
@@ -140,7 +141,7 @@ class PathMap(JointMap):
         inputs: dict[str, np.ndarray],
         sample: PathSample,
     ) -> PathMotion:
-        """Prepare a motion with what is given of curves, times and postures nearby."""
+        """Prepare a motion from the given curves, times and close postures."""
         motion = PathMotion.prepare(
             self.robot.chain,
             self.task_map.prescribed,
@@ -152,7 +153,7 @@ class PathMap(JointMap):
         return motion
 
     def along(self, path: Path, start: np.ndarray) -> Self:
-        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        """Return the same map for a part of its path that begins at, or close to, a posture, (n,)."""
         submap = super().along(path, start)
         submap.sample_at = LastCall(path.sample)
         return submap
@@ -163,9 +164,9 @@ class PathMap(JointMap):
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> PathState:
-        """Joint motion at K times; see `JointMap.state` and the module's formulas.
+        """Return the joint motion at K times; see `JointMap.state` and the formulas of the module.
 
-        Without `t` and `near`, successive times must be so close that no joint turns by pi in between.
+        Without `t` and `near`, successive times must be so close that no joint turns by more than pi in between.
         """
         y, ydot, yddot, ydddot = curves
         sample = self.sample_at(y[:, 0])
@@ -190,5 +191,5 @@ class PathMap(JointMap):
         return PathState(self, y, ydot, yddot, ydddot, *joint_motion, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
-        """Exact derivatives of a state; see the module's formulas."""
+        """Return the exact derivatives of a state; see the formulas of the module."""
         return JointDerivatives(*state.motion.derivatives())

@@ -1,15 +1,24 @@
-"""Limits on the motion, listed in `TABLE`.
+"""Limits on the motion, listed in `LIMIT_BUILDERS`.
 
-A limit is a function of q, qdot, qddot and s, some of qdddot too. A new kind of joint limit is a row of
-`brachis.task.LIMIT_KINDS`, a class in `joint.py`, and a formula in `verify/limits/joint.py`. Any other kind is its
-model in `task`, its file here with a line in `TABLE`, and a formula in `verify.limits` with a line in the table there.
-Nothing else asks which kind a limit is. Only joint ranges are known elsewhere too: postures and turns are chosen within
-them.
+A limit is a function of q, qdot, qddot and s; a few also depend on qdddot. A new kind of limit touches these places:
+
+- A joint limit: a row of `brachis.task.LIMIT_KINDS` and its keyword in `LimitKeywords`, both in `task/limit_kinds.py`;
+  a class in `JOINT_LIMITS` of `joint.py`; a formula in `JOINT_CHECKS` of `verify/limits/joint.py`.
+- A limit on one figure of the whole robot: a row of `brachis.task.ROBOT_LIMITS` and its keyword; a subclass of
+  `RobotLimit` in `drives.py`; a line in `LIMIT_BUILDERS`; a formula in `DRIVE_CHECKS` of `verify/limits/joint.py`.
+- Any other limit of drives, such as ``torque_speed``: a field of `brachis.LimitSpec` with its keyword, and its unit in
+  `task/units.py`; a field of `Limits` in `robot/limits.py`, which `resolve_limits`, `with_tool_joints` and `to_spec`
+  handle; a line in `robot/masses.py` if it needs masses; a class, a line in `LIMIT_BUILDERS` and a formula.
+- A limit on the tool or the scene: a field of its model in `task`; a class here with a line in `LIMIT_BUILDERS`; a
+  formula in `verify/limits`, in a table that `LIMIT_CHECKS` contains.
+
+No other code asks for the kind of a limit. The ranges of the joints are the exception: postures and turns are chosen
+within them.
 
 Examples
 --------
 >>> import brachis
->>> "torque" in brachis.limits.TABLE
+>>> "torque" in brachis.limits.LIMIT_BUILDERS
 True
 """
 
@@ -17,13 +26,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from operator import attrgetter
 
 from brachis.common.labels import Label
-from brachis.limits.checks import build_user_limits
+from brachis.limits.checks import build_own_limits
 from brachis.limits.clearance import build_clearance
-from brachis.limits.drives import build_torque_speed, build_total_power
+from brachis.limits.drives import TotalPowerLimit, build_torque_speed
 from brachis.limits.joint import JOINT_LIMITS
-from brachis.limits.margins import build_joint_ends, build_singularity
+from brachis.limits.margins import JointEndLimit, SingularityLimit
 from brachis.limits.protocol import (
     Bound,
     Description,
@@ -36,49 +46,57 @@ from brachis.limits.protocol import (
     Role,
 )
 from brachis.limits.tool import (
-    build_constant,
-    build_tool_distance,
+    DistanceLimit,
+    TiltLimit,
     build_tool_range,
     build_tool_speed,
-    build_tool_tilt,
+    constant_limit,
 )
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel, list_models
-from brachis.task import LIMIT_KINDS, Task
+from brachis.task import Task
 
 Build = Callable[[Robot, Task], Limit | None]
-"""Makes the limit of a kind for a task on a robot; None where nothing is limited."""
+"""Builds the limit of a kind for a task on a robot; None if nothing is limited."""
 
-_AFTER: dict[str, dict[str, Build]] = {
-    "position": {
-        "tool_speed": build_tool_speed,
-        "tool_acceleration": partial(build_constant, "acceleration", "m/s^2"),
-        "tool_angular_speed": partial(build_constant, "angular speed", "rad/s"),
-    },
-    "power": {
-        "total_power": build_total_power,
-        "torque_speed": build_torque_speed,
-    },
-}
-TABLE: dict[str, Build] = {}
-"""By kind, in the order of the rows of the program: a joint limit, then those that `_AFTER` lists for it."""
-for _kind in LIMIT_KINDS:
-    TABLE[_kind] = JOINT_LIMITS[_kind].build
-    TABLE |= _AFTER.get(_kind, {})
-TABLE |= {
-    "singularity": build_singularity,
-    "joint_ends": build_joint_ends,
-    "tool_tilt": build_tool_tilt,
-    "tool_distance": build_tool_distance,
+
+def _build_from(limit: Callable[[Robot, Task, float], Limit], key: str) -> Build:
+    """Return a function that builds a limit of a figure, which the task gives under a dotted key."""
+
+    def build(robot: Robot, task: Task) -> Limit | None:
+        """Build the limit; None if the figure is missing, or if it limits nothing on this robot."""
+        figure = attrgetter(key)(task)
+        built = None if figure is None else limit(robot, task, figure)
+        return built if built and built.labels else None
+
+    return build
+
+
+LIMIT_BUILDERS: dict[str, Build] = {
+    **{kind: limit.build for kind, limit in JOINT_LIMITS.items()},
+    "total_power": TotalPowerLimit.build,
+    "torque_speed": build_torque_speed,
+    "tool_speed": build_tool_speed,
+    "tool_acceleration": _build_from(
+        partial(constant_limit, "acceleration", "m/s^2"), "tool_limits.acceleration"
+    ),
+    "tool_angular_speed": _build_from(
+        partial(constant_limit, "angular speed", "rad/s"), "tool_limits.angular_speed"
+    ),
+    "singularity": _build_from(SingularityLimit, "margins.singularity"),
+    "joint_ends": _build_from(JointEndLimit, "margins.joint_ends"),
+    "tool_tilt": _build_from(TiltLimit, "tolerances.orientation.tilt"),
+    "tool_distance": _build_from(DistanceLimit, "tolerances.position.sphere"),
     "tool_range": build_tool_range,
     "clearance": build_clearance,
 }
+"""Builders by kind of limit, in the order of the rows of the program."""
 
 
 def limits_of(
     robot: Robot,
     task: Task,
-    user_limits: Sequence[LimitModel] = (),
+    own_limits: Sequence[LimitModel] = (),
 ) -> tuple[Limit, ...]:
     """List the limits of a task on a robot.
 
@@ -86,38 +104,38 @@ def limits_of(
     ----------
     robot : Robot
     task : Task
-    user_limits : sequence of LimitModel, optional
-        Further limits, besides those of the table and of the task's ``custom_limits``.
+    own_limits : sequence of LimitModel, optional
+        Limits besides the built-in ones and those under the task's ``custom_limits``.
 
     Returns
     -------
     tuple of Limit
-        In the order of the table, then the user's.
+        The built-in limits in the order of `LIMIT_BUILDERS`, then the user's.
 
     Raises
     ------
     InputError
-        A limit of the user's own does not fit the robot, or is not valid (see `build_user_limits`).
+        A user's limit does not fit the robot, or is not valid (see `build_own_limits`).
     """
-    built = [build(robot, task) for build in TABLE.values()]
+    built = [build(robot, task) for build in LIMIT_BUILDERS.values()]
     limits = [limit for limit in built if limit is not None]
-    models = list_models(task, user_limits)
-    return (*limits, *build_user_limits(models, robot, limits, TABLE))
+    models = list_models(task, own_limits)
+    return (*limits, *build_own_limits(models, robot, limits, LIMIT_BUILDERS))
 
 
 def joint_limits_of(robot: Robot) -> tuple[Limit, ...]:
-    """List the limits of a robot without a task: those of its joints."""
+    """List the limits of a robot without a task, which are the limits of its joints."""
     built = [kind.build(robot) for kind in JOINT_LIMITS.values()]
     return tuple(limit for limit in built if limit is not None)
 
 
 def describe_guarantees(limits: Iterable[Limit]) -> dict[str, str]:
-    """Say of each limit, by its name, where it holds."""
+    """Describe where each limit holds, by the name of the limit."""
     return {limit.name: limit.guarantee.value for limit in limits}
 
 
 __all__ = [
-    "TABLE",
+    "LIMIT_BUILDERS",
     "Bound",
     "Description",
     "Guarantee",

@@ -1,8 +1,9 @@
-"""A limit of the user's own is checked before it is used: its members, the shapes of its arrays, its derivatives.
+"""Checks of a user's limit before it is used: its members, the shapes of its arrays, its derivatives.
 
-Partial derivatives are compared with central differences of the values, joint by joint at some random moments. Limits
-may have kinks and steps, and their values may be noisy. So slopes are taken with two steps, and what these differ by is
-allowed. A partial derivative is refused if it is wrong at most of the moments.
+Partial derivatives are compared with central differences of the values, joint by joint, at a few random moments. Limits
+may have kinks and steps, and their values may be noisy. The differences are therefore computed with two step sizes, and
+the difference between the two results is taken as the allowed error. A partial derivative is refused if it is wrong at
+most of the moments.
 """
 
 from __future__ import annotations
@@ -26,21 +27,21 @@ from brachis.robot.custom_limits import (
 )
 
 _COUNT = 6
-"""Moments at which derivatives are compared."""
+"""Number of moments at which derivatives are compared."""
 _STEP = 1e-3
-"""Step of the differences, as a fraction of how far motions go: single precision is enough for it."""
+"""Step of the differences, as a fraction of the range of the motion; large enough for single precision."""
 _FURTHEST = 1.0
-"""Largest speed, acceleration and jerk of the moments, rad or m."""
+"""Largest speed, acceleration and jerk at the moments, rad or m and seconds."""
 _PRECISION = 2e-3
-"""Difference between stated and found slope, as a fraction of the largest slope, above which the stated is wrong."""
+"""Largest allowed difference between the stated slope and the computed one, as a fraction of the largest slope."""
 _ROUNDING = 1e-3
 """Slopes smaller than this fraction of the values count as zero."""
 _MARGIN = 5.0
-"""Factor on the difference between slopes with two steps, which is allowed too."""
+"""Factor on the difference between the slopes with both steps, which is allowed as well."""
 
 
 def _is_label(label: object) -> bool:
-    """Tell whether a value is a label of texts."""
+    """Tell whether a value is a label whose entries are texts."""
     return isinstance(label, Label) and all(
         isinstance(text, str) for text in vars(label).values()
     )
@@ -57,14 +58,14 @@ def _is_per_value(value: Any, limit: Limit) -> bool:
 
 
 def _is_centre(value: Any, limit: Limit) -> bool:
-    """Tell whether values lie between the bounds; NaN is for values without a bound."""
+    """Tell whether values lie between the bounds; a value without bounds may be NaN."""
     is_open = np.isneginf(limit.lower) & np.isposinf(limit.upper)
     is_between = (limit.lower <= value) & (value <= limit.upper)
     return np.shape(value) == limit.lower.shape and bool(np.all(is_between | is_open))
 
 
 def _are_bounds(bounds: Any, limit: Limit) -> bool:
-    """Tell whether a value is a list of `Bound`, each of one of the limit's c values."""
+    """Tell whether a value is a list of `Bound`, each for one of the limit's c values."""
     return all(
         isinstance(bound, Bound)
         and bound.side in {None, "lower", "upper"}
@@ -115,11 +116,12 @@ _MEMBERS: dict[str, tuple[str, Callable[[Any, Limit], object]]] = {
     ),
     "refusal": ("a text", _is_text),
 }
-"""Members of a limit, each with what is allowed: in words, and as a function of value and limit that tells whether it
-is. It may raise TypeError or ValueError if not. The labels and the arrays of the bounds are checked before."""
+"""Members of a limit, each with the allowed values in words, and with a function of the value and the limit that tells
+whether the value is allowed. The function may raise TypeError or ValueError if not. The labels and the arrays of bounds
+are checked before."""
 
 
-def build_user_limits(
+def build_own_limits(
     models: Mapping[str, LimitModel],
     robot: Robot,
     existing: Sequence[Limit],
@@ -130,18 +132,19 @@ def build_user_limits(
     Parameters
     ----------
     models : mapping of str to LimitModel
-        By where they stand, for messages.
+        The user's limits, by the places where they are given, for messages.
     robot : Robot
     existing : sequence of Limit
-        Those that exist already: labels are unique.
+        The limits that exist already. Labels must be unique.
     kinds : collection of str
-        Those of the built-in limits.
+        The kinds of the built-in limits.
 
     Raises
     ------
     InputError
-        A model cannot be bound, or does not give a limit; its members are not allowed or do not fit together; its kind
-        or a label is taken; its values or partials have the wrong shape, are not finite or contradict each other.
+        A model cannot be bound, or `bind` does not return a limit; a member is not allowed, or members do not fit
+        together; the kind or a label is taken; values or partials have the wrong shape, are not finite or contradict
+        each other.
     """
     limits: list[Limit] = []
     labels = {str(label) for known in existing for label in known.labels}
@@ -182,7 +185,7 @@ def build_user_limits(
 
 
 def _check_members(limit: Limit) -> None:
-    """Refuse a limit that lacks a member, or has one that is not allowed."""
+    """Refuse a limit that lacks a member, or has a member that is not allowed."""
     required = ("kind", "labels", "lower", "upper")
     missing = [name for name in required if not hasattr(limit, name)]
     if missing:
@@ -228,9 +231,9 @@ def _check_members(limit: Limit) -> None:
 
 
 def _check_functions(limit: Limit, robot: Robot) -> None:
-    """Refuse values and partial derivatives of the wrong type or shape, not finite, or that contradict each other.
+    """Refuse values and partial derivatives that have the wrong type or shape, are not finite or contradict each other.
 
-    A limit may be undefined in some postures: those are left out, if they are not most of them.
+    A limit may be undefined in some postures. They are left out, provided that they are the minority.
     """
     moments = sample_moments(robot)
     count = len(moments.q)
@@ -278,7 +281,7 @@ def _check_functions(limit: Limit, robot: Robot) -> None:
 
 
 def _reaches(robot: Robot) -> np.ndarray:
-    """How far q, qdot, qddot and qdddot go, (4, n), to both sides of the middle; q no further than the others."""
+    """Return how far q, qdot, qddot and qdddot may deviate from the middle, (4, n); q at most as far as the others."""
     low, high = _ranges(robot)
     rate = np.full(robot.n, _FURTHEST)
     speed = 0.5 * np.minimum(robot.limits.velocity, rate)
@@ -286,7 +289,7 @@ def _reaches(robot: Robot) -> np.ndarray:
 
 
 def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Postures to look at, (n,) each: the middle of the ranges; half a turn, or 1 m, beside an open end."""
+    """Return the ends of the postures to check, (n,) each: inside the ranges; half a turn, or 1 m, for an open end."""
     reach = np.where(robot.revolute, np.pi, 1.0)
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper
@@ -310,7 +313,7 @@ def sample_moments(robot: Robot) -> Moments:
 
 
 def write_posture(moments: Moments, number: int | np.intp) -> str:
-    """Write down the posture of one of some moments."""
+    """Write the posture at the moment with this number."""
     q = ", ".join(f"{value:.4g}" for value in moments.q[number])
     return f"q = [{q}]"
 
@@ -318,9 +321,9 @@ def write_posture(moments: Moments, number: int | np.intp) -> str:
 def _differentiate(
     limit: Limit, moments: Moments, name: str, reach: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Differentiate values by one of q, qdot, ..., s in units of its reach, (d,), once with each of two steps.
+    """Differentiate values with respect to one of q, qdot, ..., s in units of its reach, (d,), with two step sizes.
 
-    Both are (K, c, d), with d = n joints, and d = 1 for s.
+    Both results are (K, c, d), with d = n for joint quantities and d = 1 for s.
     """
     count = len(moments.q)
     steps = _STEP * np.array([1.0, -1.0, 2.0, -2.0])
@@ -350,16 +353,16 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
     Parameters
     ----------
     limit : Limit
-        Its values and partials have the right shapes, and are finite.
+        Its values and partials have the right shapes and are finite.
     moments : Moments
-        At which they are compared.
+        The moments at which they are compared.
     robot : Robot
 
     Raises
     ------
     InputError
-        A partial derivative is wrong at most of the moments, or the values depend on qdddot and the limit's order is
-        2.
+        A partial derivative is wrong at most of the moments; or the values depend on qdddot although the limit's order
+        is 2.
     """
     partials = limit.partials(moments)
     rounding = _ROUNDING * np.abs(limit.values(moments)).max(axis=0)
@@ -397,7 +400,7 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
 
 
 def _check_order(limit: Limit, depends: np.ndarray) -> None:
-    """Refuse values that depend on qdddot, (K, c) bool, at most of the moments."""
+    """Refuse values that depend on qdddot at most of the moments; `depends` is (K, c) bool."""
     columns = np.flatnonzero(2 * depends.sum(axis=0) > len(depends))
     if len(columns):
         raise InputError(

@@ -1,6 +1,7 @@
-"""Distances between solids >= the clearance: one value for every pair.
+"""The distance between each pair of solids must be at least the clearance: one value for every pair.
 
-A pair that is far counts as `_FAR` away. With the unit vector u between the nearest points w_a and w_b
+A pair that is far apart counts as `_FAR` above the clearance. With the unit vector u between the nearest points w_a and
+w_b,
 
     dd/dq = u . (J_b(w_b) - J_a(w_a)).
 """
@@ -18,26 +19,26 @@ from brachis.scene.chain import Chain
 from brachis.task import Task
 
 _FAR = 0.1
-"""Distance from which on it is not computed, beyond the clearance, m."""
+"""Distance above the clearance from which on distances are not computed, m."""
 _DEVIATION = 2e-4
-"""By how much bodies leave where a joint path has them, where splines follow it, m."""
+"""Distance by which bodies deviate from a joint path when splines follow it, m."""
 _NEARBY = 2.0
-"""Pairs are left out that stay so many times `_FAR` apart where the motion begins."""
+"""Pairs that stay this many times `_FAR` apart in the initial motion are left out."""
 _STRIDE = 0.05
-"""Distance that solids move between two checks on a step of the lattice, m."""
+"""Largest distance that solids move between two checks on a step of the lattice, m."""
 _MOST_STRIDES = 16
-"""Checks on a step, no more."""
+"""Largest number of intervals between the checks on a step."""
 
 
 class Clearance(Limit):
-    """Distances between solids of a scene.
+    """Limit on the distances between the solids of a scene.
 
     Parameters
     ----------
     chain : Chain
         Of the robot.
     scene : Scene
-        Its pairs are the values.
+        Its pairs of solids give the values.
     clearance : float
         m.
     """
@@ -76,7 +77,7 @@ class Clearance(Limit):
         return Clearance(self._chain, self._scene.with_pairs(pairs), self._clearance)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), no pair is too close, (K,)."""
+        """Tell in which postures, (K, n), no pair is too close, (K,) bool."""
         within = (self.lower.min(initial=np.inf) - slack) * UNIT
         close = self._scene.find_close(self._chain.place(q), within)
         return np.bincount(close.posture, minlength=len(q)) == 0
@@ -84,7 +85,7 @@ class Clearance(Limit):
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell on which straight steps no pair is too close, where the solids have moved on by `_STRIDE`."""
+        """Tell on which straight steps no pair is too close, at checks between which solids move by `_STRIDE`."""
         ends = [self._scene.centres(self._chain.place(q)) for q in (first, last)]
         moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
         count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
@@ -100,7 +101,7 @@ class Clearance(Limit):
         return self._scene.find_close(self._chain.place(q), self._clearance + _FAR)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Distances, (K, P), in units of `UNIT`."""
+        """Compute the distances, (K, P), in units of `UNIT`."""
         close = self._close_pairs(motion.q)
         shape = (len(motion.q), len(self.labels))
         distances = np.full(shape, (self._clearance + _FAR) / UNIT)
@@ -108,7 +109,7 @@ class Clearance(Limit):
         return distances
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the distances by q, (K, P, n); 0 for pairs that are far apart."""
+        """Differentiate the distances with respect to q, (K, P, n); 0 for pairs that are far apart."""
         close = self._close_pairs(motion.q)
         joints = self._scene.joints[self._scene.pairs[close.pair]]
         placed = self._chain.place(motion.q)
@@ -122,7 +123,7 @@ class Clearance(Limit):
 
 
 def build_clearance(robot: Robot, task: Task) -> Clearance | None:
-    """Build the limit of a task whose motion has to keep clear of something."""
+    """Build the limit of a task that avoids collisions; None without pairs of solids."""
     if task.collision_mode != "avoid":
         return None
     scene = scene_of(robot, task)

@@ -1,33 +1,36 @@
-"""Limits of drives that are not one number for each joint: the total power, and torque that falls with speed.
+"""Limits of drives that are not one number for each joint: the total power, and torques that fall with speed.
 
 |sum over the joints of tau qdot| <= P_total, as a ratio in [-1, 1].
 
-|tau| <= T(|qdot|) with T piecewise linear and falling, the same for driving and braking, is two values for each joint
-with such a curve, over its torque at rest, with T rounded from below (`RoundedCurve`):
+The limit |tau| <= T(|qdot|), with T piecewise linear and falling, is the same for driving and braking. Each joint with
+such a curve has two values, as ratios to its torque at rest T_0, with T rounded from below (`RoundedCurve`):
 
     (tau - T(qdot)) / T_0 <= 0,        (-tau - T(qdot)) / T_0 <= 0.
 
-The level beginning of a curve is the plain torque limit.
+The level first part of a curve is the plain torque limit.
 
-The rounded curve is twice continuously differentiable and nowhere above the given one. With slopes m_k between the
-points of the curve, w_k half the width of the rounding of a corner at speed v_k, and the curve taken as an even
-function of the velocity v,
+The rounded curve is twice continuously differentiable and nowhere above the given curve. Let m_k be the slopes between
+the points of the curve, and w_k half the width of the rounding of the corner at speed v_k. As an even function of the
+velocity v, the curve is
 
     T(v) = T(0) + sum_k (m_k - m_{k-1}) (r((v - v_k) / w_k) + r((-v - v_k) / w_k)) w_k,        m_{-1} = 0,
 
-where r(y) w is the ramp max(x, 0), x = w y, with its corner rounded between y = -1 and 1, nowhere below the ramp:
+where r(y) w is the ramp max(x, 0), with x = w y, whose corner is rounded between y = -1 and 1. It is nowhere below the
+ramp:
 
     r(y) = (3 + 8 y + 6 y^2 - y^4) / 16.
 
-Where a curve falls ever more steeply this lies below it. A corner behind which it falls less steeply is first moved to
-the left by w_k, on the line that follows it: the rounded part then ends at the corner itself. It is convex and neither
-of its ends is above the curve, which is straight there; so nowhere is it above.
+Where a curve falls more and more steeply, T lies below it. A corner after which the curve falls less steeply is first
+moved to the left by w_k, along the line that follows it, so that the rounded part ends at the corner itself. The
+rounded part is convex, and neither of its ends is above the curve, which is straight there. So it is nowhere above the
+curve.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -36,30 +39,46 @@ from brachis.limits.joint import power_partials, powers
 from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot
 from brachis.robot.limits import TorqueSpeedCurve
-from brachis.task import LIMIT_KINDS, Task
+from brachis.task import LIMIT_KINDS, ROBOT_LIMITS, Task
 
 
-class TotalPowerLimit(Limit):
-    """Power that all joints together draw from a common supply, or return to it, over its limit.
+class RobotLimit(Limit):
+    """The ratio of one figure of the whole robot to its limit; `kind` is a row of `ROBOT_LIMITS`.
 
     Parameters
     ----------
     robot : Robot
+    figure : float
+        Largest magnitude of the figure, in the unit of the row.
     """
 
-    kind = "total_power"
     longer_time = "relieves"
+    subject: str
+    """What the figure belongs to, for labels."""
 
-    def __init__(self, robot: Robot) -> None:
-        figure = robot.limits.total_power
+    def __init__(self, robot: Robot, figure: float) -> None:
         self._robot = robot
         self._figure = figure
+        unit = ROBOT_LIMITS[self.kind].unit
         self.labels = (
-            Label("all joints", "total power", "W", "robot.limits.total_power"),
+            Label(self.subject, self.name, unit, f"robot.limits.{self.kind}"),
         )
         self.lower = -np.ones(1)
         self.upper = np.ones(1)
         self.bounds = (Bound(0, figure, figure, 1.0 / figure),)
+
+    @classmethod
+    def build(cls, robot: Robot, _task: Task) -> Self | None:
+        """Build the limit; None if the robot has none."""
+        figure = getattr(robot.limits, cls.kind)
+        return cls(robot, figure) if np.isfinite(figure) else None
+
+
+class TotalPowerLimit(RobotLimit):
+    """The power that all joints together draw from a common supply, or return to it."""
+
+    kind = "total_power"
+    subject = "all joints"
 
     def values(self, motion: JointStates) -> np.ndarray:
         return powers(self._robot, motion).sum(axis=1, keepdims=True) / self._figure
@@ -70,13 +89,8 @@ class TotalPowerLimit(Limit):
         )
 
 
-def build_total_power(robot: Robot, _task: Task) -> TotalPowerLimit | None:
-    """Build the limit of a robot that has one."""
-    return TotalPowerLimit(robot) if np.isfinite(robot.limits.total_power) else None
-
-
 WIDTH = 0.002
-"""Half the width of a rounded corner, as a part of the shorter one of the pieces beside it."""
+"""Half the width of a rounded corner, as a fraction of the shorter of the two pieces beside it."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +100,13 @@ class RoundedCurve:
     Attributes
     ----------
     stall_torque : float
-        Value at velocity 0, were the corner there not rounded.
+        Value at velocity 0 if the corner there were not rounded.
     corners : (k,) ndarray
         Speeds of the corners, rad/s or m/s.
     widths : (k,) ndarray
-        Half the widths of their rounding.
+        Half the widths of the rounded corners.
     bends : (k,) ndarray
-        Changes of slope.
+        Changes of slope at the corners.
     """
 
     stall_torque: float
@@ -102,10 +116,10 @@ class RoundedCurve:
 
     @classmethod
     def below(cls, curve: TorqueSpeedCurve) -> RoundedCurve | None:
-        """Round a curve; None for a curve that does not fall.
+        """Round a curve; return None for a curve that does not fall.
 
-        Its last slope goes on until no torque is left. A level beginning is left out, and the piece that follows it
-        goes on to speed 0: the level itself is a plain torque limit.
+        Its last slope continues until no torque is left. If the curve begins with a level part, this part is left out,
+        and the next piece is extended to speed 0: the level itself is a plain torque limit.
         """
         speed, torque = np.array(curve).T
         slope = np.diff(torque) / np.diff(speed)
@@ -130,11 +144,11 @@ class RoundedCurve:
         return cls(stall_torque, corners, widths[first:], np.diff(slope, prepend=0.0))
 
     def _distances(self, velocity: np.ndarray) -> np.ndarray:
-        """How far velocities (K,), and their negatives, are behind the corners, (2, K, k)."""
+        """Return by how much velocities, (K,), and their negatives exceed those of the corners, (2, K, k)."""
         return np.array([velocity, -velocity])[..., None] - self.corners
 
     def values(self, velocity: np.ndarray) -> np.ndarray:
-        """Values (K,) at velocities (K,)."""
+        """Evaluate the curve at velocities, (K,)."""
         x = self._distances(velocity)
         y = np.clip(x / self.widths, -1.0, 1.0)
         rounded = self.widths * (3.0 + y * (8.0 + y * (6.0 - y * y))) / 16.0
@@ -142,20 +156,20 @@ class RoundedCurve:
         return self.stall_torque + (ramp @ self.bends).sum(axis=0)
 
     def slopes(self, velocity: np.ndarray) -> np.ndarray:
-        """Differentiate `values` by the velocities, (K,)."""
+        """Differentiate `values` with respect to the velocities, (K,)."""
         y = np.clip(self._distances(velocity) / self.widths, -1.0, 1.0)
         forward, backward = (2.0 + y * (3.0 - y * y)) @ self.bends / 4.0
         return forward - backward
 
 
 class TorqueSpeedLimit(Limit):
-    """Torques in both directions over the joints' curves.
+    """Torques in both directions, relative to the joints' curves.
 
     Parameters
     ----------
     robot : Robot
     curves : dict of int to RoundedCurve
-        Those of the joints that have one, by index.
+        The curves, by the index of the joint.
     """
 
     kind = "torque_speed"
@@ -190,7 +204,7 @@ class TorqueSpeedLimit(Limit):
         self.labels = tuple(labels)
         self.lower = np.full(len(stall_torques), -np.inf)
         self.upper = np.zeros(len(stall_torques))
-        # The whole curve rises with the torque at rest.
+        # The whole curve is scaled with the torque at rest.
         self.bounds = tuple(
             Bound(column, level, level, 1.0 / level, "upper")
             for column, level in enumerate(stall_torques)
@@ -201,20 +215,20 @@ class TorqueSpeedLimit(Limit):
         function: Callable[[RoundedCurve, np.ndarray], np.ndarray],
         motion: JointStates,
     ) -> np.ndarray:
-        """Evaluate a function of each curve and its joint's velocities, (K, c)."""
+        """Evaluate a function of each curve and the velocities of its joint, (K, c)."""
         qdot = motion.qdot[:, self._joints[::2]].T
         pairs = zip(self._curves, qdot, strict=True)
         return np.repeat([function(*pair) for pair in pairs], 2, axis=0).T
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Torques beyond what the curves allow at the joints' velocities, over the torque at rest, (K, c)."""
+        """Compute the torques in excess of the curves at the joints' velocities, over the torques at rest, (K, c)."""
         tau = motion.torque(self._robot)[:, self._joints]
         allowed = self._by_curve(RoundedCurve.values, motion)
         excess = self._signs * tau - allowed
         return excess / self._stall_torques
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the values by q, qdot and qddot, (K, c, n) each."""
+        """Differentiate the values with respect to q, qdot and qddot, (K, c, n) each."""
         scale = (self._signs / self._stall_torques)[:, None]
         by_q, by_qdot, by_qddot = (
             derivatives[:, self._joints] * scale
@@ -227,7 +241,7 @@ class TorqueSpeedLimit(Limit):
 
 
 def build_torque_speed(robot: Robot, _task: Task) -> TorqueSpeedLimit | None:
-    """Build the limit of a robot with a joint whose torque falls with its speed."""
+    """Build the limit; None if the torque of no joint falls with its speed."""
     rounded = {
         joint: RoundedCurve.below(curve)
         for joint, curve in enumerate(robot.limits.torque_speed)

@@ -1,17 +1,19 @@
-"""Limits on a quantity of each joint: position, velocity, acceleration, jerk, torque, its rate and mean, power.
+"""Limits on a quantity of each joint: position, velocity, acceleration, jerk, power, torque, torque rate, mean torque.
 
-A value is (quantity - middle) / half the distance between the lower and the upper limit, in [-1, 1]. With the same
-limit in both directions that is the ratio to it. Positions are measured in rad or m if their range is wide or open.
+A value is (quantity - middle) / (half the distance between the lower and the upper limit), in [-1, 1]. If both
+directions have the same limit, this is the ratio to the limit. Positions with a wide or open range are measured in rad
+or m instead.
 
 The rate of the torque tau(q, qdot, qddot) is
 
     dtau/dt = tau_q qdot + tau_v qddot + M qdddot
 
-with the derivatives of tau by q, qdot and qddot. Its own derivatives, with D for d/dt along the motion, are
+with the derivatives of tau with respect to q, qdot and qddot. With D for d/dt along the motion, the derivatives of the
+rate with respect to
 
-    by q: D(tau_q),   by qdot: D(tau_v) + tau_q,   by qddot: D(M) + tau_v,   by qdddot: M
+    q: D(tau_q),   qdot: D(tau_v) + tau_q,   qddot: D(M) + tau_v,   qdddot: M
 
-where D is taken by differences.
+where D is computed by differences.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ from brachis.task import LIMIT_KINDS, Task
 
 
 class JointLimit(Limit):
-    """A quantity of every limited joint between its limits; `kind` is a row of `LIMIT_KINDS`.
+    """Limits on a quantity of the joints that are limited; `kind` is a row of `LIMIT_KINDS`.
 
     Parameters
     ----------
@@ -51,7 +53,7 @@ class JointLimit(Limit):
 
     longer_time: Literal["relieves", "neither"] = "relieves"
     share = ""
-    """Title of an axis of ratios; see `Label`."""
+    """Title of an axis for the ratios; see `Label`."""
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         row = LIMIT_KINDS[self.kind]
@@ -59,8 +61,7 @@ class JointLimit(Limit):
         self._joints = joints
         self._ends = robot.limits.both_ways(self.kind)[:, joints]
         self._measure(*self._ends)
-        units = [robot.position_units[i] for i in joints]
-        names = [robot.joint_names[i] for i in joints]
+        named_units = [*zip(robot.joint_names, robot.position_units, strict=True)]
         ranges = {joint.name: joint.key for joint in robot.tool_joints}
         self.labels = tuple(
             Label(
@@ -70,11 +71,11 @@ class JointLimit(Limit):
                 ranges.get(name, f"robot.limits.{self.kind}.{name}"),
                 share=self.share,
             )
-            for name, unit in zip(names, units, strict=True)
+            for name, unit in (named_units[joint] for joint in joints)
         )
 
     def _measure(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Set how quantities become values, and the bounds of these, from lower and upper limits, (c,) each."""
+        """Set the scale of the values and their bounds from lower and upper limits of the quantity, (c,) each."""
         self._middle = 0.5 * (high + low)
         self._scale = 2.0 / (high - low)
         self.lower = -np.ones(len(low))
@@ -83,7 +84,7 @@ class JointLimit(Limit):
         self._set_bounds(np.abs(self._ends), -low == high)
 
     def _set_bounds(self, full_scale: np.ndarray, is_symmetric: np.ndarray) -> None:
-        """List the finite limits, with full scales, (2, c); a symmetric limit, (c,) bool, is one figure."""
+        """List the finite limits, with full scales, (2, c); a limit that is symmetric, (c,) bool, is one figure."""
         self.bounds = tuple(
             Bound(
                 column,
@@ -100,12 +101,12 @@ class JointLimit(Limit):
 
     @property
     def centre(self) -> np.ndarray:
-        """Value at which the quantity is zero."""
+        """The values at which the quantity is zero."""
         return -self._middle * self._scale
 
     @classmethod
     def build(cls, robot: Robot, _task: Task | None = None) -> Self | None:
-        """Build the limit for the joints with a finite limit; None without such joints."""
+        """Build the limit for the joints that have a finite limit; None without such joints."""
         joints = np.flatnonzero(
             np.isfinite(robot.limits.both_ways(cls.kind)).any(axis=0)
         )
@@ -113,26 +114,26 @@ class JointLimit(Limit):
 
     @abstractmethod
     def quantity(self, motion: JointStates) -> np.ndarray:
-        """Quantity of all joints, (K, n), in SI units."""
+        """Compute the quantity of all joints, (K, n), in SI units."""
 
     def values(self, motion: JointStates) -> np.ndarray:
         quantity = self.quantity(motion).take(self._joints, axis=1)
         return (quantity - self._middle) * self._scale
 
     def kernel_quantity(self, chain: Chain) -> ScaledQuantity | None:
-        """Describe the values; nothing for subclasses, which may have values of their own."""
+        """Describe the values; None for subclasses, whose values may differ."""
         name = _QUANTITIES.get(type(self))
         if name is None or self._robot.chain is not chain:
             return None
         return ScaledQuantity(name, self._joints, self._middle, self._scale, chain)
 
     def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
-        """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""
+        """Turn derivatives of the quantity, (K, n, n), into derivatives of the values, (K, c, n)."""
         return slopes.take(self._joints, axis=1) * self._scale[:, None]
 
 
 class _DerivativeLimit(JointLimit):
-    """Joint positions, velocities, accelerations or jerks within their limits."""
+    """Limits on joint positions, velocities, accelerations or jerks."""
 
     derivative: str
     """Name of the quantity in `JointStates` and in `Partials`."""
@@ -144,18 +145,18 @@ class _DerivativeLimit(JointLimit):
         return Partials(**{self.derivative: self._rows(len(motion.q))})
 
     def _rows(self, count: int) -> np.ndarray:
-        """Differentiate the values by the quantity, (K, c, n), at `count` moments."""
+        """Return the derivatives of the values with respect to the quantity, (K, c, n), at `count` moments."""
         rows = np.eye(self._robot.n)[self._joints] * self._scale[:, None]
         return np.broadcast_to(rows, (count, *rows.shape))
 
 
 def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Return what counts as a violation of 1 beyond ranges, rad or m: half of each, but from 1e-5 to 1."""
+    """Return the distance from a range that is a violation of 1, rad or m: half the range, at least 1e-5, at most 1."""
     return np.clip(0.5 * upper - 0.5 * lower, 1e-5, 1.0)
 
 
 class PositionLimit(_DerivativeLimit):
-    """Joint positions within their ranges."""
+    """Ranges of the joint positions."""
 
     kind = "position"
     derivative = "q"
@@ -165,7 +166,7 @@ class PositionLimit(_DerivativeLimit):
 
     def _measure(self, low: np.ndarray, high: np.ndarray) -> None:
         half = 0.5 * high - 0.5 * low
-        # Half of a range beyond 20 rad or m is too coarse a measure near its ends.
+        # For a range of more than 20 rad or m, half of it is too coarse a measure close to its ends.
         is_narrow = half <= 10.0
         measure = np.where(is_narrow, half, 1.0)
         with np.errstate(invalid="ignore"):  # -inf + inf
@@ -181,12 +182,12 @@ class PositionLimit(_DerivativeLimit):
 
     @property
     def centre(self) -> np.ndarray:
-        """Middle of the range."""
+        """The middles of the ranges."""
         return super(JointLimit, self).centre
 
 
 class VelocityLimit(_DerivativeLimit, HasLatticeWeights):
-    """Joint velocities within their limits."""
+    """Limits on joint velocities."""
 
     kind = "velocity"
     derivative = "qdot"
@@ -196,7 +197,7 @@ class VelocityLimit(_DerivativeLimit, HasLatticeWeights):
 
 
 class AccelerationLimit(_DerivativeLimit, HasLatticeWeights):
-    """Joint accelerations within their limits."""
+    """Limits on joint accelerations."""
 
     kind = "acceleration"
     derivative = "qddot"
@@ -206,7 +207,7 @@ class AccelerationLimit(_DerivativeLimit, HasLatticeWeights):
 
 
 class JerkLimit(_DerivativeLimit):
-    """Joint jerks within their limits."""
+    """Limits on joint jerks."""
 
     kind = "jerk"
     derivative = "qdddot"
@@ -214,18 +215,18 @@ class JerkLimit(_DerivativeLimit):
 
 
 class _DynamicLimit(JointLimit):
-    """A quantity of the joints that depends on several derivatives of their positions."""
+    """Limits on a quantity that depends on several derivatives of the joint positions."""
 
     @abstractmethod
     def quantity_partials(self, motion: JointStates) -> Partials:
-        """Differentiate `quantity`, (K, n, n) each."""
+        """Return the derivatives of `quantity`, (K, n, n) each."""
 
     def partials(self, motion: JointStates) -> Partials:
         return self.quantity_partials(motion).map(self._scale_rows)
 
 
 class _TorqueLimit(_DynamicLimit):
-    """A function of the joint torques within its limits."""
+    """Limits on a function of the joint torques."""
 
     def quantity(self, motion: JointStates) -> np.ndarray:
         return motion.torque(self._robot)
@@ -235,7 +236,7 @@ class _TorqueLimit(_DynamicLimit):
 
 
 class TorqueLimit(_TorqueLimit, HasLatticeWeights):
-    """Joint torques within their limits."""
+    """Limits on joint torques."""
 
     kind = "torque"
     at_rest = "posture"
@@ -246,13 +247,13 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
 
 
 class TorqueRateLimit(_DynamicLimit):
-    """Rates of joint torques within their limits."""
+    """Limits on the rates of joint torques."""
 
     kind = "torque_rate"
     order = 3
 
     def quantity(self, motion: JointStates) -> np.ndarray:
-        """Rates of the torques of all joints, (K, n), Nm/s or N/s."""
+        """Compute the rates of the torques of all joints, (K, n), Nm/s or N/s."""
         exact = motion.torque_derivatives(self._robot)
         return (
             apply_each(exact.q, motion.qdot)
@@ -261,11 +262,11 @@ class TorqueRateLimit(_DynamicLimit):
         )
 
     def quantity_partials(self, motion: JointStates) -> Partials:
-        """Slopes of the rates by q and its first three derivatives, (K, n, n) each."""
+        """Differentiate the rates with respect to q and its first three derivatives, (K, n, n) each."""
         exact = motion.torque_derivatives(self._robot)
 
         def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:
-            """Return the derivatives of the torque by q, qdot and qddot, (2 K, n, n) each."""
+            """Return the derivatives of the torque with respect to q, qdot and qddot, (2 K, n, n) each."""
             return dynamics.torque_derivatives(self._robot, *states[:3])
 
         states = (motion.q, motion.qdot, motion.qddot, motion.qdddot)
@@ -274,12 +275,12 @@ class TorqueRateLimit(_DynamicLimit):
 
 
 def powers(robot: Robot, motion: JointStates) -> np.ndarray:
-    """Mechanical powers of all joints, (K, n), W; negative where a joint brakes."""
+    """Compute the mechanical power of each joint, (K, n), W; negative if the joint brakes."""
     return motion.torque(robot) * motion.qdot
 
 
 def power_partials(robot: Robot, motion: JointStates) -> Partials:
-    """Differentiate `powers` by q, qdot and qddot, (K, n, n) each."""
+    """Differentiate `powers` with respect to q, qdot and qddot, (K, n, n) each."""
     exact = motion.torque_derivatives(robot)
     rate = motion.qdot[:, :, None]
     by_qdot = exact.qdot * rate
@@ -289,7 +290,7 @@ def power_partials(robot: Robot, motion: JointStates) -> Partials:
 
 
 class PowerLimit(_DynamicLimit):
-    """Mechanical power of every joint within its limit."""
+    """Limits on the mechanical power of each joint."""
 
     kind = "power"
 
@@ -301,7 +302,7 @@ class PowerLimit(_DynamicLimit):
 
 
 class RmsTorqueLimit(_TorqueLimit):
-    """Squares of joint torques over their limits; their means over time are held."""
+    """Limits on root-mean-square torques. The values are the squares of the ratios to the limits."""
 
     kind = "rms_torque"
     guarantee = Guarantee.AS_MEAN
@@ -309,7 +310,7 @@ class RmsTorqueLimit(_TorqueLimit):
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         super().__init__(robot, joints)
         self.lower = np.full(len(joints), -np.inf)
-        # To first order the square of a figure changes by twice as much as the figure.
+        # To first order, the relative change of the square is twice that of the figure.
         self.bounds = tuple(
             replace(bound, per_unit=2.0 * bound.per_unit) for bound in self.bounds
         )
@@ -348,15 +349,15 @@ _QUANTITIES: dict[type[Limit], str] = {TorqueLimit: "torque"} | {
     limit: limit.derivative
     for limit in (PositionLimit, VelocityLimit, AccelerationLimit, JerkLimit)
 }
-"""Limits whose values are a quantity of the kernel, less an offset, times a factor."""
+"""Limits whose values are (a quantity of the kernel - an offset) * a factor."""
 
 
 def reciprocals_near(
     robot: Robot, limits: Sequence[Limit], q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Reciprocals of the largest acceleration and of the largest velocity of each joint alone near `q`, (n,) each.
+    """Return the reciprocals of the largest acceleration and velocity of each joint alone close to `q`, (n,) each.
 
-    They follow from the joints' own limits; 0 for a joint without a limit.
+    They follow from the limits of the joints; 0 for a joint without a limit.
     """
     reciprocals = np.zeros((2, robot.n))
     for limit in limits:

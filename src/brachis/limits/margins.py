@@ -1,6 +1,6 @@
-"""Margins that a motion keeps on request: from singular postures of the arm, and from the ends of joint ranges.
+"""Margins that a motion keeps on request: a distance from singular postures, and from the ends of joint ranges.
 
-With the singular vectors u and v of its least singular value the Jacobian J(q) gives the slope u^T dJ v.
+With the singular vectors u and v of the least singular value of the Jacobian J(q), its slope is u^T dJ v.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from brachis.task import Task
 
 
 class SingularityLimit(Limit):
-    """Least singular value of the task Jacobian of the arm's own joints over the least that is wanted.
+    """Ratio of the least singular value of the task Jacobian, for the joints of the arm itself, to the required value.
 
     Parameters
     ----------
     robot : Robot
     task : Task
     figure : float
-        The least singular value.
+        The required value.
     """
 
     kind = "singularity"
@@ -33,8 +33,7 @@ class SingularityLimit(Limit):
         self._task_map = task_map_of(robot, task.task_space)
         self._count = len(robot.urdf_joints)
         self._figure = figure
-        key = "margins.singularity"
-        self.labels = (Label("arm", "singularity", "-", key),)
+        self.labels = (Label("arm", "singularity", "-", "margins.singularity"),)
         self.lower = np.ones(1)
         self.upper = np.full(1, np.inf)
         self.bounds = (Bound(0, figure, figure, 1.0 / figure, "lower"),)
@@ -48,7 +47,7 @@ class SingularityLimit(Limit):
         return least / self._figure
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the least singular value, over its smallest figure, by q, (K, 1, n)."""
+        """Differentiate the ratio with respect to q, (K, 1, n)."""
         twists = self._task_map.twists(motion.q)
         u, sizes, vt = np.linalg.svd(self._arm_jacobian(twists))
         last = sizes.shape[1] - 1
@@ -61,20 +60,20 @@ class SingularityLimit(Limit):
 
 
 class JointEndLimit(Limit):
-    """Joint positions away from the ends of their ranges, as parts of these, 0 to 1.
+    """Joint positions relative to their ranges, from 0 to 1, which keep a distance from both ends.
 
     Parameters
     ----------
     robot : Robot
     share : float
-        Part of each range that is kept free at both ends.
+        Fraction of each range that is kept free at both ends.
     """
 
     kind = "joint_ends"
     at_rest = "posture"
     refusal = "is not kept"
 
-    def __init__(self, robot: Robot, share: float) -> None:
+    def __init__(self, robot: Robot, _task: Task, share: float) -> None:
         count = len(robot.urdf_joints)
         lower = robot.limits.position_lower[:count]
         width = robot.limits.position_upper[:count] - lower
@@ -84,9 +83,8 @@ class JointEndLimit(Limit):
         self._width = width[joints]
         self._revolute = robot.revolute[joints]
         self._rows = np.eye(robot.n)[joints] / self._width[:, None]
-        kind = "range margin"
         self.labels = tuple(
-            Label(robot.joint_names[joint], kind, "-", "margins.joint_ends")
+            Label(robot.joint_names[joint], "range margin", "-", "margins.joint_ends")
             for joint in joints
         )
         self.lower = np.full(len(joints), share)
@@ -94,7 +92,7 @@ class JointEndLimit(Limit):
         self.violation_scale = np.minimum(self._width, 1.0)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), it holds in the turn that is nearest to the middle of the range, (K,)."""
+        """Tell in which postures, (K, n), it holds with angles in the turn closest to the range's middle, (K,) bool."""
         middle = self._begin + 0.5 * self._width
         turned = q.copy()
         turned[:, self._joints] = in_turn_of(q[:, self._joints], middle, self._revolute)
@@ -106,18 +104,3 @@ class JointEndLimit(Limit):
     def partials(self, motion: JointStates) -> Partials:
         shape = (len(motion.q), *self._rows.shape)
         return Partials(q=np.broadcast_to(self._rows, shape))
-
-
-def build_singularity(robot: Robot, task: Task) -> SingularityLimit | None:
-    """Build the limit of a task that keeps away from singular postures."""
-    figure = task.margins.singularity
-    return None if figure is None else SingularityLimit(robot, task, figure)
-
-
-def build_joint_ends(robot: Robot, task: Task) -> JointEndLimit | None:
-    """Build the limit of a task that keeps away from the ends of joint ranges."""
-    share = task.margins.joint_ends
-    if share is None:
-        return None
-    limit = JointEndLimit(robot, share)
-    return limit if limit.labels else None

@@ -1,13 +1,14 @@
-"""What a limit on the motion is: one object, which everything that plans, refines and reports takes as it is.
+"""What a limit on the motion is: one object, which is used unchanged by the search, the optimiser and the reports.
 
-A limit has c values at every moment of the motion, held between `lower` and `upper`. Most are ratios to a figure, so
-that their bounds are -1 and 1. How far a value v is beyond its bounds is its *violation*, and how near it is its
-*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own `violation_scale` k and `centre` c:
+A limit has c values at every moment of the motion, which must stay between `lower` and `upper`. Most values are ratios
+to a figure, with the bounds -1 and 1. The *violation* of a value v says how far it is outside its bounds. Its *ratio*
+says how much of the limit it uses: 1 at the upper bound, -1 at the lower bound. With the `violation_scale` k and the
+`centre` c,
 
     violation = max(k (v - upper), k (lower - v))
-    ratio     = (v - c) / (upper - c)         between c and the upper bound; towards the lower one likewise, down to -1
-              = 1 + violation                 beyond the upper bound; beyond the lower one -(1 + violation)
-              = max(1 + violation, 0)         where the only bound is the upper one; negative for a lower one
+    ratio     = (v - c) / (upper - c)         between c and the upper bound; towards the lower bound likewise, to -1
+              = 1 + violation                 above the upper bound; below the lower bound -(1 + violation)
+              = max(1 + violation, 0)         if the upper bound is the only one; its negative for a lower bound
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ from brachis.robot.dynamics import SharedTorques
 _Found = TypeVar("_Found")
 
 _DEVIATION = 3e-5
-"""Distance by which splines leave a joint path, about, rad or m."""
+"""Approximate distance by which splines deviate from a joint path, rad or m."""
 _LARGEST_INSET = 0.1
-"""Largest violation by which joint paths keep inside a narrow range."""
+"""Largest inset of joint paths in a narrow range, as a violation."""
 
 
 class Guarantee(Enum):
@@ -48,19 +49,19 @@ class Guarantee(Enum):
 
     @property
     def is_mean(self) -> bool:
-        """Whether the means of the values over the motion are held, and not the values at every moment."""
+        """Whether the limit applies to the means of the values over the motion, not to the values at every moment."""
         return self is Guarantee.AS_MEAN
 
 
 class JointStates(Protocol):
-    """Joint motion at K moments; for example states of the optimiser or samples of a trajectory.
+    """Joint motion at K moments, such as states of the optimiser or samples of a trajectory.
 
     Attributes
     ----------
     q, qdot, qddot, qdddot : (K, n) ndarray
         rad or m, and per second.
     s : (K,) ndarray
-        Path coordinate; NaN without a path, or if it is not known.
+        Path coordinate; NaN without a path, or if it is unknown.
     """
 
     @property
@@ -74,17 +75,17 @@ class JointStates(Protocol):
     @property
     def s(self) -> np.ndarray: ...
     def torque(self, robot: Robot) -> np.ndarray:
-        """Joint torques, (K, n), computed once."""
+        """Return the joint torques, (K, n), which are computed once."""
         ...
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
-        """Differentiate `torque`, once."""
+        """Return the derivatives of `torque`, which are computed once."""
         ...
 
 
 @dataclass(frozen=True)
 class Moments(SharedTorques):
-    """Joint motion at K moments, made from arrays; see `JointStates`."""
+    """Joint motion at K moments, given by arrays; see `JointStates`."""
 
     q: np.ndarray
     qdot: np.ndarray
@@ -94,40 +95,43 @@ class Moments(SharedTorques):
 
     @classmethod
     def at_rest(cls, q: np.ndarray) -> Moments:
-        """Stand still in postures, (K, n), somewhere on the path."""
+        """Return the motion of an arm that rests in postures, (K, n), somewhere on the path."""
         still = np.zeros_like(q)
         return cls(q, still, still, still, np.full(len(q), np.nan))
 
 
 class Role(Enum):
-    """Whose limit it is."""
+    """What a limit belongs to."""
 
     ROBOT = "robot"
-    """A limit of drives and joints."""
+    """A limit of the drives and joints."""
     PROCESS = "process"
-    """A limit of what the tool does."""
+    """A limit of the process, on what the tool does."""
     SCENE = "scene"
-    """A limit of what stands around the robot."""
+    """A limit of the objects around the robot."""
     SAFEGUARD = "safeguard"
-    """Numerical, not physical: small violations are ignored, and the verification does not check it."""
+    """A numerical limit, not a physical one. Small violations are ignored, and the verification does not check it."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """A figure that the user could change, and how it moves the bounds of one value.
+    """A figure that the user could change, and its effect on the bounds of one value.
 
     Attributes
     ----------
     column : int
-        Of the value, among the limit's c.
+        Index of the value among the limit's c values.
     figure : float
-        In the unit of the value's label.
+        The figure, in the unit of the value's label.
     full_scale : float
-        What a change by 100 % means: of most limits the figure itself, of a position the width of its range.
+        The change of the figure that counts as 100 %: for most limits the figure itself, for a position the width of
+        its range.
     per_unit : float
-        How far the bounds of the value move outwards when the figure is relaxed by one unit.
+        Distance by which the bounds of the value move outwards when the figure is relaxed by one unit: 1 / figure for
+        a ratio.
     side : {"lower", "upper"} or None
-        Which of the bounds moves; None: both.
+        The bound that the figure moves. None: it moves both bounds. An infinite bound stays infinite, so None also
+        serves for a ratio that has an upper bound only.
     """
 
     column: int
@@ -139,9 +143,9 @@ class Bound:
 
 @dataclass(frozen=True)
 class Partials:
-    """Partial derivatives of a limit's c values at K moments, each (K, c, n), or None where they vanish.
+    """Partial derivatives of a limit's c values at K moments, (K, c, n) each; None stands for zeros.
 
-    `s`, (K, c), is that by the path coordinate, where a value depends on it besides.
+    `s`, (K, c), is the derivative with respect to the path coordinate, if a value depends on it directly.
     """
 
     q: np.ndarray | None = None
@@ -152,65 +156,73 @@ class Partials:
 
     @property
     def by_joints(self) -> tuple[np.ndarray | None, ...]:
-        """Partials by q, qdot, qddot and qdddot."""
+        """The derivatives with respect to q, qdot, qddot and qdddot."""
         return self.q, self.qdot, self.qddot, self.qdddot
 
     @property
     def size(self) -> int:
         """Number of values, c."""
-        arrays = (*self.by_joints, self.s)
-        return next(array.shape[1] for array in arrays if array is not None)
+        return next(
+            array.shape[1] for array in vars(self).values() if array is not None
+        )
 
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
-        """Return the partials by q and its derivatives, changed."""
+        """Apply a function to the derivatives with respect to q, qdot, qddot and qdddot."""
         changed = (None if array is None else change(array) for array in self.by_joints)
         return Partials(*changed)
 
 
 class HasLatticeWeights(ABC):
-    """A limit by which the lattice measures joint steps between postures."""
+    """Further base class of limits by which the lattice measures joint steps between postures.
+
+    It suits limits that are linear in the joint accelerations or in the joint velocities while the arm is at rest, such
+    as torques. Other limits have no effect on the length of a step.
+    """
 
     @abstractmethod
     def lattice_weights(
         self, q: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Rows A and B, (K, c, n), in postures q, (K, n); None where they vanish.
+        """Return the rows A and B, (K, c, n), in postures q, (K, n); None for zeros.
 
-        A qddot is the part of the limit that joint accelerations take, B qdot the part that joint velocities take.
+        A qddot is the share of the limit that joint accelerations use, B qdot the share that joint velocities use.
         """
 
 
 class Description:
-    """What is known of a limit besides its values.
+    """The properties of a limit besides its values.
 
     Attributes
     ----------
     kind : str
-        Name of the kind; not that of a built-in limit.
+        Name of the kind of limit. The names of the built-in kinds are taken.
     labels : tuple of Label
-        Of each of the c values.
+        A label for each of the c values.
     lower, upper : (c,) ndarray
-        Bounds of the values; -inf and inf where open. Values should be of the size of 1.
+        Bounds of the values; -inf and inf where there is no bound. The values should be of the order of 1.
     guarantee : Guarantee
-        Where it holds.
+        Where the limit holds.
     role : Role
-        Whose limit it is.
+        What the limit belongs to.
     longer_time : {"relieves", "neither"}
-        What a longer end time does: it relieves a velocity, acceleration or torque.
+        Effect of a longer end time on the values. It relieves everything that grows with speed, such as a velocity,
+        an acceleration or an energy.
     at_rest : {"nothing", "posture", "turns"}
-        What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or also the
-        turn of an angle (position).
+        What the limit restricts while the arm rests. "posture": the posture, where an angle and the same angle plus
+        2 pi count alike, for example the torque that holds the arm against gravity. "turns": also the number of turns,
+        for example a range of joint positions.
     breaks : (b,) ndarray
-        Path coordinates at which it changes abruptly, so that the motion must be checked exactly there.
+        Path coordinates at which the limit changes abruptly, so that the motion must be checked exactly there.
     order : int
-        Highest time derivative of q in the values: 2, or 3 for the jerk. The splines' degree must be at least as high.
+        Order of the highest time derivative of q in the values: 2, or 3 for the jerk. The degree of the splines must be
+        at least as high.
     violation_scale : (c,) ndarray or float
-        Violation of a value that is beyond its bound by 1 (see the module).
+        Factor from the distance between a value and the bound that it exceeds to its violation: 1 for ratios.
     inset : (c,) ndarray or float
-        By how much joint paths keep inside the bounds of a limit on postures, as a violation: splines leave them
-        by a little. 0 where that is not known.
+        Distance, as a violation, that joint paths keep from the bounds of a limit on postures, because splines deviate
+        slightly from joint paths. 0 if the deviation is not known.
     refusal : str
-        What a message says of an arm at rest beyond the limit, after "the ... limit".
+        Words that follow "the ... limit" in a message about an arm that violates the limit at rest.
     """
 
     kind: str
@@ -228,33 +240,33 @@ class Description:
     refusal: str = "is exceeded at rest"
 
     origin: str = ""
-    """Where the user gives it, for messages; brachis sets it for limits that are not its own."""
+    """Where the user gives the limit, for messages. Only set for limits that are not built in; brachis sets it."""
 
     @property
     def name(self) -> str:
-        """The kind in words."""
+        """The kind of limit, in words."""
         return self.kind.replace("_", " ")
 
     @property
     def is_checked_at_points(self) -> bool:
-        """Whether a violation counts at single points."""
+        """Whether a violation at a single point counts."""
         return self.role is not Role.SAFEGUARD and not self.guarantee.is_mean
 
     @property
     def is_of_postures(self) -> bool:
-        """Whether it is one of postures alone, whatever the timing."""
+        """Whether the limit depends on the posture alone, whatever the timing."""
         has_posture = self.at_rest != "nothing" and self.longer_time == "neither"
         return self.is_checked_at_points and has_posture
 
     @property
     def centre(self) -> np.ndarray:
-        """Value, (c,), that uses nothing of the limit; by default the middle between two finite bounds."""
+        """Values, (c,), at which the ratios are 0; by default the middle between two finite bounds."""
         with np.errstate(invalid="ignore"):  # -inf + inf
             return 0.5 * self.lower + 0.5 * self.upper
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
-        """The figures that the user could change; by default every finite bound by itself."""
+        """The figures that the user could change; by default each finite bound is a figure."""
         return tuple(
             Bound(column, level, max(abs(level), 1.0), 1.0, side)
             for side in ("lower", "upper")
@@ -264,12 +276,12 @@ class Description:
 
 
 def compute_inset(measure: np.ndarray | float) -> np.ndarray | float:
-    """Return the inset of positions whose violations are counted in a measure, rad or m."""
+    """Return the inset of positions whose violations are counted in units of `measure`, rad or m."""
     return np.minimum(_DEVIATION / measure, _LARGEST_INSET)
 
 
 def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
-    """Let a method of a limit say which plug-in's it is where it fails."""
+    """Let a method of a limit name the plug-in that it belongs to, if it fails."""
 
     @wraps(method)
     def call(limit: Limit, motion: JointStates) -> _Found:
@@ -283,44 +295,99 @@ def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
 
 
 class Limit(Description, ABC):
-    """c values of the joint motion at every moment, or their means over time, held between bounds."""
+    """Bounds on c values of the joint motion at every moment, or on the means of these values over time.
+
+    Attributes
+    ----------
+    robot : Robot
+        The robot of the limit, which `bind` sets.
+    """
+
+    robot: Robot
 
     def __init_subclass__(cls, **keywords: Any) -> None:
-        """Let the methods of plug-ins name the plug-in where they fail."""
+        """Let the methods of a plug-in name the plug-in if they fail."""
         super().__init_subclass__(**keywords)
         for name in ("values", "partials"):
             if name in vars(cls):
                 setattr(cls, name, _name_failures_of(vars(cls)[name]))
 
+    def bind(self, robot: Robot) -> Self:
+        """Return the limit for a robot: a copy with the attribute `robot`.
+
+        Override this method to check the robot, or to compute in advance what depends on it.
+        """
+        bound = copy.copy(self)
+        object.__setattr__(bound, "robot", robot)  # it may be frozen
+        return bound
+
     @abstractmethod
     def values(self, motion: JointStates) -> np.ndarray:
-        """Values (K, c)."""
+        """Compute the values.
+
+        Parameters
+        ----------
+        motion : JointStates
+            Motion at K moments, in rad or m, and seconds.
+
+        Returns
+        -------
+        (K, c) ndarray
+            The values, in the unit of `lower` and `upper`, of the order of 1.
+
+        Examples
+        --------
+        The speed of the first joint as a ratio to 2 rad/s:
+
+        >>> def values(self, motion):
+        ...     return motion.qdot[:, :1] / 2.0
+        """
 
     @abstractmethod
     def partials(self, motion: JointStates) -> Partials:
-        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
+        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, as if these were independent.
+
+        Parameters
+        ----------
+        motion : JointStates
+            Motion at K moments, in rad or m, and seconds.
+
+        Returns
+        -------
+        Partials
+            Derivatives with respect to q, qdot, qddot and qdddot, (K, c, n) each, per rad or m, rad/s or m/s, and so
+            on; and with respect to s, (K, c). None stands for zeros.
+
+        Examples
+        --------
+        The partials of the example of `values`:
+
+        >>> def partials(self, motion):
+        ...     first = np.eye(self.robot.n)[None, :1] / 2.0
+        ...     return Partials(qdot=np.repeat(first, len(motion.q), axis=0))
+        """
 
     def kernel_quantity(self, chain: Chain) -> Quantity | None:
-        """Describe the values as what the kernel computes by itself, of a chain; None where it does not."""
+        """Describe the values as a quantity that the kernel computes for a chain; None if it does not compute them."""
         return None
 
     def restrict_to(self, q: np.ndarray) -> Limit | None:
-        """Return what matters of it while the motion stays close to postures, (K, n); None where nothing does."""
+        """Return the part of the limit that matters close to postures, (K, n); None if no part does."""
         return self
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), it holds within a violation of `slack` while the arm rests, (K,)."""
+        """Tell in which postures, (K, n), the resting arm violates the limit by at most `slack`, (K,) bool."""
         values = self.values(Moments.at_rest(q))
         return np.all(self.violation(values) <= slack, axis=1)
 
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell on which straight steps from postures to others, (E, n), it holds as at both ends, (E,)."""
+        """Tell for each straight step between two postures, (E, n), if the limit holds as at its ends, (E,) bool."""
         return np.ones(len(first), dtype=bool)
 
     def relax(self, bound: Bound, amount: float) -> Self:
-        """Return the limit with one figure relaxed by `amount`, in its unit."""
+        """Return the limit with one figure relaxed by `amount`, in the unit of the figure."""
         relaxed = copy.copy(self)
         step = np.zeros(len(self.lower))
         step[bound.column] = bound.per_unit * amount
@@ -331,7 +398,7 @@ class Limit(Description, ABC):
         return relaxed
 
     def keep_inside(self, ends: np.ndarray) -> Self:
-        """Return the limit with bounds that are narrower by its inset, as far as postures, (K, n), leave room."""
+        """Return the limit with bounds that are narrower by the inset, as far as the postures `ends`, (K, n), allow."""
         ends = ends[np.isfinite(ends).all(axis=1)]
         beyond = self.violation(self.values(Moments.at_rest(ends)))
         room = -beyond.max(axis=0, initial=-np.inf)
@@ -342,12 +409,12 @@ class Limit(Description, ABC):
         return narrowed
 
     def violation(self, values: np.ndarray) -> np.ndarray:
-        """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
+        """Compute the violations, (K, c), of values, (K, c); negative inside the bounds. See the module."""
         beyond = np.maximum(values - self.upper, self.lower - values)
         return beyond * self.violation_scale
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
-        """How near values, (K, c), are to their bounds; see the module."""
+        """Compute the ratios, (K, c), of values, (K, c), to their bounds; see the module."""
         above = (values - self.upper) * self.violation_scale
         below = (self.lower - values) * self.violation_scale
         outside = np.where(
@@ -362,9 +429,9 @@ class Limit(Description, ABC):
         return np.divide(away, reach, out=outside, where=inside)
 
     def ratios(self, motion: JointStates, t: np.ndarray) -> np.ndarray:
-        """How near a whole motion is to the bounds at times t, (K,), dense and ascending, s: (K, c).
+        """Compute the ratios of a whole motion to the bounds, (K, c), at dense, ascending times t, (K,), s.
 
-        A mean over the whole motion is equally near at all times.
+        The ratio of a mean over the motion is the same at all times.
         """
         values = self.values(motion)
         if self.guarantee.is_mean:

@@ -1,4 +1,4 @@
-"""Branch margins >= eps: keeps the motion on its branch and away from singular decompositions."""
+"""Branch margins >= eps: this keeps the motion on its branch and away from singular decompositions."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from brachis.kinematics import JointMap
 from brachis.limits.protocol import Guarantee, JointStates, Limit, Partials, Role
 
 MARGIN = 5e-3
-"""Least branch margin, dimensionless. Nearer to the boundary, non-redundant joints are too fast for any collocation
+"""Least branch margin, dimensionless. Closer to the boundary, non-redundant joints move too fast for any collocation
 grid."""
 HELD_BACK = 1e-4
-"""Distance of a branch margin from its bound from which on it holds the motion back."""
+"""A branch margin that is closer than this to its bound is considered to hold the motion back."""
 
 
 class BranchMargin(Limit):
-    """Margins of the branch that a joint map is on.
+    """Margins of the branch of a joint map.
 
     Parameters
     ----------
     joint_map : JointMap
     at_start : (c,) ndarray
-        Margins of the start posture; half of one is the least margin if it is smaller than `margin`.
+        Margins of the start posture. If half of one is smaller than `margin`, it is the least margin.
     margin : float
-        The least one, dimensionless.
+        Least margin, dimensionless.
     """
 
     kind = "branch_margin"
@@ -45,11 +45,11 @@ class BranchMargin(Limit):
         self.upper = np.full(count, np.inf)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Margins (K, c); the motion is a state of the joint map."""
+        """Compute the margins, (K, c); the motion is a state of the joint map."""
         return self._joint_map.margins(motion)
 
     def kernel_quantity(self, _chain: Chain) -> FormulaQuantity | None:
-        """Describe the margins."""
+        """Describe the margins for the kernel."""
         return self._joint_map.margin_quantity()
 
     def partials(self, motion: JointStates) -> Partials:
@@ -60,6 +60,6 @@ class BranchMargin(Limit):
 def build_branch_margins(
     joint_map: JointMap, margin: float = MARGIN
 ) -> tuple[BranchMargin, ...]:
-    """Build the limit of a joint map with margins."""
+    """Build the limit of a joint map; empty if the map has no margins."""
     at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

@@ -1,18 +1,18 @@
-"""Limits on how fast the tool moves, turns and accelerates, and on how far it leaves the path.
+"""Limits on how fast the tool moves, turns and accelerates, and on how far it deviates from the path.
 
 Speeds and accelerations are ratios to the limit: |v| / v_max <= 1.
 With J the Jacobian of a velocity of the tool, v = J(q) qdot and its direction e = v / |v|,
 
     d|v|/dqdot = e . J,        d|v|/dq = e . dv/dq,
 
-and likewise for the size of the acceleration a = J qddot + Jdot qdot. A vector of zero size gets the direction zero: it
-is far from its limit.
+and likewise for the magnitude of the acceleration a = J qddot + Jdot qdot. A vector of length zero gets the direction
+zero: it is far from its limit.
 
-The largest speed of the tool frame's origin may depend on the path coordinate: piecewise linear (`SpeedProfile`).
+The largest speed of the tool frame's origin may be a piecewise linear function of the path coordinate (`SpeedProfile`).
 
-Tolerances that are more than ranges of the tool's virtual joints are a cone, a sphere, and a box in the world's axes.
-With the angles a (side) and b (lead) the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
-of the path's orientation is R d in the world's, with the rotation R of the chain's end.
+Three tolerances are more than ranges of the tool's virtual joints: a cone, a sphere, and a box in the world's axes.
+With the angles a (side) and b (lead), the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
+of the path's orientation is R d in the axes of the world, with the rotation R of the end of the chain.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from brachis.robot.task_map import Pose
 from brachis.task import SpeedTable, Task
 
 PROCESS_SPEED = "process speed"
-"""Name of what gives the tool's speed, from which the largest speed next to it follows."""
+"""Name of the setting from which the largest speed next to a part with a process speed follows."""
 
 
 class ToolRatios(Limit):
-    """Ratios of what the tool does to its limits, at most 1.
+    """Ratios of quantities of the tool to their limits, at most 1.
 
     Parameters
     ----------
@@ -62,25 +62,26 @@ class ToolRatios(Limit):
 
 
 class SpeedProfile:
-    """Largest sizes of a motion at path coordinates: piecewise linear, with steps made into ramps on their faster side.
+    """Largest speeds along the path: piecewise linear, with steps turned into ramps on their faster side.
 
     Parameters
     ----------
     s : (P,) sequence of float
-        Ascending; a place that occurs twice is a step.
+        Ascending path coordinates. A coordinate that occurs twice is a step.
     speed : (P,) sequence of float
         m/s.
-    whole : bool, optional
-        Whether the first and the last speed hold beyond their places too; otherwise nothing does there.
+    covers_path : bool, optional
+        Whether the first and the last speed also hold before the first and after the last coordinate. Otherwise there
+        is no limit there.
 
     Attributes
     ----------
     places : (p,) ndarray
-        Path coordinates between which the speed is linear, each once.
+        Path coordinates between which the speed is linear, without repetitions.
     speeds : (p,) ndarray
-        m/s; between the given places nowhere above the given ones.
+        Speeds at these coordinates, m/s. Between the given coordinates they are nowhere above the given speeds.
     largest : float
-        Of the given ones, m/s.
+        Largest of the given speeds, m/s.
     """
 
     def __init__(
@@ -89,9 +90,9 @@ class SpeedProfile:
         stated = np.array(s, dtype=float)
         places = stated.copy()
         speeds = np.array(speed, dtype=float)
-        ramp = 5e-3  # length in s: Newton's steps need a slope
+        ramp = 5e-3  # length in s: Newton steps need a slope
         for first in np.flatnonzero(np.diff(stated) == 0.0).tolist():
-            # The side with the higher speed moves away from the step, on the line to the next place.
+            # The side with the higher speed is moved away from the step, along the line to the next coordinate.
             rises = speeds[first + 1] > speeds[first]
             moved = first + 1 if rises else first
             onwards = 1 if rises else -1
@@ -104,7 +105,7 @@ class SpeedProfile:
             places[moved] += onwards * length
         self.largest = float(speeds.max())
         self._covers_path = covers_path
-        if not covers_path:  # beyond its ends the speed goes on rising within a ramp
+        if not covers_path:  # outside, the speed continues to rise within a ramp
             places = np.concatenate([[places[0] - ramp], places, [places[-1] + ramp]])
             speeds = np.concatenate([20.0 * speeds[:1], speeds, 20.0 * speeds[-1:]])
         slopes = np.concatenate([[np.nan], np.diff(speeds) / np.diff(places), [np.nan]])
@@ -113,7 +114,7 @@ class SpeedProfile:
         self.speeds = speeds[bends]
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; infinite off the path."""
+        """Return the largest speeds at s, (K,), m/s, and their slopes over s, m/s; infinite speeds without a limit."""
         if len(self.places) == 1:
             return np.full(len(s), self.speeds[0]), np.zeros(len(s))
         slopes = np.diff(self.speeds) / np.diff(self.places)
@@ -126,9 +127,9 @@ class SpeedProfile:
 
 
 class ToolMotionLimit(ToolRatios):
-    """Size of a motion of the tool over its limits: speed or acceleration of its frame's origin, or angular speed.
+    """Ratio of a speed of the tool to its limits: speed or acceleration of its frame's origin, or angular speed.
 
-    Virtual joints do not move the tool: they say how far it is from the path.
+    Virtual joints do not move the tool: their positions are its deviation from the path.
 
     Parameters
     ----------
@@ -148,7 +149,7 @@ class ToolMotionLimit(ToolRatios):
         tables: Sequence[SpeedProfile],
         labels: Sequence[Label],
     ) -> None:
-        # The largest figure of a table stands for all of them.
+        # The largest figure of a table represents the table.
         super().__init__(labels, [table.largest for table in tables])
         self.kind = f"tool_{quantity}".replace(" ", "_")
         self._robot = robot
@@ -158,7 +159,7 @@ class ToolMotionLimit(ToolRatios):
         self.breaks = np.unique(np.concatenate(steps or [[]]))
 
     def largest_at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest sizes, (K, c), at path coordinates s, (K,), and their derivatives by s."""
+        """Return the limits, (K, c), at path coordinates s, (K,), and their derivatives with respect to s."""
         largest, slopes = zip(*(table.at(s) for table in self._tables), strict=True)
         return np.column_stack(largest), np.column_stack(slopes)
 
@@ -173,7 +174,7 @@ class ToolMotionLimit(ToolRatios):
         return sizes[:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the values by q, qdot and, for accelerations, qddot, (K, c, n) each, and by s, (K, c)."""
+        """Differentiate with respect to q, qdot and, for accelerations, qddot, (K, c, n) each, and to s, (K, c)."""
         chain = self._robot.chain
         sizes, slopes = chain.tool_size_slopes(self._quantity, *self._states(motion))
         largest, slope = self.largest_at(motion.s)
@@ -182,9 +183,8 @@ class ToolMotionLimit(ToolRatios):
             for derivatives in slopes
         )
         s = -sizes[:, None] * slope / largest**2
-        if self._quantity == "acceleration":
-            return Partials(q, qdot, qddot, s=s)
-        return Partials(q, qdot, s=s)
+        by_qddot = qddot if self._quantity == "acceleration" else None
+        return Partials(q, qdot, by_qddot, s=s)
 
 
 def _label(quantity: str, unit: str) -> Label:
@@ -193,7 +193,7 @@ def _label(quantity: str, unit: str) -> Label:
 
 
 def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one, or whose path has feed rates or leads to process speeds."""
+    """Build the limit from the task's tool speed, feed rates, and leads of process speeds; None without any."""
     limits = task.tool_limits
     speed = limits.speed
     tables = []
@@ -237,19 +237,16 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 
 
-def build_constant(
-    quantity: str, unit: str, robot: Robot, task: Task
-) -> ToolMotionLimit | None:
-    """Build the limit of a task that has one figure for a quantity of `ToolMotionLimit`."""
-    figure = getattr(task.tool_limits, quantity.replace(" ", "_"))
-    if figure is None:
-        return None
+def constant_limit(
+    quantity: str, unit: str, robot: Robot, _task: Task, figure: float
+) -> ToolMotionLimit:
+    """Return the limit of a quantity of `ToolMotionLimit` with one figure, in the given unit."""
     table = SpeedProfile([0.0], [figure])
     return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
 
 
 def _joints_of(robot: Robot, *directions: str) -> list[int]:
-    """Return the virtual joints of the tool that move it in some ways, as far as there are such joints."""
+    """Return the indices of the tool's virtual joints for some directions, as far as there are such joints."""
     names = [joint.direction for joint in robot.tool_joints]
     first = len(robot.urdf_joints)
     return [
@@ -258,21 +255,21 @@ def _joints_of(robot: Robot, *directions: str) -> list[int]:
 
 
 class _Size(ToolRatios):
-    """How far the tool is from the path, zero or more, over the largest size that is allowed.
+    """Ratio of the tool's deviation from the path, zero or more, to the largest allowed deviation.
 
     Parameters
     ----------
     robot : Robot
     figure : float
-        The largest size, in the unit of the label.
+        The largest allowed deviation, in the unit of the label.
     """
 
     at_rest = "posture"
     directions: tuple[str, ...]
-    """In which the virtual joints move the tool on which it depends."""
+    """Directions of the virtual joints on which the deviation depends."""
     label: Label
 
-    def __init__(self, robot: Robot, figure: float) -> None:
+    def __init__(self, robot: Robot, _task: Task, figure: float) -> None:
         super().__init__([self.label], [figure])
         self._n = robot.n
         self._joints = _joints_of(robot, *self.directions)
@@ -280,7 +277,7 @@ class _Size(ToolRatios):
         self.inset = compute_inset(self._largest)
 
     def _divide(self, slopes: np.ndarray, size: np.ndarray) -> Partials:
-        """Return `slopes` by the virtual joints, (K, j), over a size, (K, 1), and the largest one; 0 for size 0."""
+        """Divide slopes with respect to the virtual joints, (K, j), by `size`, (K, 1), and the limit; 0 for size 0."""
         by_q = np.zeros((len(slopes), 1, self._n))
         zero = np.zeros_like(slopes)
         by_q[:, 0, self._joints] = np.divide(
@@ -290,7 +287,7 @@ class _Size(ToolRatios):
 
 
 class TiltLimit(_Size):
-    """Angle between the tool's z axis and that of the path over the largest one."""
+    """Ratio of the angle between the z axes of the tool and the path to the largest angle."""
 
     kind = "tool_tilt"
     directions = ("side", "lead")
@@ -302,7 +299,7 @@ class TiltLimit(_Size):
         return np.arccos(np.clip(cosine, -1.0, 1.0)) / self._largest
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the tilt, over the largest one, by q, (K, 1, n)."""
+        """Differentiate the ratio with respect to q, (K, 1, n)."""
         angles = motion.q[:, self._joints]
         tilt = self.values(motion) * self._largest
         falls = np.tan(angles) * np.cos(angles).prod(axis=1, keepdims=True)
@@ -310,7 +307,7 @@ class TiltLimit(_Size):
 
 
 class DistanceLimit(_Size):
-    """Distance of the tool from the path over the largest one."""
+    """Ratio of the distance between tool and path to the largest distance."""
 
     kind = "tool_distance"
     directions = ("x", "y", "z")
@@ -326,13 +323,13 @@ class DistanceLimit(_Size):
 
 
 class RangeLimit(Limit):
-    """Displacement of the tool from the path along the world's axes within ranges.
+    """Ranges for the displacement of the tool from the path along the world's axes.
 
     Parameters
     ----------
     robot : Robot
     ranges : (3, 2) ndarray
-        Along x, y and z, m.
+        Ranges along x, y and z, m.
     """
 
     kind = "tool_range"
@@ -362,7 +359,7 @@ class RangeLimit(Limit):
         return apply_each(rotations, away) * self._scale
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the values by q, (K, 3, n)."""
+        """Differentiate the values with respect to q, (K, 3, n)."""
         rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
         away = motion.q[:, self._joints]
         turning = self._pose.twists(motion.q)[3:]
@@ -373,20 +370,8 @@ class RangeLimit(Limit):
         return Partials(q=in_world * self._scale[:, None])
 
 
-def build_tool_tilt(robot: Robot, task: Task) -> TiltLimit | None:
-    """Build the limit of a task whose tool may tilt within a cone."""
-    figure = task.tolerances.orientation.tilt
-    return None if figure is None else TiltLimit(robot, figure)
-
-
-def build_tool_distance(robot: Robot, task: Task) -> DistanceLimit | None:
-    """Build the limit of a task whose tool may be within a sphere around the path."""
-    figure = task.tolerances.position.sphere
-    return None if figure is None else DistanceLimit(robot, figure)
-
-
 def build_tool_range(robot: Robot, task: Task) -> RangeLimit | None:
-    """Build the limit of a task whose tool may be within a box in the world's axes."""
+    """Build the limit; None unless the task allows the tool a box in the world's axes."""
     tolerance = task.tolerances.position
     if tolerance.axes == "tool" or tolerance.x is None:
         return None

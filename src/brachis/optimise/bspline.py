@@ -157,23 +157,6 @@ def clamped_knots(degree: int, breaks: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros(degree), breaks, np.ones(degree)])
 
 
-def clamped_uniform_knots(degree: int, intervals: int) -> np.ndarray:
-    """Return the knots of a clamped spline with equal intervals.
-
-    Parameters
-    ----------
-    degree : int
-    intervals : int
-        N; the spline has N + degree control points.
-
-    Returns
-    -------
-    (N + 2 degree + 1,) ndarray
-        Knots in normalised time, from 0 to 1.
-    """
-    return clamped_knots(degree, np.linspace(0.0, 1.0, intervals + 1))
-
-
 def insert_knots(
     control_points: np.ndarray, knots: np.ndarray, finer: np.ndarray, degree: int
 ) -> np.ndarray:

@@ -49,9 +49,9 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
         chart_knots = joint_map.rows.knots
     nodes = join_nodes([section.nodes for section in sections])
     limits = program.phases[0].limits
-    user_limits = [
+    own_limits = tuple(
         limit.name for limit in limits if limit.origin.startswith("own_limits")
-    ]
+    )
     return Trajectory(
         task=task,
         urdf=joint_map.robot.urdf,
@@ -69,7 +69,7 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
         phase_ends=np.cumsum([section.nodes.times[-1] for section in sections]),
         chart_rows=rows,
         chart_knots=chart_knots,
-        own_limits=tuple(user_limits),
+        own_limits=own_limits,
     )
 
 

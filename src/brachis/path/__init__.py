@@ -1,4 +1,4 @@
-"""The prescribed path and its derivatives by the path coordinate, up to the third."""
+"""The prescribed path and its first three derivatives with respect to the path coordinate."""
 
 from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.from_curve import bspline_segment, with_feed_rates

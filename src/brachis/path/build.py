@@ -1,4 +1,4 @@
-"""The path of a task: the curves of its segments, joined with blends, from where the start posture's tool is."""
+"""The path of a task: the curves of its segments, joined with blends, beginning at the tool of the start posture."""
 
 from __future__ import annotations
 
@@ -105,17 +105,17 @@ BUILDERS: Final[dict[type, Callable[[Any, SegmentContext], Curve]]] = {
     BSplineCurve: bspline_curve,
     PointFile: _unread,
 }
-"""For every form of segment, the function that makes the curve of its rows, or of a pose's position."""
+"""For every form of segment, the function that builds the curve of its rows, or of a pose's position."""
 
 
 @dataclass(frozen=True)
 class RowCoordinates:
-    """Rows of a task space; the task velocity is their own derivative.
+    """Rows of a task space; the task velocity is their derivative.
 
     Attributes
     ----------
     rows : tuple of str
-        Names of the first coordinates, those of the position before others.
+        Names of the first coordinates: those of the position come first.
     """
 
     rows: tuple[str, ...]
@@ -123,12 +123,12 @@ class RowCoordinates:
     blend = staticmethod(blend_rows)
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """Return the curve of the segment with this index in the path, from its start on.
+        """Return the curve of the segment with this index in the path, beginning at `start`.
 
         Raises
         ------
         PathError
-            The segment has zero length, or does not fit these coordinates.
+            The segment has zero length or does not fit these coordinates.
         """
         context = SegmentContext(f"path[{index}].{segment.kind}", start, self.rows)
         if isinstance(segment, TurnSegment) or segment.orientation is not None:
@@ -147,7 +147,7 @@ class JointCoordinates(RowCoordinates):
     """The positions of all joints."""
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """Return the curve of a segment, whose coordinates may be in another order of the joints."""
+        """Return the curve of a segment, whose coordinates may be in a different order of the joints."""
         if not isinstance(segment, LineSegment | SplineSegment | BSplineSegment):
             by = ", ".join(["1.5708", *["0"] * (len(self.rows) - 1)])
             raise PathError(
@@ -183,7 +183,7 @@ def _permute(columns: np.ndarray, _sigma: Array, derivatives: Array) -> Array:
 
 @dataclass(frozen=True)
 class PoseCoordinates(RowCoordinates):
-    """Rows of the position, then the rotation matrix row by row; `rows` are those of the position."""
+    """Rows of the position, then the rotation matrix row by row; `rows` are the rows of the position."""
 
     corner = staticmethod(pose_corner)
     blend = staticmethod(blend_poses)
@@ -238,26 +238,26 @@ def build_path(
     segments : sequence of Segment
         The segments of a task, at least one.
     start : array_like, shape (c,)
-        Task coordinates at the start posture, m and rad; of an orientation the rotation matrix row by row.
+        Task coordinates at the start posture, m and rad; for an orientation, the rotation matrix row by row.
     task_space_rows : sequence of str
-        Rows of the task space, out of x, y, z and behind them one of roll, pitch, yaw, or rx, ry, rz for orientations;
+        Rows of the task space: out of x, y, z, followed by one of roll, pitch, yaw, or by rx, ry, rz for orientations;
         or the rows of all joints (`brachis.robot.task_map.protocol.joint_rows`).
     frame : PathFrame, optional
-        Frame in which the segments are given; the world's unless given. The start is in the world either way.
+        Frame in which the segments are given. Default: the world. The start is always in the world.
     postures : mapping of str to ndarray, optional
-        Task coordinates in the world, (c,), of the postures that lines lead to.
+        Task coordinates in the world, (c,), of the postures to which lines lead.
 
     Returns
     -------
     Path
-        The path in the world, three times continuously differentiable in s but for its stops. For poses `PosePath`,
-        whose samples have the body twist; for other orientations `OrientedPath`.
+        The path in the world, three times continuously differentiable in s except at its stops: for poses a `PosePath`,
+        whose samples have the body twist; for other orientations an `OrientedPath`.
 
     Raises
     ------
     PathError
-        A segment does not fit the task space, has zero length or is not defined; or the path has a corner that is not
-        blended and no stop, or a blend that does not fit. The message names the key.
+        A segment does not fit the task space, has zero length or is undefined; the path has a corner without a blend or
+        a stop; or a blend does not fit. The message names the key.
 
     Examples
     --------
@@ -275,7 +275,7 @@ def build_path(
     elif rows[-3:] == TURN_ROWS:
         path_type = PosePath if rows == POSE_ROWS else OrientedPath
         coordinates = PoseCoordinates(position_rows(rows))
-        # The nearest rotation: the polar decomposition without its stretch.
+        # The closest rotation: the polar decomposition without its stretch.
         u, _, vt = np.linalg.svd(rotations(point))
         point[-9:] = (u @ vt).ravel()
     if frame is not None:
@@ -300,7 +300,7 @@ def build_path(
 def _line_to(
     segment: Segment, place: Array, start: Array, rows: tuple[str, ...]
 ) -> Segment:
-    """Return a line to a posture as the line from `start` to its `place`, (c,), the shorter way round."""
+    """Replace a line to a posture by the line from `start` to `place`, (c,), with the shorter rotation."""
     orientation = None
     if rows[-3:] == TURN_ROWS:
         turn = rotation_of(rotations(place))
@@ -319,13 +319,12 @@ def _join(
     segments: Sequence[Segment],
     coordinates: RowCoordinates,
 ) -> tuple[CurveSpan, ...]:
-    """Return the parts of the segments' curves, each of which starts where its predecessor ends, with rounded corners.
+    """Return the parts of the segments' curves, joined end to end, with rounded corners.
 
     Raises
     ------
     PathError
-        Curves do not continue each other to the third derivative, are not blended, and the tool does not stop there; or
-        a blend does not fit.
+        Curves do not continue each other to the third derivative, without a blend or a stop; or a blend does not fit.
     """
     corners = []
     spans = []
@@ -344,7 +343,7 @@ def _join(
             spans.append(CurveSpan(rounded, 0.0, rounded.length))
     spans.append(CurveSpan(curves[-1], taken, curves[-1].length, len(curves) - 1))
     refuse_corners(corners)
-    # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
+    # Two blends that meet in the middle of a segment leave nothing of it except rounding.
     return tuple(span for span in spans if span.length > 1e-11 * span.curve.length)
 
 
@@ -363,7 +362,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     Raises
     ------
     StartError
-        The start posture's tool is not at the task's ``path_start``.
+        The tool of the start posture is not at the task's ``path_start``.
     PathError, UnknownNameError, InputError
         See `build_path`; or ``path_start`` does not fit the task space.
     """
@@ -392,7 +391,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
 def check_on_path(
     task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str, where: str
 ) -> None:
-    """Refuse a posture, (n,), stated at `where`, whose tool is not at the path's start or end, `target`, (c,).
+    """Refuse a posture, (n,), given at `where`, whose tool is not at the start or end of the path, `target`, (c,).
 
     Raises
     ------
@@ -417,7 +416,7 @@ def check_on_path(
 
 
 def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
-    """Say what implausible positions in a posture, (n,), look like, such as degrees; None if all are plausible."""
+    """Return a hint about implausible positions in a posture, (n,), such as degrees; None if all are plausible."""
     ends = robot.limits.both_ways("position")
     joints = zip(posture.tolist(), *ends, robot.position_units, strict=True)
     hints = (position_hint(*joint) for joint in joints)
@@ -425,7 +424,7 @@ def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
 
 
 def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
-    """Say what stated coordinates, (c,), that are not the tool's, (c,), look like."""
+    """Return a hint about stated coordinates, (c,), that differ from those of the tool, (c,)."""
     axes = len(task_map.axes)
     hint = place_hint(place[:axes], target[:axes], task_map.rows)
     if axes:

@@ -1,4 +1,4 @@
-"""Where a segment stands: its key and the point it starts from, with the checks that all builders share."""
+"""The context of a segment: its key and its start, with the checks that all builders share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from brachis.robot.task_map.protocol import position_rows
 
 @dataclass(frozen=True, eq=False)
 class SegmentContext:
-    """What the builder of a segment's curve knows beside the segment itself.
+    """The data that the builder of a segment's curve needs besides the segment itself.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class SegmentContext:
     start : ndarray, shape (m,)
         Task coordinates at which the segment starts.
     rows : tuple of str
-        Rows of the task space; of a pose its position rows.
+        Rows of the task space; for a pose its position rows.
     """
 
     key: str
@@ -62,7 +62,7 @@ class SegmentContext:
         return np.asarray(values, dtype=float)
 
     def need_rows(self, what: str, *counts: int) -> None:
-        """Refuse a form of segment for which the task space has another number of position rows than `counts`.
+        """Refuse a form of segment unless the number of position rows is among `counts`.
 
         Raises
         ------
@@ -88,13 +88,13 @@ class SegmentContext:
     def wrong(
         self, problem: str, key: str = "", **details: Unpack[Details]
     ) -> PathError:
-        """Return the error that a key of the segment, such as ``.normal``, is wrong."""
+        """Return an error about a key of the segment, such as ``.normal``."""
         details["where"] = f"{self.key}{key}"
         return PathError(problem, **details)
 
 
 def place(rows: Sequence[str], point: Array) -> str:
-    """Return coordinates in words, to the nanometre; of a pose its position."""
+    """Write coordinates in words, to the nanometre; for a pose only its position."""
     return ", ".join(
         f"{row} = {round(value, 9) + 0.0:.6g}"
         for row, value in zip(rows, point, strict=False)
@@ -102,6 +102,6 @@ def place(rows: Sequence[str], point: Array) -> str:
 
 
 def stands_still(curve: Curve, positions: int) -> bool:
-    """Return whether the position rows, the first ones, do not move along a curve."""
+    """Return whether the position rows, which come first, do not move along a curve."""
     ends = curve.derivatives(curve.knots, 0)[0, :, :positions]
     return bool(np.ptp(ends, axis=0).max(initial=0.0) < tolerances.LENGTH)

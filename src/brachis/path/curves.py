@@ -1,4 +1,4 @@
-"""Curves: lines, arcs, helices and splines; and the functions that make all but the splines of a task's segments."""
+"""Curves: lines, arcs, helices and splines; and the functions that build them from segments, except for splines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from brachis.task.segments import (
 )
 
 _MOST_TURNS = 1000
-"""Turns of an arc. They have four knots each; a plan of 100 turns takes half a minute and 1.1 GB of memory."""
+"""Largest number of turns of an arc. Each has four knots: a plan of 100 turns takes half a minute and 1.1 GB of
+memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +35,10 @@ class SplineCurve:
     spline : Spline
         With values of shape (m,).
     length : float
-        Range of sigma; of waypoints the cumulative chord length of the position rows, m (of the angle, rad, where they
-        stand still).
+        Range of sigma; for waypoints the cumulative chord length of the position rows, m (of the angle, rad, if the
+        position stands still).
     knots : ndarray
-        Values of sigma between which the spline is a polynomial; of waypoints their chord lengths.
+        Values of sigma between which the spline is a polynomial; for waypoints their cumulative chord lengths.
     """
 
     spline: Spline
@@ -45,17 +46,17 @@ class SplineCurve:
     knots: Array
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        """Return the curve and its derivatives with respect to sigma, shape (order + 1, K, m)."""
         return self.spline.derivatives(sigma, order)
 
 
 def septic(start: Array, end: Array, length: float) -> SplineCurve:
-    """Return the septic polynomial with given values and three derivatives at both ends.
+    """Return the septic polynomial with given values and first three derivatives at both ends.
 
     Parameters
     ----------
     start, end : ndarray, shape (4, m)
-        Value, first, second and third derivative by sigma.
+        Value and first, second and third derivatives with respect to sigma.
     length : float
         Range of sigma.
     """
@@ -63,7 +64,7 @@ def septic(start: Array, end: Array, length: float) -> SplineCurve:
 
     ends = np.array([0.0, length])
     polynomial = BPoly.from_derivatives(ends, [start, end])
-    # As a spline without inner knots it has the same control points, and is evaluated faster.
+    # A spline without inner knots has the same control points, and is evaluated faster.
     spline = Spline(np.repeat(ends, 8), polynomial.c[:, 0], 7)
     return SplineCurve(spline, length, ends)
 
@@ -77,9 +78,10 @@ class LineCurve:
     start : ndarray, shape (m,)
         Task coordinates at its start.
     slope : ndarray, shape (m,)
-        Task coordinates per unit sigma; of norm 1 in the position rows, or in the angle where they stand still.
+        Task coordinates per unit sigma. The norm is 1 in the position rows, or in the angle if the position stands
+        still.
     length : float
-        Range of sigma, m (rad where the position stands still).
+        Range of sigma, m (rad if the position stands still).
     """
 
     start: Array
@@ -88,11 +90,11 @@ class LineCurve:
 
     @property
     def knots(self) -> Array:
-        """Start and end: the line is analytic."""
+        """Start and end, because the line is analytic."""
         return np.array([0.0, self.length])
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the line and its derivatives by sigma, shape (order + 1, K, m)."""
+        """Return the line and its derivatives with respect to sigma, shape (order + 1, K, m)."""
         result = np.zeros((order + 1, sigma.size, self.start.size))
         result[0] = self.start + sigma[:, None] * self.slope
         result[1:2] = self.slope
@@ -106,13 +108,13 @@ def line_to(shape: LineTo, context: SegmentContext) -> LineCurve:
 
 
 def line_by(shape: LineBy, context: SegmentContext) -> LineCurve:
-    """Return the line by a displacement."""
+    """Return the line given by a displacement."""
     displacement = context.coordinates(shape.by, "by", context.rows)
     return _line(displacement, context, ".by", list(shape.by))
 
 
 def line_heading(shape: LineHeading, context: SegmentContext) -> LineCurve:
-    """Return the line of given length and direction in the plane of the two position rows."""
+    """Return the line given by its length and direction in the plane of the two position rows."""
     context.need_rows("a line by length and angle_deg", 2)
     angle = np.deg2rad(shape.angle_deg)
     displacement = np.zeros_like(context.start)
@@ -138,15 +140,16 @@ class ArcCurve:
     Attributes
     ----------
     center : ndarray, shape (m,)
-        Centre, m; where an angle is a row, that at the start, rad.
+        Centre, m; for an angle its value at the start, rad.
     outward, forward : ndarray, shape (m,)
-        From the centre to the start, and in the direction of the turn there; both as long as the radius, m.
+        Vectors from the centre to the start, and in the direction of the turn there. Both have the length of the
+        radius, m.
     length : float
         Length of the curve, m.
     turn : float
         Angle per unit sigma, rad/m.
     slope : ndarray, shape (m,)
-        Climb along the axis per unit sigma; of an angle rad/m.
+        Climb along the axis per unit sigma; for an angle its slope, rad/m.
     """
 
     center: Array
@@ -164,13 +167,13 @@ class ArcCurve:
 
     @property
     def knots(self) -> Array:
-        """Every quarter turn: the arc is analytic, but a quadrature needs several intervals on many turns."""
+        """Every quarter turn. The arc is analytic, but a quadrature over many turns needs several intervals."""
         quarters = int(np.ceil(self.length * self.turn / (np.pi / 2)))
         return np.linspace(0.0, self.length, max(quarters, 1) + 1)
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
-        # Each derivative turns the position vector by a quarter and multiplies it by the angle per unit sigma.
+        """Return the curve and its derivatives with respect to sigma, shape (order + 1, K, m)."""
+        # Each derivative turns the position vector by a quarter turn and multiplies it by the angle per unit sigma.
         orders = np.arange(order + 1)[:, None, None]
         angle = self.turn * sigma[:, None] + orders * np.pi / 2
         result = np.cos(angle) * self.outward + np.sin(angle) * self.forward
@@ -181,14 +184,14 @@ class ArcCurve:
 
 
 def _arc(center: Array, outward: Array, forward: Array, angle: float) -> ArcCurve:
-    """Return the arc by an angle, rad, without climb or angle."""
+    """Return the arc through an angle, rad, without climb and without a row for an angle."""
     radius = float(np.linalg.norm(outward))
     nothing = np.zeros_like(center)
     return ArcCurve(center, outward, forward, radius * angle, 1.0 / radius, nothing)
 
 
 def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
-    """Return the arc about a centre by an angle."""
+    """Return the arc about a centre through an angle."""
     angle = float(np.deg2rad(shape.angle_deg))
     if abs(angle) < tolerances.LENGTH:
         raise context.zero_length(".angle_deg", shape.angle_deg)
@@ -196,16 +199,16 @@ def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
 
 
 def circle(shape: CircleTurns, context: SegmentContext) -> ArcCurve:
-    """Return the turns about a centre."""
+    """Return whole or partial turns about a centre."""
     arc = _about_center(shape, 2 * np.pi * shape.turns, context)
     return _with_angle(arc, shape.yaw, context)
 
 
 def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
-    """Return the arc through a point to another one.
+    """Return the arc through one point to another.
 
-    The centre c is as far from the start p as from the two points p + a and p + b: ``a.(c - p) = a.a / 2`` and the same
-    with b, where c - p is a combination of a and b, whatever the number of rows.
+    The centre c is as far from the start p as from the two points p + a and p + b: ``a.(c - p) = a.a / 2``, and the
+    same with b. For any number of rows, c - p is a linear combination of a and b.
     """
     context.need_rows("an arc", 2, 3)
     start = context.position
@@ -227,7 +230,7 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     to_center = np.linalg.solve(gram, np.diag(gram) / 2) @ sides
     outward = -to_center
     radius = np.linalg.norm(outward)
-    # An inversion about the start makes a line of the circle, and this the direction in which via comes before the end.
+    # An inversion about the start turns the circle into a line. In this direction, via comes before the end.
     forward = to_via / gram[0, 0] - to_end / gram[1, 1]
     forward -= (forward @ outward) / radius**2 * outward
     forward *= radius / np.linalg.norm(forward)
@@ -240,7 +243,7 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
 def _about_center(
     shape: ArcCenter | CircleTurns | HelixTurns, angle: float, context: SegmentContext
 ) -> ArcCurve:
-    """Return the arc by a signed angle, rad, about the centre of a shape; an angle is left out."""
+    """Return the arc through a signed angle, rad, about the centre of a shape, without a row for an angle."""
     context.need_rows("an arc", 2, 3)
     center = context.coordinates(shape.center, "center", context.positions)
     outward = context.position - center
@@ -269,7 +272,7 @@ def _about_center(
         forward = np.array([-outward[1], outward[0]])
     else:
         normal = _normal(shape.normal, outward, context)
-        # The plane is the one through the start: a centre given with a few digits is moved into it.
+        # The plane contains the start: a centre given with few digits is moved into it.
         center = center + (normal @ outward) * normal
         outward = context.position - center
         forward = np.cross(normal, outward)
@@ -303,7 +306,7 @@ def _normal(
 
 
 def _with_angle(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
-    """Return the arc with the angle that the segment asks for, where the task space has one."""
+    """Add the row of the angle that the segment asks for, if the task space has an angle."""
     tangent = turning == "tangent"
     angle = context.rows[-1]
     if angle in ANGLES:
@@ -341,7 +344,7 @@ def _with_angle(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurv
 
 
 def helix(shape: HelixTurns, context: SegmentContext) -> ArcCurve:
-    """Return the climbing turns about an axis."""
+    """Return climbing turns about an axis."""
     context.need_rows("a helix", 3)
     arc = _about_center(shape, 2 * np.pi * shape.turns, context)
     # The arc's normal has the sign of the turns.

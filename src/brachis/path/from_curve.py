@@ -1,4 +1,4 @@
-"""Segments from curves of other libraries, and speeds of the tool along a path from the feed rates of its points."""
+"""Segments from curves of other libraries; and speeds of the tool along a path from the feed rates of its points."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ def bspline_segment(
     *,
     tolerance: float = 1e-9,
 ) -> dict[str, Any]:
-    """Turn a curve into a segment of a task's path.
+    """Convert a curve to a segment of a task's path.
 
     Parameters
     ----------
     curve : scipy BSpline, PPoly, CubicSpline, ... or callable
-        Piecewise polynomials of SciPy's are taken exactly. Of any other function ``curve(u)`` the values, (m,), are
-        asked for at single numbers u in the interval.
+        Piecewise polynomials of SciPy are converted exactly. Any other function ``curve(u)`` is called with single
+        numbers u in the interval, and returns values, (m,).
     interval : (float, float), optional
-        Range of u; of SciPy's curves their own. Required for a function.
+        Range of u. Default for curves of SciPy: their own range. Required for a function.
     tolerance : float, optional
-        Largest distance of a function from the spline that stands for it, rad or m.
+        Largest distance between a function and the spline that replaces it, rad or m.
 
     Returns
     -------
@@ -45,8 +45,8 @@ def bspline_segment(
     Raises
     ------
     InputError
-        A derivative up to the third jumps, a function is not smooth enough for the tolerance, or the interval or the
-        values do not fit.
+        One of the first three derivatives jumps, a function is not smooth enough for the tolerance, or the interval or
+        the values are not valid.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def _of_pieces(
     degree: int,
     interval: tuple[float, float] | None,
 ) -> BSpline:
-    """Write piecewise polynomials, C3, as a clamped B-spline over the same breaks."""
+    """Convert C3 piecewise polynomials to a clamped B-spline over the same breaks."""
     first, last = _check_interval(interval or (breaks[0], breaks[-1]))
     grid = cut(np.unique(breaks), first, last)
     after = grid[1:]
@@ -122,7 +122,7 @@ def _of_pieces(
 def _of_function(
     curve: Callable[[Any], Any], interval: tuple[float, float], tolerance: float
 ) -> BSpline:
-    """Fit a spline of degree 5 to a function, with ever more intervals, until it is met in between as well."""
+    """Fit a spline of degree 5 to a function, with more and more intervals, until it agrees in between as well."""
 
     def values(u: Array) -> Array:
         """Return the function's values, (K, m), after a check."""
@@ -159,9 +159,9 @@ def _interpolate(
     degree: int,
     multiplicity: int | None = None,
 ) -> BSpline:
-    """Interpolate at the Greville abscissae, which is exact where the spline space has the function.
+    """Interpolate at the Greville abscissae, which is exact if the function is in the spline space.
 
-    Inner breaks are knots of this multiplicity; as many as three continuous derivatives allow unless given.
+    Inner breaks are knots of this multiplicity. Default: the largest that leaves three continuous derivatives.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -173,21 +173,22 @@ def _interpolate(
 
 
 def _rows(values: Array) -> Array:
-    """One row a point, also of curves of one coordinate."""
+    """Return values with one row for each point, also for curves with one coordinate."""
     return np.asarray(values, dtype=float).reshape(len(values), -1)
 
 
 def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ...]:
-    """Return the tables of a task's segments on the path that was built of them, in order.
+    """Return the speed tables of a task's segments along the path that was built from them, in order.
 
-    Where one segment's table ends with it and the next one's begins with that, they are one, over the blend between.
+    If the table of one segment reaches its end, and that of the next segment its beginning, they are joined over the
+    blend.
 
     Parameters
     ----------
     segments : sequence of Segment
         Those of the task.
     path : Path
-        Built of them by `build_path`.
+        The path that `build_path` built from them.
     """
     tables: list[Array] = []
     goes_on = False  # whether the last table holds up to the end of its segment
@@ -215,7 +216,7 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
 
 
 def with_feed_rates(task: Task, path: Path) -> Task:
-    """Return the task with the feed rates of its path's points among its limits on the tool."""
+    """Add the feed rates of the path's points to the tool limits of a task."""
     tables = feed_tables(task.path, path)
     if not tables:
         return task

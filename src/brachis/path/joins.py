@@ -1,4 +1,4 @@
-"""Where curves, of rows or of poses, meet: whether they continue each other, and blends that round the corner."""
+"""Joins between curves of rows or of poses: whether the curves continue each other, and blends that round corners."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from brachis.robot.task_map.protocol import joints_of, position_rows
 from brachis.task.points.units import quaternions_of
 
 _SHARPEST = np.radians(172.0)
-"""Largest corner, rad, that a blend rounds: beyond 172.1 degrees that of two lines falls below its least speed."""
+"""Largest corner that a blend rounds, rad: above 172.1 degrees, the blend of two lines is below its least speed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Join:
-    """The place where one segment of the path ends and the next one begins, before blends.
+    """The place where one segment of the path ends and the next one begins, before blending.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Join:
     s : float
         Path coordinate.
     rows : tuple of str
-        Rows of the task space; of a pose its position rows.
+        Rows of the task space; for a pose its position rows.
     """
 
     first: Curve
@@ -50,16 +50,16 @@ class Join:
 
     @property
     def point(self) -> Array:
-        """Task coordinates, (m,); of a pose twelve."""
+        """Task coordinates, (m,); for a pose twelve."""
         return self.second.derivatives(np.zeros(1), 0)[0, 0]
 
     @property
     def shorter(self) -> float:
-        """Length of the shorter curve, sigma."""
+        """Length of the shorter of the two curves, sigma."""
         return min(self.first.length, self.second.length)
 
     def sides(self, distance: float = 0.0) -> tuple[Array, Array]:
-        """Return the derivatives, (4, m), of both curves at a distance before and after the join, sigma."""
+        """Return the derivatives, (4, m), of both curves at a distance, in sigma, before and after the join."""
         before = self.first.derivatives(np.array([self.first.length - distance]))
         after = self.second.derivatives(np.array([distance]))
         return before[:, 0], after[:, 0]
@@ -71,17 +71,17 @@ class Join:
 
     @property
     def where(self) -> str:
-        """Keys and place, for messages."""
+        """Keys of both segments and the place of the join, for messages."""
         return f"path[{self.index}] to path[{self.index + 1}], at s = {self.s:.4g}, {place(self.rows, self.point)}"
 
     @property
     def blend_key(self) -> str:
-        """The key that rounds the corner."""
+        """Key of the blend that rounds the corner."""
         return f"path[{self.index}].blend"
 
     @property
     def rounding(self) -> str:
-        """What to set to round the corner, if a blend can, or to stop at it."""
+        """Setting that rounds the corner, if a blend can, or that stops at it."""
         before, after = (side[1, : self.positions] for side in self.sides())
         if angle_between(before, after) > _SHARPEST:
             return self.stopping
@@ -89,7 +89,7 @@ class Join:
 
     @property
     def stopping(self) -> str:
-        """What to set to stop at the corner."""
+        """Setting that stops at the corner."""
         return f"path[{self.index}].stop: true to stop there"
 
     @property
@@ -112,7 +112,7 @@ class Join:
 
 
 class Kink(NamedTuple):
-    """A join where curves do not continue each other; what jumps, in words; what to try."""
+    """A join where curves do not continue each other, with the jump in words, and advice."""
 
     join: Join
     found: str
@@ -129,14 +129,14 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
 
 
 def row_corner(join: Join) -> Kink | None:
-    """Return what jumps from one curve of rows to the next, or None where three derivatives continue."""
+    """Return the kink between two curves of rows, or None if three derivatives are continuous."""
     jump = _mismatch(join, *join.sides())
     return Kink(join, jump, f"Set {join.rounding}") if jump else None
 
 
 def _mismatch(join: Join, before: Array, after: Array) -> str | None:
-    """Return in words what jumps between derivatives by sigma, (4, m), or None where three derivatives continue."""
-    # The k-th derivative times length^(k - 1) compares with the speed, which is about 1.
+    """Describe the jump between derivatives, (4, m), or return None if three derivatives are continuous."""
+    # The k-th derivative times length^(k - 1) is comparable with the speed, which is about 1.
     size = max(np.linalg.norm(before[1]), 1.0)
     jumps = (
         np.linalg.norm(after - before, axis=1)
@@ -150,7 +150,7 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
         speed, new_speed = (
             np.linalg.norm(derivatives[1]) for derivatives in (before, after)
         )
-        # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
+        # Splines change their speed at joins; a rotation of the tangent by rounding is then not mentioned.
         if corner > 0.01 * abs(new_speed - speed):
             moved = np.linalg.norm((after - before)[1, : join.positions])
             alone = "" if moved > tolerances.WRITTEN else f" in {join.rows[-1]} alone"
@@ -162,7 +162,7 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
 
 
 def refuse_corners(corners: Sequence[Kink | None]) -> None:
-    """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
+    """Raise a `PathError` for the first corner, which also names the others; nothing without corners."""
     refused = [corner for corner in corners if corner is not None]
     if not refused:
         return
@@ -179,14 +179,14 @@ def refuse_corners(corners: Sequence[Kink | None]) -> None:
 
 
 def angle_between(first: Array, second: Array) -> float:
-    """Return the angle between two vectors, accurate for small ones as well."""
+    """Return the angle between two vectors; accurate for small angles as well."""
     a = first * np.linalg.norm(second)
     b = second * np.linalg.norm(first)
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
 
 
 def pose_corner(join: Join) -> Kink | None:
-    """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
+    """Return the kink between two curves of poses, or None if three derivatives are continuous."""
     on_the_spot = [
         stands_still(curve, join.positions) for curve in (join.first, join.second)
     ]
@@ -208,13 +208,13 @@ def pose_corner(join: Join) -> Kink | None:
 
 
 def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str | None:
-    """Return in words what jumps in the turning of the tool, or None where three derivatives continue.
+    """Describe the jump in the rotation of the tool, or return None if three derivatives are continuous.
 
     Parameters
     ----------
     join : Join
     before, after : ndarray, shape (4, c)
-        Derivatives of the coordinates of the pose by sigma at the join.
+        Derivatives of the coordinates of the pose with respect to sigma at the join.
     unit : str
         Unit of sigma.
     """
@@ -238,12 +238,12 @@ def blend_rows(join: Join, size: float) -> Curve:
     join : Join
         Where the curves meet.
     size : float
-        Replaced range of sigma on either side, m.
+        Range of sigma that is replaced on each side, m.
 
     Raises
     ------
     PathError
-        The blend is longer than half of a neighbour, or (nearly) stops or reverses; or an angle alone moves.
+        The blend is longer than half of a neighbouring segment, it almost stops or reverses, or only an angle moves.
     """
     _check_neighbours(join, size)
     return _blend(join, *join.sides(size))
@@ -252,12 +252,12 @@ def blend_rows(join: Join, size: float) -> Curve:
 def blend_poses(join: Join, size: float) -> Curve:
     """Return the blend that replaces the last `size` of one curve of poses and the first `size` of the next.
 
-    It is the polynomial of the position and the quaternion, which is then divided by its length; see `blend_rows`.
+    It is a polynomial of the position and the quaternion; the quaternion is then normalised. See `blend_rows`.
 
     Raises
     ------
     PathError
-        As for rows; or the tool turns too much in the blend.
+        As for `blend_rows`; or the tool turns too much in the blend.
     """
     _check_neighbours(join, size)
     start, end = map(_with_quaternion, join.sides(size))
@@ -275,7 +275,7 @@ def blend_poses(join: Join, size: float) -> Curve:
 
 
 def _check_neighbours(join: Join, size: float) -> None:
-    """Refuse a blend where the position stands still, or that is too long.
+    """Refuse a blend that is too long, or next to a curve on which the position stands still.
 
     Raises
     ------
@@ -294,16 +294,16 @@ def _check_neighbours(join: Join, size: float) -> None:
         raise join.wrong_blend(
             "the blend is longer than half of a neighbouring segment",
             stated_size,
-            # Rounded down, to micrometres, so that the blend that the message names is accepted.
+            # Rounded down to micrometres, so that the blend named in the message is accepted.
             f"at most {floor(longest * 1e6) / 1e6:.10g} {join.unit}",
             position_hint(size, 0.0, longest, join.unit),
         )
 
 
 def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
-    """Return the septic polynomial between derivatives (4, m), after a check that its position keeps going.
+    """Return the septic polynomial between derivatives, (4, m), after a check that the position does not stop.
 
-    Its length is the mean of the chord and of the polygon over the corner, which keeps its speed near 1.
+    Its length is the mean of the chord and of the polygon over the corner, which keeps the speed close to 1.
 
     Raises
     ------
@@ -335,7 +335,7 @@ def _with_quaternion(pose: Array) -> Array:
 
 
 def _sign(join: Join, size: float) -> float:
-    """Return the sign of the end's quaternion that continues the start's along both curves."""
+    """Return the sign for the quaternion at the end that continues the one at the start along both curves."""
     steps = np.linspace(0.0, size, 9)
     poses = [
         join.first.derivatives(join.first.length - size + steps, 0)[0],

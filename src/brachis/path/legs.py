@@ -1,4 +1,4 @@
-"""The legs of a path: parts between stops, each at a given speed or as fast as the limits allow."""
+"""The legs of a path: parts between stops, each travelled at a given speed or as fast as the limits allow."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from brachis.task.messages import validate
 
 _KEY = "tool_limits.process_speed"
 _LEAD = 0.1
-"""Lengths in which the tool reaches or leaves a speed, divided by that speed, s.
+"""Distance in which the tool reaches or leaves a speed, divided by that speed, s.
 
-With 0.05 the included SCARA does not reach 0.3 m/s; 0.1 is enough for 0.02 and 0.3 m/s of five included arms.
+With 0.05, the included SCARA does not reach 0.3 m/s. With 0.1, five included arms reach 0.02 and 0.3 m/s.
 """
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A part of the path that is passed in one go.
+    """A part of the path that is travelled without a break.
 
     Attributes
     ----------
     begin, end : float
         Path coordinates.
     speed : float or None
-        Given speed of the tool, m/s; None: as fast as the limits allow.
+        Given speed of the tool, m/s. None: as fast as the limits allow.
     stops : bool
-        Whether the arm is at rest at its end; only at ends inside the path.
+        Whether the arm stops at the end of the leg; only for ends inside the path.
     dwell : float
-        Time for which the arm waits at its end, s.
+        Time for which the arm waits at the end of the leg, s.
     """
 
     begin: float
@@ -55,7 +55,7 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
     Raises
     ------
     PathError
-        A process speed does not fit the task space; or the tool stands still where it is to have one.
+        A process speed does not fit the task space, or the tool stands still where it should have one.
     """
     sections = task.tool_limits.process_speed
     if sections:
@@ -73,24 +73,24 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
 
 
 def key_of_speed(section: ProcessSpeed, number: int, below: str) -> str:
-    """Name the key of a process speed for messages: that of its segment, or one `below` its number in the list."""
+    """Return the key of a process speed for messages: that of its segment, or one `below` its index in the list."""
     if section.segment is not None:
         return f"path[{section.segment}].speed"
     return f"{_KEY}[{number}]{below}"
 
 
 def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
-    """Return the task with its process speeds, those of segments among them, where the tool can hold them.
+    """Return the task with process speeds, including those of segments, restricted to where the tool can hold them.
 
-    Segments of the same speed are one part, with the blends between them. Parts are cut at stops. They leave leads, in
-    which the speed changes, at stops, at ends of the path that are not passed at their speed, and where they follow
-    another part at once. Leads take up no more than half of a part, and in them the tool does not exceed its speed,
-    unless it comes from or goes on at a higher speed.
+    Segments with the same speed form one part, with the blends between them. Parts are cut at stops. The speed changes
+    in leads: at stops, at ends of the path that are not passed at the part's speed, and where one part directly follows
+    another. Leads take up at most half of a part. In them the tool does not exceed the speed of the part, unless it
+    comes from, or continues at, a higher speed.
 
     Raises
     ------
     TaskError
-        Parts overlap, or a speed is above the tool's largest one.
+        Parts overlap, or a speed exceeds the largest speed of the tool.
     """
     limits = task.tool_limits
     sections = [section for section in limits.process_speed if section.segment is None]
@@ -117,7 +117,7 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
             leads = np.divide(
                 lengths, [_tool_slope(task_map, between, s) for s in ends]
             ).tolist()
-            # The planner knows whether less is enough.
+            # Whether a shorter lead is enough is left to the planner.
             share = min(
                 1.0, 0.5 * (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
             )
@@ -136,7 +136,7 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
 
 
 def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
-    """List the parts of the path whose segments have a speed; a blend has that of both sides."""
+    """List the parts of the path whose segments have a speed; a blend has one if both sides have the same speed."""
     speeds = [getattr(segment, "speed", None) for segment in task.path]
     sections: list[ProcessSpeed] = []
     after = 0
@@ -155,33 +155,33 @@ def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
 
 
 def _snap(s: float, stops: Array) -> float:
-    """Return the stop at a path coordinate, to the digits of a file; the coordinate itself if there is no stop."""
+    """Return the stop at a path coordinate, to the precision of a file; the coordinate itself without a stop."""
     near = stops[np.abs(stops - s) <= tolerances.WRITTEN]
     return float(near[0]) if len(near) else s
 
 
 def _lead(speed: float, next_speed: float) -> float:
-    """Length in which the tool gets from one speed to another one, m."""
+    """Return the distance in which the tool changes from one speed to another, m."""
     if abs(speed - next_speed) <= tolerances.WRITTEN * speed:
         return 0.0
     return _LEAD * max(speed, next_speed)
 
 
 def _tool_slope(task_map: TaskMap, path: Path, s: float) -> float:
-    """How far the tool moves per unit s, m; at least the length that counts as zero."""
+    """Return how far the tool moves per unit s, m; at least the length that counts as zero."""
     velocity = tool_derivatives(task_map, path, np.array([s]))[0, 0]
     return max(float(np.linalg.norm(velocity)), tolerances.LENGTH)
 
 
 def _speed_at_end(task: Task, task_map: TaskMap, path: Path, end: int) -> float:
-    """Speed of the tool at the path's start, 0, or end, 1, m/s."""
+    """Return the speed of the tool at the start, 0, or end, 1, of the path, m/s."""
     stated = (task.boundary.start_speed, task.boundary.end_speed)[end]
     slope = _tool_slope(task_map, path, end)
     return stated * slope / path_speed(task_map, path, end)
 
 
 def _check_task_space(task_map: TaskMap) -> None:
-    """Refuse a task space that leaves the tool free to move otherwise than along the path."""
+    """Refuse a task space in which the tool can move in other ways than along the path."""
     if isinstance(task_map, JointSpace):
         return
     position = task_map_of(task_map.robot, "position")

@@ -1,4 +1,4 @@
-"""Orientations along a segment: fixed, turning about an axis that stands still, or turning with the tangent."""
+"""Orientations along a segment: fixed, turning about a fixed axis, or turning with the tangent."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 AMBIGUOUS = 1e-4
-"""How near to half a turn (rad) an orientation cannot be from another one: rounding would decide which way to turn."""
+"""An orientation this close to half a turn from another (rad) is ambiguous: rounding would decide which way to turn."""
 
 
 def _about_axis(
     start: Array, axis: Array, angle: Curve, sigma: Array, order: int
 ) -> Array:
-    """Return the rotation ``start exp(angle(sigma) hat(axis))``, about an axis in the tool frame, and derivatives."""
+    """Return the rotation ``start exp(angle(sigma) hat(axis))`` about an axis of the tool frame, with derivatives."""
     sine, cosine = sine_cosine(angle.derivatives(sigma, order) / 2.0)
     quaternions = np.concatenate([cosine, sine * axis], axis=-1)
     return start @ rotation_derivatives(quaternions)
@@ -41,13 +41,13 @@ class Turn:
     Attributes
     ----------
     start : ndarray, shape (3, 3)
-        Rotation matrix of the tool before.
+        Rotation matrix of the tool before the turn.
     axis : ndarray, shape (3,)
         Unit vector of the axis, in the tool frame.
     angle : float
         The angle, rad.
     smooth : bool
-        Whether it begins and ends at rate zero.
+        Whether the turn begins and ends at rate zero.
     """
 
     start: Array
@@ -56,10 +56,10 @@ class Turn:
     smooth: bool
 
     def over(self, length: float) -> Orientation:
-        """Return the rotation spread over a range of sigma.
+        """Return the turn, spread over a range of sigma.
 
-        Where it is smooth, its angle is the septic polynomial whose first three derivatives vanish at both ends,
-        ``35 u^4 - 84 u^5 + 70 u^6 - 20 u^7`` times the angle with ``u = sigma / length``.
+        If the turn is smooth, its angle is the septic polynomial whose first three derivatives vanish at both ends,
+        ``35 u^4 - 84 u^5 + 70 u^6 - 20 u^7`` times the angle, with ``u = sigma / length``.
         """
         angle: Curve = LineCurve(np.zeros(1), np.array([self.angle / length]), length)
         if self.smooth:
@@ -70,14 +70,14 @@ class Turn:
 
 
 def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
-    """Return the turn that a task asks for.
+    """Return the turn that a task describes.
 
     Parameters
     ----------
     turning : Rotate or TurnTo
-        The turn, as the task gives it.
+        The turn as given in the task.
     start : ndarray, shape (3, 3)
-        Rotation matrix of the tool before.
+        Rotation matrix of the tool before the turn.
     key : str
         Key of the turn, for messages.
 
@@ -105,7 +105,7 @@ def turn_between(
     Raises
     ------
     PathError
-        The target is half a turn away, so that there are two shortest ways.
+        The target is half a turn away, so there are two shortest turns.
     """
     vector = (rotation_of(start).inv() * target).as_rotvec()
     angle = float(np.linalg.norm(vector))
@@ -127,7 +127,7 @@ def half_turn(key: str) -> PathError:
 
 
 def _stay(start: Array, sigma: Array, order: int) -> Array:
-    """Return a rotation matrix that stays, and its derivatives."""
+    """Return a constant rotation matrix and its derivatives."""
     result = np.zeros((order + 1, sigma.size, 3, 3))
     result[0] = start
     return result
@@ -136,9 +136,9 @@ def _stay(start: Array, sigma: Array, order: int) -> Array:
 def _with_frame(
     position: Curve, up: Array, tool: Array, sigma: Array, order: int
 ) -> Array:
-    """Return the rotation of a tool that rests in a frame along a curve: x along its tangent, y along up x tangent.
+    """Return the rotation of a tool that is fixed in a frame along a curve: x along the tangent, y along up x tangent.
 
-    One more derivative of the position is needed than of the orientation.
+    The position must have one more derivative than the orientation.
     """
     tangent = unit(position.derivatives(sigma, order + 1)[1:])
     sideways = unit(tangent @ hat(up).T)
@@ -168,7 +168,7 @@ def orientation_along(
     Raises
     ------
     PathError
-        The orientation is not defined along this curve.
+        The orientation is undefined along this curve.
     """
     if mode is None or mode == "fixed":
         return partial(_stay, start)

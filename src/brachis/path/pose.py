@@ -1,4 +1,4 @@
-"""Paths of poses, or of fewer rows of the position and the orientation: curves of their coordinates, and the twist."""
+"""Paths of poses, or of some rows of the position with the orientation: curves of their coordinates, and twists."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from brachis.path.rotations import angular_rates
 from brachis.path.sequence import Path
 
 LEAST_QUALITY = 0.5
-"""Quality of interpolated quaternions below which the tool turns quite otherwise than its neighbours ask for."""
+"""Quality of interpolated quaternions below which the tool turns very differently from the neighbouring
+orientations."""
 
 
 class PosePath(Path):
-    """A path of poses, whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
+    """A path of poses whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s; beyond its ends as the first or last piece continues.
+        """Return the path at K values of s; outside its ends the first or last piece is continued.
 
         Parameters
         ----------
@@ -33,13 +34,12 @@ class PosePath(Path):
 
 
 class OrientedPath(Path):
-    """A path of rows of the position and the orientation, whose samples have angular velocities in the world."""
+    """A path of rows of the position and the orientation whose samples have angular velocities in the world frame."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s, shape (K,); beyond its ends as the first or last piece continues.
+        """Return the path at K values of s, shape (K,); outside its ends the first or last piece is continued.
 
-        With the angular velocity w along the tool's axes that in the world is R w. Its derivatives are R w', and
-        R (w'' + w x w').
+        The angular velocity w along the tool's axes is R w in the world. Its derivatives are R w' and R (w'' + w x w').
         """
         derivatives = self.derivatives(s)
         velocity, rate, bend = angular_rates(derivatives)
@@ -60,10 +60,11 @@ def _with_orientation(orientation: Orientation, sigma: Array, position: Array) -
 
 
 def quaternion_curve(columns: Curve) -> MappedCurve:
-    """Return the coordinates of a position and a quaternion, which need not have unit length.
+    """Return the coordinates of a position and a quaternion; the quaternion need not have unit length.
 
-    Divided by its length the quaternion is that of the orientation. This construction does not depend on the choice of
-    the world frame or the tool frame: others multiply all quaternions by a unit quaternion, which commutes with it.
+    The quaternion divided by its length is that of the orientation. The result does not depend on the choice of the
+    world frame or the tool frame: a different frame multiplies all quaternions by a unit quaternion, which commutes
+    with the division.
 
     Parameters
     ----------
@@ -79,9 +80,9 @@ def _from_quaternions(_sigma: Array, columns: Array) -> Array:
 
 
 def least_quality(columns: Curve) -> tuple[float, float]:
-    """Return where the quaternions, the last four columns, are farthest from unit length, and how far.
+    """Return where the quaternions, the last four columns, have the lowest quality, and that quality.
 
-    The quality of a quaternion is its length, or where this is greater than 1 its reciprocal.
+    The quality of a quaternion is its length, or the reciprocal if the length is greater than 1.
     """
 
     def quality(sigma: Array) -> Array:
@@ -99,8 +100,8 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
     Parameters
     ----------
     function : callable
-        Values, shape (K,), at K values of sigma. It is looked at 64 times between two knots, and then as often around
-        the smallest value found.
+        Function with values of shape (K,) at K values of sigma. It is evaluated at 64 points between two knots, then as
+        often around the smallest value.
     knots : ndarray, shape (n,)
         Values of sigma between which the function is smooth.
     """

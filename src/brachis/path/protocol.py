@@ -1,4 +1,4 @@
-"""What samples of a path are, and what a curve is to a path."""
+"""Samples of a path, and the protocol of its curves."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ class PathSample:
     """A path at K values of the path coordinate s.
 
     `xi` is the task velocity per unit s: ``J qdot = xi sdot`` and ``J qddot + Jdot qdot = xi_ds sdot**2 + xi sddot``.
-    For task spaces of rows it is the plain derivative of the target. For poses, of position p and rotation matrix R of
-    the tool frame in the world frame, it is the body twist [v; w]: the velocity ``v = R^T p'`` (m) and the angular
-    velocity w of ``R^T R'`` (rad), both along the axes of the tool frame; `xi_ds` and `xi_dds` are the plain
-    derivatives of these six numbers. For orientations with fewer rows of the position than a pose, the velocity and the
-    angular velocity are along the axes of the world.
+    For task spaces of rows it is the derivative of the target. For poses, with the position p and the rotation matrix R
+    of the tool frame in the world frame, it is the body twist [v; w]: the velocity ``v = R^T p'`` (m) and the angular
+    velocity w of ``R^T R'`` (rad), both along the axes of the tool frame. `xi_ds` and `xi_dds` are the derivatives of
+    these six numbers. For orientations with fewer rows of the position than a pose, the velocity and the angular
+    velocity are along the axes of the world.
 
     Attributes
     ----------
     target : ndarray, shape (K, c)
-        Task coordinates z(s): m for position rows, rad for angles; of an orientation R row by row.
+        Task coordinates z(s): m for position rows, rad for angles; for an orientation, R row by row.
     xi : ndarray, shape (K, m)
         dz/ds, or the body twist.
     xi_ds : ndarray, shape (K, m)
-        Its first derivative by s.
+        First derivative of `xi` with respect to s.
     xi_dds : ndarray, shape (K, m)
-        Its second derivative by s.
+        Second derivative of `xi` with respect to s.
     """
 
     target: Array
@@ -44,8 +44,8 @@ class PathSample:
 class Curve(Protocol):
     """One piece of a path over a parameter sigma in [0, length].
 
-    Sigma is the arc length of the position rows, m; for a spline the cumulative chord length of its waypoints; for a
-    motion of an angle alone, or a turn on the spot, the angle, rad.
+    Sigma is the arc length of the position rows, m. For a spline it is the cumulative chord length of the waypoints.
+    For a motion of an angle alone, or a turn on the spot, it is the angle, rad.
     """
 
     @property
@@ -59,13 +59,13 @@ class Curve(Protocol):
         ...
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, c)."""
+        """Return the curve and its derivatives with respect to sigma up to `order`, shape (order + 1, K, c)."""
         ...
 
 
 Orientation = Callable[[Array, int], Array]
-"""Orientation of the tool along a segment: from K values of sigma and the order, the rotation matrix and as many
-derivatives by sigma, shape (order + 1, K, 3, 3)."""
+"""Orientation of the tool along a segment: a function of K values of sigma and an order. It returns the rotation matrix
+and its derivatives with respect to sigma, shape (order + 1, K, 3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class MappedCurve:
     curve : Curve
         The other curve.
     function : callable
-        Of sigma, shape (K,), and the curve's coordinates and derivatives, shape (order + 1, K, c).
+        Function of sigma, shape (K,), and of the curve's coordinates and derivatives, shape (order + 1, K, c).
     """
 
     curve: Curve
@@ -94,5 +94,5 @@ class MappedCurve:
         return self.curve.knots
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        """Return the curve and its derivatives with respect to sigma, shape (order + 1, K, m)."""
         return self.function(sigma, self.curve.derivatives(sigma, order))

@@ -1,9 +1,9 @@
 """Rotations and quaternions (w, x, y, z), and exact derivatives of products, unit vectors and sines by Leibniz' rule.
 
-SciPy's rotations are imported where they are used: a fifth of a second that paths without orientation need not wait.
+SciPy's rotations are imported only where they are used: the import takes a fifth of a second.
 
-A function of one parameter is given by its derivatives: an array whose first axis counts them, from the value on; shape
-(order + 1, ...). Then ``f[1:]`` are the derivatives of f', and ``(f g)[k] = sum_i binomial(k, i) f[i] g[k - i]``.
+A function of one parameter is given by its value and derivatives, along the first axis of an array of shape (order + 1,
+...). Then ``f[1:]`` are the derivatives of f', and ``(f g)[k] = sum_i binomial(k, i) f[i] g[k - i]``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def _leibniz(
     multiply: Callable[[Array, Array], Array], first: Array, second: Array, k: int
 ) -> Any:
-    """Return the k-th derivative of a product from those of both factors, by Leibniz' rule."""
+    """Return the k-th derivative of a product from the derivatives of both factors, by Leibniz' rule."""
     return sum(comb(k, i) * multiply(first[i], second[k - i]) for i in range(k + 1))
 
 
@@ -35,7 +35,7 @@ def product(first: Array, second: Array, how: str) -> Array:
 
     Parameters
     ----------
-    one, other : ndarray, shape (order + 1, ...)
+    first, second : ndarray, shape (order + 1, ...)
         Derivatives of the factors.
     how : str
         The product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
@@ -48,14 +48,14 @@ def product(first: Array, second: Array, how: str) -> Array:
 def unit(vector: Array) -> Array:
     """Return the derivatives of a vector divided by its length, shape (order + 1, ..., n).
 
-    With the squared length n, ``y = n^(-1/2)`` solves ``n y' = -n' y / 2``, which gives one derivative after the other.
+    With the squared length n, ``y = n^(-1/2)`` solves ``n y' = -n' y / 2``. This gives one derivative after the other.
     """
     squared = product(vector, vector, "...i,...i->...")
     inverse = np.zeros_like(squared)
     inverse[0] = 1.0 / np.sqrt(squared[0])
     for k in range(len(vector) - 1):
         right_side = _leibniz(np.multiply, squared[1:], inverse, k) / -2.0
-        # Of n y', what is known: the last derivative of y is zero as yet.
+        # The known part of n y': the last derivative of y is still zero.
         known = _leibniz(np.multiply, squared, inverse[1:], k)
         inverse[k + 1] = (right_side - known) / squared[0]
     return product(vector, inverse, "...i,...->...i")
@@ -78,7 +78,7 @@ def hat(vector: Array) -> Array:
 def quaternion_derivatives(pose: Array) -> Array:
     """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a pose's coordinates, (order + 1, c).
 
-    With the angular velocity w in the turning frame, ``q' = q w / 2``, one derivative after the other.
+    With the angular velocity w in the turning frame, ``q' = q w / 2`` gives one derivative after the other.
     """
     result = np.zeros((len(pose), 4))
     result[0] = quaternions_of(rotation_of(pose[0, -9:].reshape(3, 3)))
@@ -91,7 +91,7 @@ def quaternion_derivatives(pose: Array) -> Array:
 def angular_rates(poses: Array) -> Array:
     """Return the angular velocity along the tool's axes, and its derivatives, (order, ..., 3), rad.
 
-    Coordinates, (order + 1, ..., c), have a rotation matrix row by row at their end.
+    The coordinates, (order + 1, ..., c), end with a rotation matrix row by row.
     """
     turning = poses[..., -9:]
     still = np.zeros((*turning.shape[:-1], 3))

@@ -1,4 +1,4 @@
-"""A path made of curves, the frame in which they are given, and how the path begins and ends."""
+"""A path made of curves, the frame in which the curves are given, and the ends of the path."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from brachis.task.points.units import rotation_by
 
 @dataclass(frozen=True, eq=False)
 class PathFrame:
-    """Task coordinates in a frame, (..., c), as those in the world: ``turn @ coordinates + origin``.
+    """A frame whose task coordinates, (..., c), are ``turn @ coordinates + origin`` in the world.
 
     Attributes
     ----------
     turn : (c, c) ndarray
-        An orthogonal matrix.
+        Orthogonal matrix.
     origin : (c,) ndarray
         m, rad.
     """
@@ -45,7 +45,7 @@ class PathFrame:
         Raises
         ------
         PathError
-            The frame turns the rows out of their line or plane.
+            The frame turns the path out of the line or plane of the rows.
         """
         from scipy.linalg import block_diag
 
@@ -74,11 +74,11 @@ class PathFrame:
         return cls(block_diag(block, turning), origin)
 
     def to_world(self, coordinates: Array) -> Array:
-        """Return coordinates in the world, (c,)."""
+        """Convert coordinates, (c,), from the frame to the world."""
         return self.turn @ coordinates + self.origin
 
     def to_frame(self, coordinates: Array) -> Array:
-        """Return coordinates in the frame, (c,), of coordinates in the world."""
+        """Convert coordinates, (c,), from the world to the frame."""
         return self.turn.T @ (coordinates - self.origin)
 
 
@@ -86,7 +86,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def integrate(function: Callable[[Array], Array], bounds: Array) -> Array:
-    """Integrate a function of (K,) between successive bounds, (N + 1,), by Gauss quadrature: (N,)."""
+    """Integrate a function of s, (K,), between successive bounds, (N + 1,), by Gauss quadrature; return (N,)."""
     half = np.diff(bounds)[:, None] / 2.0
     nodes = bounds[:-1, None] + half * (_NODES + 1.0)
     values = function(nodes.ravel()).reshape(nodes.shape)
@@ -94,14 +94,14 @@ def integrate(function: Callable[[Array], Array], bounds: Array) -> Array:
 
 
 def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
-    """Return the length of a curve with velocities (K, p) by s, (K,), analytic between knots, (N + 1,)."""
+    """Return the length of a curve from its velocities, (K, p), at s, (K,); analytic between knots, (N + 1,)."""
     lengths = integrate(lambda s: np.linalg.norm(velocity(s), axis=1), knots)
     return float(lengths.sum())
 
 
 @dataclass(frozen=True, eq=False)
 class CurveSpan:
-    """The part of a curve between sigma = `first` and sigma = `last`; of which segment, or None for a blend."""
+    """The part of a curve between sigma = `first` and `last`, with the index of its segment; None for a blend."""
 
     curve: Curve
     first: float
@@ -116,23 +116,23 @@ class CurveSpan:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A prescribed path: curves one after the other; s is the sum of their parameters over its total.
+    """A prescribed path: curves joined end to end. s is the sum of their parameters divided by `total`.
 
     Attributes
     ----------
     spans : tuple of CurveSpan
         Parts of the segments' curves, and blends.
     breaks : (b + 1,) ndarray
-        Values of s where spans join, from 0 to 1; of a part of a path, from its begin to its end. The path is C3
-        there, but for its stops.
+        Values of s where spans join, from 0 to 1; for a part of a path, from its begin to its end. There the path is
+        C3, except at its stops.
     total : float
-        Range of the summed parameter of the whole path, sigma per unit s.
+        Sum of the parameter ranges of the whole path, sigma per unit s.
     positions : int
         Number of position rows.
     frame : PathFrame or None
-        In which the curves are; None: the world.
+        Frame of the curves; None: the world.
     stops : ndarray
-        Values of s at which the tool stops, so that there may be a corner.
+        Values of s at which the tool stops, where corners are allowed.
     """
 
     spans: tuple[CurveSpan, ...]
@@ -150,7 +150,7 @@ class Path:
         frame: PathFrame | None,
         stopping: Sequence[int] = (),
     ) -> Self:
-        """Put spans together whose first `positions` rows are those of the position.
+        """Join spans whose first `positions` rows are those of the position.
 
         The tool stops at the ends of the segments with the indices `stopping`.
         """
@@ -170,11 +170,11 @@ class Path:
 
     @property
     def knots(self) -> Array:
-        """Values of s between which the path is analytic, from its begin to its end; the breaks are among them."""
+        """Values of s between which the path is analytic, from its begin to its end, including the breaks."""
         inner_knots = [self.breaks]
         for (begin, end), span in zip(pairwise(self.breaks), self.spans, strict=True):
             knots = begin + (span.curve.knots - span.first) / self.total
-            # Ends of a piece may be knots of its curve, but for rounding.
+            # The ends of a piece may be knots of its curve, up to rounding.
             is_inner = (knots > begin + tolerances.PATH) & (
                 knots < end - tolerances.PATH
             )
@@ -182,10 +182,10 @@ class Path:
         return np.unique(np.concatenate(inner_knots))
 
     def between(self, begin: float, end: float) -> Self:
-        """Return the part of the path from s = `begin` to `end`, in the same s.
+        """Return the part of the path from s = `begin` to `end`, with the same s.
 
-        Only the spans in between are sampled, so that at a corner it is certain which side is meant. Beyond its ends
-        it continues as its first or last piece.
+        Only the spans in between are sampled, so that the side is unambiguous at a corner. Outside its ends, the first
+        or last piece is continued.
         """
         inner = self.breaks[1:-1]
         is_after = inner > begin + tolerances.PATH
@@ -204,13 +204,13 @@ class Path:
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).
 
-        Beyond its ends the path continues as the formula of its first or last piece, so that an optimiser's trial point
-        just outside meets smooth derivatives. At a stop the path is sampled as it is after the stop.
+        Outside its ends, the formula of the first or last piece is continued, so that trial points of the optimiser
+        just outside have smooth derivatives. At a stop, the path is sampled as it is after the stop.
         """
         return PathSample(*self.derivatives(s))
 
     def derivatives(self, s: Sequence[float] | Array, order: int = 3) -> Array:
-        """Return the coordinates in the world and their derivatives by s, shape (order + 1, K, m)."""
+        """Return the coordinates in the world and their derivatives with respect to s, shape (order + 1, K, m)."""
         values = np.array(s, dtype=float, ndmin=1)
         if len(self.spans) == 1:
             result = self._on_span(0, values, order)
@@ -229,16 +229,16 @@ class Path:
         return result
 
     def _on_span(self, i: int, s: Array, order: int) -> Array:
-        """Return coordinates and their derivatives by sigma, (order + 1, K, m), on the curve of one piece."""
+        """Return coordinates and derivatives with respect to sigma, (order + 1, K, m), on the curve of one piece."""
         span = self.spans[i]
         sigma = span.first + (s - self.breaks[i]) * self.total
         return span.curve.derivatives(sigma, order)
 
 
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
-    """Return how far the position moves per unit s, m; where it stands still, how far the angles turn, rad.
+    """Return how far the position moves per unit s, m; if it stands still, how far the angles turn, rad.
 
-    Of a path of joints it is the norm of their derivatives.
+    For a path of joints, it is the norm of their derivatives.
     """
     sizes = task_map.norms(path.sample(np.array([s])).xi)
     position, angle = (float(size[0]) for size in sizes)
@@ -246,10 +246,10 @@ def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
 
 
 def tool_derivatives(task_map: TaskMap, path: Path, s: Array) -> Array:
-    """Return the velocity of the tool frame's origin per unit s, and its first two derivatives by s, (3, K, p), m.
+    """Return the velocity of the tool frame's origin per unit s and its first two derivatives, (3, K, p), m.
 
-    They are those of the p position rows, along the axes of the world, or of the tool frame for poses; of a path of
-    joints all three.
+    They are for the p position rows, along the axes of the world, or along those of the tool frame for poses. For a
+    path of joints, p = 3.
     """
     sample = path.sample(s)
     if not isinstance(task_map, JointSpace):
@@ -275,7 +275,7 @@ def tool_distance(task_map: TaskMap, path: Path) -> float:
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:
-    """Refuse a path that does not end where, and as, it begins, to the second derivative.
+    """Refuse a path that is not closed, or whose first two derivatives differ at its ends.
 
     Raises
     ------

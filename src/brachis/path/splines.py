@@ -1,4 +1,4 @@
-"""Smooth curves through waypoints, and B-splines given by knots and control points; of rows or of poses."""
+"""Smooth curves through waypoints, and B-splines given by knots and control points, for rows or poses."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 START_TOLERANCE = 1e-4
-"""How far a segment may start from where its waypoints expect, m and rad."""
+"""Largest distance between the start of a segment and the start that its waypoints expect, m and rad."""
 
 
 def spline_through(
     shape: SplineThrough, context: SegmentContext
 ) -> SplineCurve | LineCurve:
-    """Return the smooth curve from the segment's start through waypoints; a line where there is only one."""
+    """Return the smooth curve from the segment's start through waypoints; a line for a single waypoint."""
     if shape.orientations is not None:
         raise context.wrong(
             "orientations need a task space of poses",
@@ -51,10 +51,11 @@ def spline_through(
 def pose_spline(
     shape: SplineThrough, context: SegmentContext, rotation: Array
 ) -> MappedCurve:
-    """Return the smooth curve through poses; where there is only one, the line with a uniform turn.
+    """Return the smooth curve through poses; for a single pose, the line with a uniform turn.
 
-    Position and quaternion are one natural quintic spline over the chord lengths of the positions (the angles between
-    the orientations, where the position stands still). The quaternions' signs are such that neighbours are close.
+    Position and quaternion form one natural quintic spline over the chord lengths of the positions, or over the angles
+    between the orientations if the position stands still. The signs of the quaternions are chosen so that neighbours
+    are close.
 
     Parameters
     ----------
@@ -68,8 +69,8 @@ def pose_spline(
     Raises
     ------
     PathError
-        The segment starts elsewhere than its waypoints expect, or a waypoint repeats another one, or orientations are
-        half a turn apart or turn back and forth too much.
+        The segment does not start where its waypoints expect, a waypoint repeats another one, orientations are half a
+        turn apart, or they turn back and forth too much.
     """
     points = _waypoints_of(shape, context)
     turned = _rotations(shape, context, rotation)
@@ -104,14 +105,14 @@ def pose_spline(
 
 
 def _angles(turned: Rotation) -> Array:
-    """Return the angles, (n - 1,), rad, between n successive rotations."""
+    """Return the angles between n successive rotations, (n - 1,), rad."""
     return np.asarray((turned[:-1].inv() * turned[1:]).magnitude())
 
 
 def _rotations(
     shape: SplineThrough, context: SegmentContext, matrix: Array
 ) -> Rotation:
-    """Return the n rotations at the start and the waypoints."""
+    """Return the n rotations at the start and at the waypoints."""
     start = rotation_of(matrix)
     waypoints = [attitude.rotation for attitude in shape.orientations or ()]
     expected = start
@@ -137,7 +138,7 @@ def _waypoints_of(shape: SplineThrough, context: SegmentContext) -> Array:
     Raises
     ------
     PathError
-        A waypoint has the wrong number of coordinates, or the segment does not start where the waypoints expect.
+        A waypoint has the wrong number of coordinates, or the segment does not start where its waypoints expect.
     """
     start = context.start
     points = [
@@ -156,15 +157,15 @@ def _waypoints_of(shape: SplineThrough, context: SegmentContext) -> Array:
 
 
 def _repeats_start(steps: Array) -> bool:
-    """Tell whether the first waypoint is the segment's start, from the steps between it and all waypoints, (n - 1,).
+    """Tell from the steps between the start and the waypoints, (n - 1,), whether the first waypoint is the start.
 
-    It is, where it is within the tolerance and within 1 % of the distance to the next waypoint.
+    It is if it lies within the tolerance, and within 1 % of the distance to the next waypoint.
     """
     return len(steps) > 1 and bool(is_repeated(steps, START_TOLERANCE)[0])
 
 
 def _check_start(key: str, off: Array, context: SegmentContext) -> None:
-    """Refuse a segment whose start is off where it is expected, by `off`, m in the position rows and rad in others.
+    """Refuse a segment whose start differs from the expected start by `off`, m in position rows and rad in others.
 
     Raises
     ------
@@ -187,7 +188,7 @@ def _check_start(key: str, off: Array, context: SegmentContext) -> None:
 def _starts_elsewhere(
     context: SegmentContext, key: str, found: str, hint: str | None
 ) -> PathError:
-    """Return the error that a segment does not start where its waypoints expect; `hint` says what they look like."""
+    """Return the error that a segment does not start where its waypoints expect, with a hint if there is one."""
     return context.wrong(
         "the segment starts elsewhere than its waypoints expect",
         key,
@@ -208,7 +209,7 @@ def _chord_knots(
     chords : ndarray, shape (n - 1,)
         Distances of successive waypoints, m.
     otherwise : ndarray, shape (n - 1,)
-        What to take where all positions are the same, rad.
+        Distances to use if all positions are the same, rad.
     shape : SplineThrough
         The waypoints.
     context : SegmentContext
@@ -242,8 +243,8 @@ def _chord_knots(
 def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
     """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,).
 
-    The spline is C4. Of all curves through the waypoints it has the least integral of the squared third derivative; its
-    third and fourth derivatives vanish at both ends. That holds from three waypoints on, where it is a parabola.
+    The spline is C4. Of all curves through the waypoints, it has the least integral of the squared third derivative.
+    Its third and fourth derivatives vanish at both ends. Through three waypoints it is a parabola.
 
     Raises
     ------
@@ -266,13 +267,13 @@ def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
 
 
 def _natural(knots: Array, waypoints: Array) -> Spline:
-    # Imported here: it takes half a second, which tasks without a spline need not wait for.
+    # Imported here because it takes half a second, and tasks without a spline do not need it.
     from scipy.interpolate import make_interp_spline
 
-    # Over a parameter in [0, 1], so that the derivatives at the ends are of the same magnitude as the values.
+    # With a parameter in [0, 1], derivatives at the ends have the same magnitude as the values.
     unit = knots / knots[-1]
     if len(knots) == 3:
-        # The conditions at the ends leave a parabola, but as equations they lose digits where a chord is short.
+        # The end conditions give a parabola, but as equations they lose digits if a chord is short.
         spline = make_interp_spline(unit, waypoints, k=2, t=np.repeat([0.0, 1.0], 3))
     else:
         zero = np.zeros(waypoints.shape[1])
@@ -283,13 +284,13 @@ def _natural(knots: Array, waypoints: Array) -> Spline:
 
 
 def bspline_curve(shape: BSplineCurve, context: SegmentContext) -> SplineCurve:
-    """Return the curve, moved to the segment's start: it keeps its form to the last digit of the start.
+    """Return the curve, moved to the segment's start; its shape does not change.
 
     Raises
     ------
     PathError
-        Control points are all the same or have the wrong number of coordinates, or the curve starts elsewhere than the
-        segment.
+        All control points are the same, they have the wrong number of coordinates, or the curve does not start where
+        the segment does.
     """
     key = "control_points[0]"
     first = context.coordinates(shape.control_points[0], key, context.rows)
@@ -321,7 +322,7 @@ def pose_bspline(
     Raises
     ------
     PathError
-        The curve starts elsewhere than the segment.
+        The curve does not start where the segment does.
     """
     points = np.array(shape.control_points)
     first = points[0, -4:] / np.linalg.norm(points[0, -4:])
@@ -337,7 +338,7 @@ def pose_bspline(
 
 
 def _of_control_points(shape: BSplineCurve, points: Array) -> SplineCurve:
-    """Return the curve of control points, (n, m), from sigma = 0 on."""
+    """Return the curve with control points, (n, m), beginning at sigma = 0."""
     spline = Spline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
     breaks = np.unique(spline.knots)
     return SplineCurve(spline, float(breaks[-1]), breaks)

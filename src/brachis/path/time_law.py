@@ -1,11 +1,12 @@
 """The time law of a leg with a given speed v of the tool: s(t) with ds/dt = v / g(s).
 
-g(s) is the distance that the tool moves per unit s. With t(s) the integral of g / v, s(t) is its inverse function:
+g(s) is the distance that the tool moves per unit s. t(s) is the integral of g / v, and s(t) its inverse function:
 
     sdot = v / g,    sddot = -v^2 g' / g^3,    sdddot = v^3 (3 g'^2 - g g'') / g^5
 
-Where g is constant, as on lines and circles, s(t) is linear. Otherwise it is a spline through (t(s), s) that is refined
-until the speed is met in between too. Its knots are double where the path is not analytic, so that it is C3 there.
+If g is constant, as on lines and circles, s(t) is linear. Otherwise it is a spline through (t(s), s) that is refined
+until the speed is correct in between as well. Its knots are double where the path is not analytic, so that it is C3
+there.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 DEGREE = 5
-"""Degree of the spline where the law is not linear."""
+"""Degree of the spline, if the law is not linear."""
 _ACCURACY = 2e-10
-"""Largest relative deviation from the speed, but for the rounding of times."""
+"""Largest relative deviation from the speed, without the rounding of times."""
 _LEAST_ACCURACY = 1e-7
-"""The same with the rounding of times, which matters where the path turns within micrometres."""
+"""The same including the rounding of times, which matters if the path turns within micrometres."""
 _MOST_INTERVALS = 20_000
 
 
@@ -47,8 +48,8 @@ class TimeLaw:
     spline : BSpline
         s over t in [0, duration], s.
     ends : (2, 4) ndarray
-        s and its first three derivatives by time, per second, at the beginning and at the end; free of the spline's
-        error.
+        s and its first three time derivatives, per second, at the beginning and at the end, without the error of the
+        spline.
     """
 
     duration: float
@@ -56,12 +57,12 @@ class TimeLaw:
     ends: Array
 
     def at(self, t: Array) -> Array:
-        """Return s and three derivatives by time, (4, K), per second, at times t, (K,), s."""
+        """Return s and its first three time derivatives, (4, K), per second, at times t, (K,), s."""
         return np.stack([self.spline(t, nu=order) for order in range(4)])
 
 
 def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
-    """Return the time law of a leg; None where its speed is free.
+    """Return the time law of a leg; None if its speed is free.
 
     Parameters
     ----------
@@ -116,14 +117,14 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
 
 @dataclass(frozen=True, eq=False)
 class _ToolAlongPath:
-    """How far the tool moves along a part of a path that it passes at a speed, m/s."""
+    """The distance that the tool moves along a part of a path, which it travels at a speed, m/s."""
 
     task_map: TaskMap
     path: Path
     speed: float
 
     def slopes(self, s: Array) -> Array:
-        """Return the distances per unit s and their first two derivatives by s, (3, K), m."""
+        """Return the distances per unit s and their first two derivatives with respect to s, (3, K), m."""
         v, v_ds, v_dds = tool_derivatives(self.task_map, self.path, s)
         g = np.linalg.norm(v, axis=1)
         g_ds = (v * v_ds).sum(axis=1) / g
@@ -131,7 +132,7 @@ class _ToolAlongPath:
         return np.stack([g, g_ds, g_dds])
 
     def rates(self, s: Array) -> Array:
-        """Return path coordinates s, (K,), and their three derivatives by time, (4, K)."""
+        """Return path coordinates s, (K,), and their first three time derivatives, (4, K)."""
         g, g_ds, g_dds = self.slopes(s)
         v = self.speed
         return np.stack(
@@ -139,7 +140,7 @@ class _ToolAlongPath:
         )
 
     def times(self, s: Array) -> Array:
-        """Return the times, (K,), s, at ascending path coordinates, from the first one on."""
+        """Return the times, (K,), s, at ascending path coordinates, counted from the first one."""
         distances = integrate(lambda nodes: self.slopes(nodes)[0], s)
         return sum_up(distances / self.speed)
 
@@ -147,7 +148,7 @@ class _ToolAlongPath:
 def _interpolate(
     tool: _ToolAlongPath, breaks: Array, is_double: np.ndarray, ends: Array
 ) -> BSpline:
-    """Return the spline through s at the times of its Greville abscissae, with given rates at its ends.
+    """Return the spline that interpolates s at the times of its Greville abscissae, with given rates at the ends.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def _interpolate(
     often = np.where(is_double, 2, 1)
     often[[0, -1]] = DEGREE + 1
     knots = np.repeat(breaks, often)
-    # Two rates at each end take the places of the abscissae nearest to it.
+    # Two rates at each end replace the two abscissae closest to it.
     inner = greville(knots, DEGREE)[3:-3]
     sites = np.concatenate([breaks[:1], inner, breaks[-1:]])
     every = np.union1d(breaks, sites)
@@ -183,7 +184,7 @@ def _interpolate(
 
 
 def _deviations(tool: _ToolAlongPath, spline: BSpline) -> Array:
-    """Return the largest relative deviation from the speed between the knots, (N,)."""
+    """Return the largest relative deviations from the speed between the knots, (N,)."""
     times = np.unique(spline.t)
     t = times[:-1, None] + np.diff(times)[:, None] * (np.arange(8) + 0.5) / 8
     s = spline(t.ravel())

@@ -59,7 +59,7 @@ class Problem(Summary):
         Parts of the path that are travelled in one go.
     time_laws : tuple of TimeLaw or None
         Time law of each leg; None if its speed is free.
-    user_limits : tuple of LimitModel
+    own_limits : tuple of LimitModel
         Limits that are not in the task, as the user gave them.
     """
 
@@ -72,11 +72,11 @@ class Problem(Summary):
     limits: tuple[Limit, ...]
     legs: tuple[Leg, ...]
     time_laws: tuple[TimeLaw | None, ...]
-    user_limits: tuple[LimitModel, ...] = ()
+    own_limits: tuple[LimitModel, ...] = ()
 
     @classmethod
     def of(
-        cls, robot: Robot, task: Task, user_limits: Sequence[LimitModel] = ()
+        cls, robot: Robot, task: Task, own_limits: Sequence[LimitModel] = ()
     ) -> Problem:
         """Bind robot and task, and check the postures that the task gives.
 
@@ -84,7 +84,7 @@ class Problem(Summary):
         ----------
         robot : Robot
         task : Task
-        user_limits : sequence of LimitModel, optional
+        own_limits : sequence of LimitModel, optional
             Limits that are not in the task.
 
         Raises
@@ -107,7 +107,7 @@ class Problem(Summary):
             end = start
         legs = legs_of(task, task_map, path)
         time_laws = tuple(time_law_of(leg, task_map, path) for leg in legs)
-        limits = limits_of(robot, task, user_limits)
+        limits = limits_of(robot, task, own_limits)
         check_smoothness(limits, task.spline)
         problem = cls(
             task,
@@ -119,7 +119,7 @@ class Problem(Summary):
             limits,
             legs,
             time_laws,
-            tuple(user_limits),
+            tuple(own_limits),
         )
         limits = check_postures(task, task_map, limits, problem.given_postures, path)
         if end is not None and not task.boundary.periodic:

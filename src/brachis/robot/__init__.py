@@ -1,4 +1,4 @@
-"""URDF to Pinocchio model, limits and friction."""
+"""The robot: from a URDF to a Pinocchio model, limits and friction."""
 
 from brachis.robot.friction import Friction
 from brachis.robot.limits import Limits

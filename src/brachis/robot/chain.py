@@ -1,4 +1,4 @@
-"""The chain of a model as the kernel takes it: at the zero posture, in the world frame."""
+"""The chain of a model in the form that the kernel needs: at the zero posture, in the world frame."""
 
 from __future__ import annotations
 

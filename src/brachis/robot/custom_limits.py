@@ -1,8 +1,8 @@
-"""Limits that are not of brachis: those of a user's program, and those of other packages.
+"""Limits that are not built in: those of a user's program, and those of other packages.
 
-The kinds of other packages are named in a task under ``custom_limits``. They are entry points of the group
-``brachis.limits``: each loads to a callable that takes the parameters that the task gives, as keywords, and returns an
-object with ``bind(robot)``, which gives the limit for a robot (see `brachis.limits.Limit`).
+A task names the kinds of other packages under ``custom_limits``. They are entry points of the group ``brachis.limits``.
+Each entry point is a callable that takes the parameters of the task as keywords, and returns an object whose
+``bind(robot)`` returns the limit for a robot (see `brachis.limits.Limit`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SECTION = "custom_limits"
 
 
 class LimitModel(Protocol):
-    """A limit as a user gives it, which does not know the robot yet."""
+    """A limit as a user gives it, before the robot is known."""
 
     def bind(self, robot: Robot, /) -> Any:
         """Return the limit for a robot, a `brachis.limits.Limit`."""
@@ -32,33 +32,37 @@ class LimitModel(Protocol):
 def list_models(
     task: Task, own_limits: Sequence[LimitModel] = ()
 ) -> dict[str, LimitModel]:
-    """List the limits of a task's ``custom_limits`` and of a program by where they stand, such as ``own_limits[0]``.
+    """List the limits of a task's ``custom_limits`` and of a program by their places, such as ``own_limits[0]``.
 
     Raises
     ------
     UnknownNameError
-        No installed package has a kind that the task names.
+        No installed package provides a kind that the task names.
     InputError
-        A package cannot be loaded, or refuses the parameters; or an object is not a limit.
+        A package cannot be loaded or refuses the parameters, or an object is not a limit.
     """
     check_list(own_limits, "own_limits", "limits")
     models = _make_plugins(task)
     models |= {f"own_limits[{i}]": model for i, model in enumerate(own_limits)}
     for where, model in models.items():
-        if isinstance(model, type) or not callable(getattr(model, "bind", None)):
+        is_class = isinstance(model, type)
+        if is_class or not callable(getattr(model, "bind", None)):
             raise InputError(
                 "this object is not a limit",
                 where=where,
-                found=model,
-                allowed="an object whose bind(robot) returns a brachis.limits.Limit (docs/own_limit.md)",
+                found=model
+                if is_class
+                else f"an object of the class {type(model).__name__}",
+                allowed="an object that inherits brachis.limits.Limit, or whose bind(robot) returns one "
+                "(docs/own_limit.md)",
             )
     return models
 
 
 def _make_plugins(task: Task) -> dict[str, LimitModel]:
-    """Make the limits that a task names under ``custom_limits``."""
+    """Create the limits that a task names under ``custom_limits``."""
     if not task.custom_limits:
-        return {}  # looking through the installed packages takes milliseconds
+        return {}  # a search through the installed packages takes milliseconds
     entries = importlib.metadata.entry_points(group="brachis.limits")
     installed = {entry.name: entry for entry in entries}
     made = {}
@@ -88,9 +92,9 @@ def _make_plugins(task: Task) -> dict[str, LimitModel]:
 
 @contextmanager
 def name_failures(where: str, method: str) -> Iterator[None]:
-    """Say of an exception in the code of a plug-in which part of which limit failed.
+    """Turn an exception in the code of a plug-in into an error that names the limit and the method.
 
-    An exception in the code of the user's own program, under ``own_limits``, passes as it is.
+    Exceptions in the code of a user's program, under ``own_limits``, are passed on unchanged.
 
     Raises
     ------
@@ -110,12 +114,12 @@ def name_failures(where: str, method: str) -> Iterator[None]:
 
 
 def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
-    """Return a model's limit for a robot.
+    """Return the limit of a model for a robot.
 
     Raises
     ------
     InputError
-        It cannot be built, or is not a limit.
+        The limit cannot be built, or `bind` does not return a limit.
     """
     try:
         with name_failures(where, "bind"):
@@ -138,35 +142,35 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
 
 
 def has_check(model: LimitModel) -> bool:
-    """Tell whether a model has a formula of its own for the verification."""
+    """Tell whether a model has a separate formula for the verification."""
     return getattr(model, "check", None) is not None
 
 
 def check_ratios(
     where: str, model: Any, robot: Robot, motion: Sequence[np.ndarray], size: int
 ) -> np.ndarray:
-    """Call a model's own ``check(robot, q, qdot, qddot, tau)``.
+    """Call a model's ``check(robot, q, qdot, qddot, tau)``.
 
     Parameters
     ----------
     where : str
-        Where the model stands; see `list_models`.
+        Place of the model; see `list_models`.
     model : LimitModel
     robot : Robot
     motion : sequence of (K, n) ndarray
         q, qdot, qddot and tau at K moments.
     size : int
-        Number of the limit's values, c.
+        Number of values of the limit, c.
 
     Returns
     -------
     (K, c) ndarray
-        Sizes of the ratios.
+        Magnitudes of the ratios.
 
     Raises
     ------
     InputError
-        What the method returns is not finite, or has another shape.
+        The result of the method is not finite, or has a different shape.
     """
     with name_failures(where, "check"):
         ratios = model.check(robot, *motion)

@@ -1,4 +1,4 @@
-"""Joint torques of a batch of states and their exact derivatives."""
+"""Joint torques of a batch of states, and their exact derivatives."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from brachis.robot.robot import Robot
 
 
 class SharedTorques:
-    """A joint motion whose torques, and their derivatives, are computed once for all who ask.
+    """A joint motion whose torques and their derivatives are computed only once.
 
-    What the methods return is not to be written to.
+    Do not write to the arrays that the methods return.
 
     Attributes
     ----------
@@ -31,17 +31,17 @@ class SharedTorques:
         return {}
 
     def _compute_once(self, function: Callable[..., Any]) -> Any:
-        """Return a function of position, velocity and acceleration for this motion."""
+        """Return the value of a function of position, velocity and acceleration for this motion."""
         if function not in self._known:
             self._known[function] = function(self.q, self.qdot, self.qddot)
         return self._known[function]
 
     def torque(self, robot: Robot) -> np.ndarray:
-        """Joint torques, (K, n)."""
+        """Return the joint torques, (K, n)."""
         return self.torque_of(_chain_with_masses(robot))
 
     def torque_of(self, chain: Chain) -> np.ndarray:
-        """Joint torques of a chain, (K, n)."""
+        """Return the joint torques of a chain, (K, n)."""
         return np.asarray(self._compute_once(chain.torques))
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
@@ -52,7 +52,7 @@ class SharedTorques:
 
 
 def _chain_with_masses(robot: Robot) -> Chain:
-    """Return the chain of a robot whose torques are known."""
+    """Return the chain of a robot; refuse a robot without masses."""
     robot.check_masses("torques")
     return robot.chain
 
@@ -60,7 +60,7 @@ def _chain_with_masses(robot: Robot) -> Chain:
 def torque(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
-    """Joint torques of K states.
+    """Compute the joint torques of K states.
 
     Parameters
     ----------
@@ -84,5 +84,5 @@ def torque(
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
-    """Exact derivatives of `torque`; parameters as there."""
+    """Compute the exact derivatives of `torque`, which has the same parameters."""
     return _chain_with_masses(robot).torque_derivatives(q, qdot, qddot)

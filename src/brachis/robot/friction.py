@@ -1,4 +1,4 @@
-"""Joint torques that the rigid-body model does not know: rotor inertia and friction."""
+"""Joint torques that are not part of the rigid-body model: rotor inertia and friction."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from brachis.task.limit_models import per_joint_values
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Friction(Summary):
-    """Armature, viscous and Coulomb terms of every joint. The arrays are read-only.
+    """Armature, viscous friction and Coulomb friction of every joint. The arrays are read-only.
 
     The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.
-    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps that at zero and adds the term here. Pinocchio
-    reads ``damping`` and ``friction`` of a URDF but its ``rnea`` does not use them; here they are the viscous and the
-    Coulomb term, unless the task says otherwise.
+    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps it at zero and adds the term here. Pinocchio reads
+    ``damping`` and ``friction`` from a URDF, but its ``rnea`` does not use them. Here they are the viscous and the
+    Coulomb term, unless the task gives other values.
 
     Attributes
     ----------
     armature : (n,) ndarray
-        Rotor inertia seen at the joint, kg m^2 or kg.
+        Rotor inertia as seen at the joint, kg m^2 or kg.
     viscous : (n,) ndarray
         Nm s/rad or N s/m.
     coulomb : (n,) ndarray
         Nm or N.
     v_eps : (n,) ndarray
-        Speed over which the Coulomb torque changes sign, rad/s or m/s.
+        Width of the speed range in which the Coulomb torque changes its sign, rad/s or m/s.
     """
 
     armature: np.ndarray
@@ -53,14 +53,14 @@ class Friction(Summary):
         urdf: Mapping[str, np.ndarray],
         settings: FrictionSettings,
     ) -> Friction:
-        """Spread what a task says, else what the URDF says, over the joints of a chain.
+        """Combine the values of a task with those of the URDF, for the joints of a chain.
 
         Parameters
         ----------
         joint_names : sequence of str
         urdf : mapping of str to (n,) ndarray
-            What the URDF states as ``viscous``, ``coulomb`` and ``armature``; a rotor inertia of the settings replaces
-            the latter.
+            Values of the URDF for ``viscous``, ``coulomb`` and ``armature``. A rotor inertia in the settings replaces
+            the armature.
         settings : FrictionSettings
 
         Raises
@@ -120,7 +120,7 @@ class Friction(Summary):
         return cls(**terms, v_eps=v_eps)
 
     def check_against(self, model: pin.Model, limits: np.ndarray) -> None:
-        """Refuse Coulomb friction of a chain that its torque limits, (n,), cannot overcome: a joint could only creep.
+        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome: a joint could only creep.
 
         Raises
         ------
@@ -143,5 +143,5 @@ class Friction(Summary):
 
     @property
     def table(self) -> np.ndarray:
-        """All terms, (n, 4), in the order of the attributes."""
+        """The terms of all joints, (n, 4), in the order of the attributes."""
         return np.column_stack([self.armature, self.viscous, self.coulomb, self.v_eps])

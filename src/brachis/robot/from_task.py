@@ -1,4 +1,4 @@
-"""The robot that a task describes, alone or together with a given robot, and what acts on it in words."""
+"""The robot that a task describes, alone or together with a given robot; and a description of what acts on it."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def robot_from_settings(
     settings : RobotSettings
         The task's ``robot`` part.
     urdf : path, optional
-        URDF file to use in place of the one that the task names.
+        URDF file to use in place of the URDF that the task names.
     urdf_text : str, optional
-        Text of the URDF, if it was saved with the task; nothing is read from disk then.
+        Text of the URDF, if it was saved with the task. Then nothing is read from disk.
 
     Raises
     ------
     TaskError
-        No URDF is named; or a file of limits that was not read, because `load_task` did not make the task.
+        No URDF is named; or the limits file was not read, because the task was not made by `load_task`.
     UrdfError, UnknownNameError, LimitError, InputError
         See `Robot.from_urdf`.
     """
@@ -77,7 +77,7 @@ def robot_from_settings(
 
 
 _FRAMES = ("tool_frame", "base_frame", "locked_joints")
-"""Settings that decide which joints the chain has."""
+"""Settings that determine the joints of the chain."""
 _PER_JOINT: dict[str, object] = {
     **{
         f"robot.limits.{entry.name}": entry.default
@@ -89,26 +89,26 @@ _PER_JOINT: dict[str, object] = {
         for kind, field in FrictionSettings.model_fields.items()
     },
 }
-"""Settings that may be one value, a list or a mapping by joint; and the value of a joint that a mapping leaves out."""
+"""Settings that may be one value, a list or a mapping by joint, with the value of joints that a mapping leaves out."""
 
 
 def robot_for(
     robot: str | os.PathLike[str] | Robot | None, settings: RobotSettings
 ) -> Robot:
-    """Return the robot that a task is planned for; its `Robot.settings` make it again.
+    """Return the robot for which a task is planned. The same robot can be built from its `Robot.settings`.
 
     Parameters
     ----------
     robot : path, Robot or None
-        URDF file to use in place of the one that the task names, or a robot to use in place of it. The task's
-        ``robot`` part holds for a robot too: it is added to what the robot was made with.
+        URDF file or robot to use in place of the URDF that the task names. The task's ``robot`` part also applies to a
+        given robot: it is added to the robot's settings.
     settings : RobotSettings
         The task's ``robot`` part.
 
     Raises
     ------
     TaskError
-        Robot and task contradict each other; or the URDF is missing.
+        Robot and task contradict each other, or the URDF is missing.
     InputError
         See `Robot.from_urdf`.
     """
@@ -132,7 +132,7 @@ def robot_for(
 
 
 def _current_settings(robot: Robot) -> RobotSettings:
-    """Return settings that make the robot: limits, friction and gravity may have been replaced since it was made."""
+    """Return settings that rebuild the robot, whose limits, friction and gravity may have been replaced."""
     settings = robot.settings
     names = robot.urdf_joints
     changes: dict[str, object] = {}
@@ -157,7 +157,7 @@ def _current_settings(robot: Robot) -> RobotSettings:
 
 
 def lock_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
-    """Return the robot with joints held at positions, rad or m; its limits and friction hold for the others."""
+    """Return the robot with joints held at positions, rad or m; the others keep their limits and friction."""
     names = robot.urdf_joints
     moving = [i for i, name in enumerate(names) if name not in positions]
     settings = _current_settings(robot)
@@ -172,7 +172,7 @@ def lock_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
 
 
 def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
-    """State the friction of some joints, by their numbers."""
+    """State the friction of some joints, given by their indices."""
     keys = ("armature", "viscous", "coulomb", "coulomb_velocity")
     columns = friction.table[list(joints)].T.tolist()
     return FrictionSettings.model_validate(dict(zip(keys, columns, strict=True)))
@@ -181,9 +181,9 @@ def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
 def _combine(
     robot: Robot, robot_settings: RobotSettings, task_settings: RobotSettings
 ) -> RobotSettings:
-    """Merge the settings of the robot and of the task; the URDF is the robot's.
+    """Merge the settings of the robot and of the task. The URDF is that of the robot.
 
-    In the task a key that is written counts as set, in the robot a value that differs from the default.
+    In the task, a key counts as set if it is written. In the robot, it counts as set if its value is not the default.
     """
     robot_keys = robot_settings.model_dump(exclude_defaults=True)
     written = task_settings.model_dump(exclude_unset=True, exclude={"urdf"})
@@ -207,12 +207,12 @@ def _combine(
 
 
 def _merge(key: str, robot_value: Any, task_value: Any, names: Sequence[str]) -> Any:
-    """Merge two values: both sides may set different keys or joints, or set the same ones to the same value.
+    """Merge two values: both sides may set different keys or joints, or set the same key to the same value.
 
     Raises
     ------
     TaskError
-        The two sides differ.
+        The two sides set different values.
     """
     if task_value == robot_value:
         return robot_value
@@ -238,11 +238,11 @@ def _merge(key: str, robot_value: Any, task_value: Any, names: Sequence[str]) ->
 
 
 def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
-    """Describe what is in use in words, with units: payload, placements, gravity, slower limits, armature, friction.
+    """Describe in words what is in use, with units: payload, placements, gravity, scaled limits, armature, friction.
 
-    So is friction, with where it comes from: the URDF, unless the task says otherwise; and joints without a limit on
-    their acceleration, or for which nobody states a torque limit. If accelerations of a motion, (K, n), are given, the
-    largest of those without a limit is named. Without masses the torques are said to be unknown.
+    The description of friction says where it comes from: from the URDF, unless the task states it. Joints without an
+    acceleration limit or without a torque limit are also named. If accelerations of a motion, (K, n), are given, the
+    largest acceleration without a limit is named. Without masses, the torques are described as unknown.
     """
     settings = robot.settings
     payload = settings.payload
@@ -279,7 +279,7 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
 
 
 def _torques_in_use(robot: Robot) -> dict[str, str]:
-    """Describe armature, friction and missing torque limits; or say that torques are unknown."""
+    """Describe armature, friction and missing torque limits, or say that torques are unknown."""
     bodies = robot.urdf_dynamics.without_mass
     if bodies:
         joints = ", ".join(body.joint for body in bodies)
@@ -303,7 +303,7 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
 
 
 def _without_limit(robot: Robot, kind: str, motion: np.ndarray | None = None) -> str:
-    """Name the joints without a limit of a kind, and the largest figure of a motion, (K, n), among them."""
+    """Name the joints without a limit of this kind, and their largest figure in a motion, (K, n)."""
     names = robot.urdf_joints
     ends = robot.limits.both_ways(kind)[:, : len(names)]
     is_free = ~np.isfinite(ends).all(axis=0)
@@ -328,7 +328,7 @@ def _without_limit(robot: Robot, kind: str, motion: np.ndarray | None = None) ->
 
 
 def _by_joint(robot: Robot, kind: str) -> str:
-    """Write one term of the friction with its units, joint by joint unless all joints have the same value."""
+    """Write one friction term with its units, joint by joint unless all joints have the same value."""
     names = robot.urdf_joints
     columns = zip(getattr(robot.friction, kind), robot.position_units, strict=True)
     rows = [f"{value:g} {UNITS[kind][unit]}" for value, unit in columns][: len(names)]

@@ -1,6 +1,6 @@
-"""Joint positions as points of a joint space: which joints are left, differences of angles, turns by 2 pi.
+"""Joint positions as points of a joint space: remaining joints, differences of angles, turns by 2 pi.
 
-Units of joint quantities, by the unit of the joint's position: rad where it turns, m where it slides.
+Units of joint quantities depend on the unit of the joint's position: rad for revolute, m for prismatic joints.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ TURN = 2.0 * np.pi
 
 
 def complement(n: int, joints: Iterable[int]) -> list[int]:
-    """Return the joints, out of n, that are not among `joints`, ascending."""
-    left_out = set(joints)
-    return [i for i in range(n) if i not in left_out]
+    """Return those of n joints that are not in `joints`, ascending."""
+    return sorted(set(range(n)).difference(joints))
 
 
 def principal(angles: np.ndarray) -> np.ndarray:
@@ -30,13 +29,13 @@ def principal(angles: np.ndarray) -> np.ndarray:
 def difference(
     first: np.ndarray, second: np.ndarray, revolute: np.ndarray
 ) -> np.ndarray:
-    """Displacement (..., n) from `second` to `first`; of revolute joints, a mask (n,), the shortest, in [-pi, pi)."""
+    """Return the displacement, (..., n), from `second` to `first`; in [-pi, pi) for `revolute` joints, a mask (n,)."""
     gap = first - second
     return np.where(revolute, principal(gap), gap)
 
 
 def in_turn_of(q: np.ndarray, near: np.ndarray, revolute: np.ndarray) -> np.ndarray:
-    """Return positions (..., n) with every revolute joint in the turn that brings it nearest to `near`."""
+    """Return positions, (..., n), with every revolute joint in the turn that is closest to `near`."""
     return np.where(revolute, q + TURN * np.round((near - q) / TURN), q)
 
 
@@ -46,13 +45,13 @@ UNITS: Final[dict[str, dict[str, str]]] = {
     "coulomb": {"rad": "Nm", "m": "N"},
     "armature": {"rad": "kg m^2", "m": "kg"},
 }
-"""The keys are those of limits and friction in the task."""
+"""Units of joint quantities by the key of the limit or friction in the task, and by the unit of the position."""
 
 
 def shown_unit(unit: str, *, degrees: bool) -> tuple[str, float]:
-    """Return the unit in which a person sees figures of an SI unit, and the factor that brings them there.
+    """Return the unit in which figures of an SI unit are shown to a person, and the factor for the conversion.
 
-    With `degrees`, what is an angle over powers of time is shown in deg, deg/s, ...; all else stays as it is.
+    With `degrees`, angles and their time derivatives are shown in deg, deg/s, ...; other units do not change.
     """
     if degrees and unit.partition("/")[0] == "rad":
         return f"deg{unit.removeprefix('rad')}", 180.0 / math.pi

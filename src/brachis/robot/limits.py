@@ -1,4 +1,4 @@
-"""Joint limits: from the URDF, overridden or completed by the task."""
+"""Joint limits: those of the URDF, overridden or completed by the task."""
 
 from __future__ import annotations
 
@@ -13,22 +13,28 @@ from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, LimitError
 from brachis.robot.tool_joints import ToolJoint
-from brachis.task import FROM_URDF, LIMIT_KINDS, LimitSpec, check_robot_settings
+from brachis.task import (
+    FROM_URDF,
+    LIMIT_KINDS,
+    ROBOT_LIMITS,
+    LimitSpec,
+    check_robot_settings,
+)
 from brachis.task.fields import LARGEST, LEAST
 from brachis.task.limit_models import map_by_joint, per_joint_values
 
 TorqueSpeedCurve = tuple[tuple[float, float], ...]
-"""Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
+"""Points (speed, torque), rad/s or m/s and Nm or N, beginning at speed 0; empty without a curve."""
 
 FARTHEST = 1e6
-"""Largest end of a position range, rad or m: there the rounding of numbers is a tenth of a nanometre."""
+"""Largest magnitude of the end of a position range, rad or m: there, numbers are rounded to a tenth of a nanometre."""
 MAGNITUDES = tuple(kind for kind, row in LIMIT_KINDS.items() if row.form != "range")
-"""Kinds of limits that are figures around zero for each joint."""
+"""Kinds of joint limits that are figures around zero, not ranges."""
 _ARRAYS = tuple(name for row in LIMIT_KINDS.values() for name in row.ends)
 
-_JointArrays: Any = make_dataclass(
-    "_JointArrays",
-    [(name, np.ndarray) for name in _ARRAYS],
+_Figures: Any = make_dataclass(
+    "_Figures",
+    [(name, np.ndarray) for name in _ARRAYS] + [(name, float) for name in ROBOT_LIMITS],
     frozen=True,
     repr=False,
     eq=False,
@@ -36,8 +42,8 @@ _JointArrays: Any = make_dataclass(
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Limits(_JointArrays, Summary):  # type: ignore[misc]
-    """Limits of every joint of the chain; infinite where a joint is not limited. The arrays are read-only.
+class Limits(_Figures, Summary):  # type: ignore[misc]
+    """Limits of every joint of the chain; infinite if a joint is not limited. The arrays are read-only.
 
     Attributes
     ----------
@@ -58,43 +64,42 @@ class Limits(_JointArrays, Summary):  # type: ignore[misc]
     torque_rate : (n,) ndarray
         Nm/s or N/s.
     total_power : float
-        Of the sum over all joints, W.
+        Limit of the sum over all joints, W.
     torque_speed : (n,) tuple of tuple of pairs
-        Points (speed, torque), rad/s or m/s and Nm or N, of the torque that falls with speed; empty for a joint
+        Points (speed, torque), rad/s or m/s and Nm or N, of a torque limit that falls with speed; empty for a joint
         without a curve.
     """
 
-    total_power: float
     torque_speed: tuple[TorqueSpeedCurve, ...]
 
     def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
+        """Replace the arrays by read-only copies."""
         freeze(self, *_ARRAYS)
 
     @property
     def velocity(self) -> np.ndarray:
-        """Speeds, (n,), that every joint reaches in both directions, rad/s or m/s."""
+        """Speed limit of every joint, (n,), that holds in both directions, rad/s or m/s."""
         return np.minimum(self.velocity_upper, -self.velocity_lower)
 
     @property
     def torque(self) -> np.ndarray:
-        """Torques, (n,), that every joint reaches in both directions, Nm or N."""
+        """Torque limit of every joint, (n,), that holds in both directions, Nm or N."""
         return np.minimum(self.torque_upper, -self.torque_lower)
 
     def both_ways(self, kind: str) -> np.ndarray:
-        """Lower and upper limits, (2, n), of one of `LIMIT_KINDS`."""
+        """Return the lower and upper limits, (2, n), of a kind out of `LIMIT_KINDS`."""
         ends = [getattr(self, name) for name in LIMIT_KINDS[kind].ends]
         return np.array(ends if len(ends) == 2 else [-ends[0], ends[0]])
 
     def with_magnitudes(self, **magnitudes: np.ndarray) -> Limits:
-        """Return the limits with other ones of some of `MAGNITUDES`, (n,), the same in both directions."""
+        """Replace the limits of some of `MAGNITUDES` by others, (n,), which are the same in both directions."""
         ends: dict[str, Any] = {}
         for kind, values in magnitudes.items():
             ends |= _arrays_of(kind, np.array([-values, values]))
         return replace(self, **ends)
 
     def with_tool_joints(self, joints: Sequence[ToolJoint]) -> Limits:
-        """Return the limits with those of further joints, which have none but their ranges."""
+        """Append the limits of virtual joints, which only have ranges."""
         free = {
             name: np.full(len(joints), -np.inf if name.endswith("_lower") else np.inf)
             for name in _ARRAYS
@@ -110,35 +115,35 @@ class Limits(_JointArrays, Summary):  # type: ignore[misc]
 
 
 def _arrays_of(kind: str, pairs: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the arrays of a kind by name, from lower and upper limits, (2, n)."""
+    """Return the arrays of a kind, by name, from lower and upper limits, (2, n)."""
     names = LIMIT_KINDS[kind].ends
     return dict(zip(names, pairs[-len(names) :], strict=True))
 
 
 @dataclass(frozen=True)
 class UrdfLimit:
-    """One joint's limits as the URDF states them; None where it states nothing."""
+    """Limits of one joint as stated in the URDF; None if a limit is not stated."""
 
     lower: float | None = None
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
     needs_range: bool = False
-    """True where a revolute or prismatic joint states no range, so that the task has to."""
+    """True if a revolute or prismatic joint states no range, so that the task has to state it."""
 
     def of_kind(self, kind: str) -> float | None:
-        """Return the limit of one of `MAGNITUDES`; None without one."""
+        """Return the limit of a kind out of `MAGNITUDES`; None without a limit."""
         value: float | None = getattr(self, LIMIT_KINDS[kind].urdf, None)
         return value
 
 
 def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
-    """Check a user's limits, and state them joint by joint, so that others can be added.
+    """Check a user's limits, and state them joint by joint, so that limits of other joints can be added.
 
     Raises
     ------
     TaskError, InputError, UnknownNameError
-        A limit has a wrong form or length, or names a joint that is not of the chain.
+        A limit has a wrong form or length, or names a joint that is not in the chain.
     """
     by_joint: dict[str, Any] = {}
     for entry in fields(spec):
@@ -154,12 +159,12 @@ def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
 
 
 def _leave_open(value: Any) -> Any:
-    """Return limits with None for infinite figures."""
+    """Replace infinite figures by None."""
     if isinstance(value, Mapping):
         return {key: _leave_open(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
         return tuple(map(_leave_open, value))
-    return None if isinstance(value, float) and np.isinf(value) else value
+    return None if value in {np.inf, -np.inf} else value
 
 
 def resolve_limits(
@@ -168,18 +173,18 @@ def resolve_limits(
     urdf: Sequence[UrdfLimit],
     speed_override: float = 1.0,
 ) -> Limits:
-    """Combine the user's limits with the URDF's.
+    """Combine the user's limits with those of the URDF.
 
     Parameters
     ----------
     spec : LimitSpec
         The user's limits, after `check_limits`.
     joint_names : sequence of str
-        The chain's joints.
+        The joints of the chain.
     urdf : sequence of UrdfLimit
-        The URDF's limits of the same joints.
+        Limits of the same joints in the URDF.
     speed_override : float, optional
-        Factor on velocity limits, beside those of `spec`.
+        Factor on velocity limits, besides those in `spec`.
 
     Returns
     -------
@@ -191,8 +196,8 @@ def resolve_limits(
         A scaled limit is outside [`LEAST`, `LARGEST`]; a joint has neither a torque nor an acceleration limit; a range
         is missing, empty or ends more than 1e6 rad or m away from zero.
     InputError
-        A speed override has no velocity limit to scale; the total power is outside [`LEAST`, `LARGEST`]; a torque
-        curve is not valid or rises.
+        A speed override has no velocity limit to scale; one of `ROBOT_LIMITS` is outside [`LEAST`, `LARGEST`]; a
+        torque curve is not valid or rises.
     """
     names = list(joint_names)
     pairs = {
@@ -207,7 +212,7 @@ def resolve_limits(
         _resolve_curve(points, name, spec.scale.torque)
         for name, points in zip(names, listed, strict=True)
     )
-    # A torque that falls with speed is at its largest at rest, which is a plain limit.
+    # A torque that falls with speed is largest at rest. This torque is a plain limit.
     stall_torques = np.array([curve[0][1] if curve else np.inf for curve in curves])
     pairs["torque"] = np.clip(pairs["torque"], -stall_torques, stall_torques)
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
@@ -229,45 +234,44 @@ def resolve_limits(
             hint="Set robot.limits.velocity, or remove the override",
         )
     pairs["velocity"] = pairs["velocity"] * speed_override
-    arrays: dict[str, Any] = {}
+    figures: dict[str, Any] = {
+        kind: _resolve_figure(kind, spec) for kind in ROBOT_LIMITS
+    }
     for kind, limits in pairs.items():
-        arrays |= _arrays_of(kind, limits)
-    return Limits(**arrays, total_power=_resolve_total_power(spec), torque_speed=curves)
+        figures |= _arrays_of(kind, limits)
+    return Limits(**figures, torque_speed=curves)
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
-    """Leave out limits of joints that do not move: they are kept."""
-    changed: dict[str, Any] = {}
-    for kind, value in vars(spec).items():
-        if isinstance(value, Mapping):
-            remaining = {
-                name: limit for name, limit in value.items() if name not in joints
-            }
-            changed[kind] = remaining
+    """Leave out the limits of joints that are held."""
+    changed: dict[str, Any] = {
+        kind: {name: limit for name, limit in value.items() if name not in joints}
+        for kind, value in vars(spec).items()
+        if isinstance(value, Mapping)
+    }
     return replace(spec, **changed)
 
 
 def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
-    """State limits joint by joint; joints beyond `names` are left out."""
+    """State the limits joint by joint, for the joints with these names; further joints are left out."""
     spec: dict[str, Any] = {}
     for kind, row in LIMIT_KINDS.items():
-        entries: list[Any] = []
-        for lower, upper in limits.both_ways(kind).T[: len(names)].tolist():
-            pair = tuple(end if np.isfinite(end) else None for end in (lower, upper))
-            is_pair = row.form == "range" or lower != -upper
-            entries.append(pair if is_pair else pair[1])
+        ends = limits.both_ways(kind).T[: len(names)].tolist()
+        entries = [
+            (lower, upper) if row.form == "range" or lower != -upper else upper
+            for lower, upper in ends
+        ]
         spec[kind] = dict(zip(names, entries, strict=True))
     curves = zip(names, limits.torque_speed, strict=False)
     spec["torque_speed"] = {name: curve for name, curve in curves if curve} or None
-    if np.isfinite(limits.total_power):
-        spec["total_power"] = limits.total_power
-    return LimitSpec(**spec)
+    spec |= {kind: getattr(limits, kind) for kind in ROBOT_LIMITS}
+    return LimitSpec(**_leave_open(spec))
 
 
 def _spread_limits(
     kind: str, value: object, names: Sequence[str], urdf: Sequence[UrdfLimit]
 ) -> np.ndarray:
-    """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
+    """Return the lower and upper limits of one kind for all joints, (2, n); infinite if not limited."""
     key = f"robot.limits.{kind}"
     limits = np.tile([[-np.inf], [np.inf]], len(names))
     listed = per_joint_values(key, value, names, FROM_URDF)
@@ -310,46 +314,46 @@ def _check_ranges(ranges: np.ndarray, names: Sequence[str]) -> None:
 def _scale_limits(
     kind: str, limits: np.ndarray, factor: float, names: Sequence[str]
 ) -> np.ndarray:
-    """Scale limits, (2, n), and refuse figures whose products and squares would not be accurate."""
+    """Scale limits, (2, n), and refuse figures whose products and squares would be inaccurate."""
     with np.errstate(over="ignore"):
         scaled = np.asarray(limits * factor)
-    for figures, key in (limits, kind), (scaled, f"scale.{kind}"):
+    for figures, word in (limits, ""), (scaled, "scaled "):
         sizes = figures * [[-1.0], [1.0]]
         is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))
         for end, i in np.argwhere(is_wrong):
-            word = "scaled " if figures is scaled else ""
+            key = f"scale.{kind}" if word else f"{kind}.{names[i]}"
             problem = f"{word}{kind} limit is too small or too large"
             if sizes[end, i] <= 0.0:
                 problem = f"{kind} limit in the URDF is not positive"
             raise LimitError(
                 problem,
                 joint=names[i],
-                key=f"robot.limits.{key}"
-                if word
-                else f"robot.limits.{kind}.{names[i]}",
+                key=f"robot.limits.{key}",
                 found=f"{sizes[end, i]:g}",
                 allowed=f"{LEAST:g} to {LARGEST:g} in SI units, also after robot.limits.scale, or null for no limit",
             )
     return scaled
 
 
-def _resolve_total_power(spec: LimitSpec) -> float:
-    """Return the limit of the sum of the joints' powers, W; infinite without one."""
-    if spec.total_power is None:
+def _resolve_figure(kind: str, spec: LimitSpec) -> float:
+    """Return the scaled figure of a kind out of `ROBOT_LIMITS`; infinite without a limit."""
+    row = ROBOT_LIMITS[kind]
+    stated = getattr(spec, kind)
+    if stated is None:
         return np.inf
-    scaled = spec.total_power * spec.scale.power
+    scaled = float(stated * getattr(spec.scale, row.scale, 1.0))
     if not LEAST <= scaled <= LARGEST:
         raise InputError(
-            "the total power is too small or too large",
-            where="robot.limits.total_power",
-            found=spec.total_power,
-            allowed=f"{LEAST:g} W to {LARGEST:g} W after scaling, or null for no limit",
+            f"the {kind.replace('_', ' ')} is too small or too large",
+            where=f"robot.limits.{kind}",
+            found=stated,
+            allowed=f"{LEAST:g} to {LARGEST:g} {row.unit} after scaling, or null for no limit",
         )
-    return float(scaled)
+    return scaled
 
 
 def _resolve_curve(points: Any, joint: str, factor: float) -> TorqueSpeedCurve:
-    """Check the points (speed, torque) of a joint's curve, and scale its torques."""
+    """Check the points (speed, torque) of a joint's curve, and scale the torques."""
     if points is None:
         return ()
     key = f"robot.limits.torque_speed.{joint}"
@@ -370,7 +374,7 @@ def _resolve_curve(points: Any, joint: str, factor: float) -> TorqueSpeedCurve:
             found=points_text,
             allowed=f"{LEAST:g} to {LARGEST:g} N m (N), also after scaling",
         )
-    # The same torque may have been rounded to different figures.
+    # Equal torques may have been rounded to different figures.
     rising = np.flatnonzero(np.diff(torque) > tolerances.ROUNDING * torque[0])
     if len(rising):
         raise InputError(

@@ -1,7 +1,7 @@
-"""What needs dynamics, and so the masses of the robot: the one place that decides it.
+"""Which features need dynamics, and thus the masses of the robot. This is decided only here.
 
-Torques need the mass of what every joint moves. So do the limits on torques, on their rates and means and on powers, a
-payload, and friction that the task states. All else is kinematics.
+Torques need the mass of the bodies that each joint moves. The same holds for limits on torques, torque rates, mean
+torques and powers, for a payload, and for friction that the task states. Everything else is kinematics.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from brachis.errors import UrdfError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import Limits
 from brachis.robot.urdf_bodies import UrdfDynamics
-from brachis.task import LIMIT_KINDS, RobotSettings
+from brachis.task import LIMIT_KINDS, ROBOT_LIMITS, RobotSettings
 
 
 def list_users(
     dynamics: UrdfDynamics, limits: Limits, friction: Friction, settings: RobotSettings
 ) -> list[str]:
-    """List the keys of the task that need masses; a torque limit may also be an effort of the URDF."""
+    """List the keys of the task that need masses. A torque limit may also come from an effort in the URDF."""
     is_user = {
         f"limits.{kind}.{body.joint}": is_limited
         for kind, row in LIMIT_KINDS.items()
@@ -32,18 +32,20 @@ def list_users(
         )
     }
     is_user |= {
+        f"limits.{kind}": np.isfinite(getattr(limits, kind)) for kind in ROBOT_LIMITS
+    }
+    is_user |= {
         "limits.torque_speed": any(limits.torque_speed),
-        "limits.total_power": np.isfinite(limits.total_power),
         "payload": settings.payload is not None,
     }
     for kind in ("armature", "viscous", "coulomb"):
         figures = getattr(friction, kind)[: len(dynamics.bodies)]
-        is_user[f"friction.{kind}"] = np.any(figures > dynamics.friction.get(kind, 0.0))
+        is_user[f"friction.{kind}"] = np.any(figures > dynamics.friction[kind])
     return [f"robot.{key}" for key, needs_masses in is_user.items() if needs_masses]
 
 
 def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> None:
-    """Refuse users of masses if the body that a joint moves has no mass.
+    """Refuse features that need masses if a body that a joint moves has no mass.
 
     Parameters
     ----------
@@ -51,7 +53,7 @@ def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> N
     source : str
         Name of the URDF, for messages.
     users : sequence of str
-        What needs masses, see `list_users`; nothing is refused if it is empty.
+        Features that need masses; see `list_users`. Nothing is refused if it is empty.
 
     Raises
     ------

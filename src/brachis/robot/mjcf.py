@@ -1,8 +1,8 @@
-"""MJCF files, MuJoCo's format, as the text of a URDF.
+"""Conversion of MJCF files, the format of MuJoCo, to the text of a URDF.
 
-MuJoCo compiles them: Pinocchio 4.1 takes degrees for the ranges of slides, leaves out where the first body stands, all
-other bodies of the world, sites of fixed bodies and the forces of actuators, and knows neither ``limited`` nor
-``include``.
+MuJoCo compiles them, because Pinocchio 4.1 misreads some of them. It takes the ranges of slides as degrees. It ignores
+the placement of the first body, all other bodies of the world, sites of fixed bodies and the forces of actuators. It
+supports neither ``limited`` nor ``include``.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ def is_mjcf(text: str) -> bool:
 
 
 def urdf_of_mjcf(path: Path) -> str:
-    """Read an MJCF file, with what it includes, and write it as a URDF.
+    """Read an MJCF file and the files that it includes, and write it as a URDF.
 
-    Positions of joints are those of the file, ``ref`` included. The torque limit of a joint is the smaller side of
-    ``actuatorfrcrange``, or of the forces of all its actuators together if these are less.
+    Joint positions are those of the file, including ``ref``. The torque limit of a joint is the smaller side of
+    ``actuatorfrcrange``, or the sum of the forces of its actuators if it is less.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def urdf_of_mjcf(path: Path) -> str:
     Warns
     -----
     BrachisWarning
-        The file has something that a URDF cannot say, such as tendons or equality constraints.
+        The file contains elements that a URDF cannot express, such as tendons or equality constraints.
     """
     try:
         import mujoco
@@ -63,7 +63,7 @@ def urdf_of_mjcf(path: Path) -> str:
 
 
 def _list_omitted(compiled: Any) -> list[str]:
-    """List what a URDF cannot say, and how often the file says it."""
+    """List the elements of the file that a URDF cannot express, with their numbers."""
     is_on_joint = compiled.actuator_trntype <= _ON_JOINT
     counts = {
         "collision shapes": np.count_nonzero(
@@ -85,11 +85,11 @@ def _list_omitted(compiled: Any) -> list[str]:
 
 
 def _model_of(compiled: Any) -> pin.Model:
-    """Return the tree of bodies, joints and sites, without their shapes."""
+    """Return the tree of bodies, joints and sites, without shapes."""
     model = pin.Model()
     model.name = compiled.names.partition(b"\0")[0].decode()
     efforts = _effort_limits(compiled)
-    # Of every body the joint that moves it, its frame, and its placement in the joint's frame.
+    # For every body: the joint that moves it, its frame, and its placement in the joint's frame.
     bodies: list[tuple[int, int, pin.SE3]] = []
     for i in range(compiled.nbody):
         body = compiled.body(i)
@@ -124,14 +124,14 @@ def _model_of(compiled: Any) -> pin.Model:
 
 
 def _pose(position: np.ndarray, quaternion: np.ndarray) -> pin.SE3:
-    """Return a placement; MuJoCo begins a quaternion with its real part."""
+    """Return a placement. In MuJoCo, quaternions begin with the real part."""
     return pin.XYZQUATToSE3(np.append(position, np.roll(quaternion, -1)))
 
 
 def _add_joint(
     model: pin.Model, joint: Any, parent: int, placement: pin.SE3, effort: float
 ) -> int:
-    """Add a joint, and return its number. At ``ref`` the bodies are as the file places them."""
+    """Add a joint and return its number. At the position ``ref``, bodies are where the file places them."""
     name = joint.name or f"joint_{joint.id}"
     if joint.type[0] < _SLIDE:  # free and ball joints
         return int(model.addJoint(parent, pin.JointModelFreeFlyer(), placement, name))
@@ -152,15 +152,15 @@ def _add_joint(
 
 
 _NEGLIGIBLE = pin.Inertia.FromSphere(1e-9, 1e-3)
-"""What moves between two joints of one body, kg and m: nothing. A mass of 0 would look like a forgotten one."""
+"""Inertia between two joints of one body, where nothing moves, kg and m. A mass of 0 would look like a missing mass."""
 _ON_JOINT = 1
-"""MuJoCo's largest number of transmissions to a joint."""
+"""MuJoCo's largest code of a transmission to a joint."""
 _SLIDE = 2
-"""MuJoCo's number of prismatic joints; free and ball joints have smaller ones."""
+"""MuJoCo's code of a prismatic joint; free and ball joints have smaller codes."""
 
 
 def _effort_limits(compiled: Any) -> np.ndarray:
-    """Return the largest force or torque of every joint, (njnt,), N or Nm; infinite where it is not limited."""
+    """Return the largest force or torque of every joint, (njnt,), N or Nm; infinite if it is not limited."""
     forces = _smaller_side(compiled.actuator_forcerange, compiled.actuator_forcelimited)
     controls = _smaller_side(compiled.actuator_ctrlrange, compiled.actuator_ctrllimited)
     gains = np.abs(compiled.actuator_gainprm[:, 0])
@@ -178,5 +178,5 @@ def _effort_limits(compiled: Any) -> np.ndarray:
 
 
 def _smaller_side(ranges: np.ndarray, limited: np.ndarray) -> np.ndarray:
-    """Return the smaller magnitude of ranges, (N, 2); infinite where they do not limit."""
+    """Return the smaller magnitude of the ends of ranges, (N, 2); infinite for a range that is no limit."""
     return np.where(limited, np.abs(ranges).min(axis=1), np.inf)

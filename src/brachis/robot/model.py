@@ -1,4 +1,4 @@
-"""The Pinocchio model of a chain, with what the task adds to it: mounting, payload, tool offset."""
+"""The Pinocchio model of a chain, with the mounting, payload and tool offset of the task."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from brachis.task import Payload, Placement, RobotSettings
 
 
 def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Model:
-    """Make the model of a chain.
+    """Build the model of a chain.
 
     Parameters
     ----------
     chain : UrdfChain
     settings : RobotSettings
-        Of these gravity, mounting, payload and tool offset.
+        Its gravity, mounting, payload and tool offset are used.
     where : str
         Name of the URDF, for messages.
 
@@ -32,7 +32,7 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
     UrdfError
         Pinocchio cannot build the model.
     InputError
-        No rigid body has the payload's inertia.
+        No rigid body can have the inertia of the payload.
     """
     try:
         full = pin.buildModelFromXML(chain.xml)
@@ -71,7 +71,7 @@ def _se3(placement: Placement) -> pin.SE3:
 
 
 def _inertia(payload: Payload) -> pin.Inertia:
-    """Inertia of a payload in the tool frame."""
+    """Return the inertia of a payload in the tool frame."""
     matrix = np.zeros((3, 3))
     if payload.inertia is not None:
         matrix = symmetric_matrix(payload.inertia.model_dump())

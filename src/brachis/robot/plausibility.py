@@ -1,4 +1,4 @@
-"""Implausible figures: what they look like, such as degrees for rad or mm for m, reported as warnings or errors."""
+"""Implausible figures, such as degrees in place of rad or mm in place of m, reported as warnings or errors."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ class PlausibilityWarning(BrachisWarning):
 
 @dataclass(frozen=True)
 class Issue:
-    """A figure that is allowed and implausible.
+    """A figure that is allowed but implausible.
 
     Attributes
     ----------
     where : str
-        Task key, or joint or link of the robot.
+        Key of the task, or joint or link of the robot.
     message : str
         What it looks like.
     found : str
-        The figure with its unit.
+        The figure, with its unit.
     usual : str
-        What such figures usually are.
+        The usual range of such figures.
     advice : str
-        What else to write, if there is such advice.
+        What to write instead; empty without advice.
     """
 
     where: str
@@ -59,7 +59,7 @@ class Issue:
     advice: str = ""
 
     def __str__(self) -> str:
-        """Write it in one line."""
+        """Write the issue on one line."""
         text = f"{self.where}: {self.message}; found {self.found}; usual: {self.usual}"
         return f"{text}; {self.advice}" if self.advice else text
 
@@ -69,7 +69,7 @@ class Issue:
 
 
 def _join(stem: str, group: list[Issue]) -> Issue:
-    """Make one issue of several with the same message below one key."""
+    """Join several issues that have the same message and stand below one key."""
     if len(group) == 1:
         return group[0]
     figures = ", ".join(
@@ -82,9 +82,9 @@ def _join(stem: str, group: list[Issue]) -> Issue:
 def report_issues(
     issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
-    """Warn of issues, or refuse some or all of them; return them, one for all joints with the same message.
+    """Warn of issues, or refuse some or all of them. Return them, with one issue for all joints with the same message.
 
-    Warnings blame the caller of the function that calls this one. The rest is as in `refuse_issues`.
+    Warnings refer to the caller of the function that calls this one. Otherwise see `refuse_issues`.
     """
     joined = refuse_issues(issues, strict=strict)
     for issue in joined:
@@ -95,20 +95,20 @@ def report_issues(
 def refuse_issues(
     issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
-    """Refuse some or all issues; return them, one for all joints with the same message.
+    """Refuse some or all issues. Return them, with one issue for all joints with the same message.
 
     Parameters
     ----------
     issues : tuple of Issue
     strict : bool or None
-        Whether they are errors; None: those of the start posture, and of postures by name, are.
+        Whether issues are errors. None: only those of the start posture and of named postures are.
 
     Raises
     ------
     PlausibilityError
     """
     groups: dict[tuple[str, str], list[Issue]] = {}
-    for issue in dict.fromkeys(issues):  # a posture may stand at both ends
+    for issue in dict.fromkeys(issues):  # a posture may be both the start and the end
         stem = issue.where.rpartition(".")[0]
         groups.setdefault((stem, issue.message), []).append(issue)
     joined = tuple(_join(stem, group) for (stem, _), group in groups.items())
@@ -140,12 +140,12 @@ def issue_above(
     where, message, advice : str
         See `Issue`.
     value, usual : float
-        The figure and the largest usual one, in `unit`; a NaN passes.
+        The figure and the largest usual figure, in `unit`. NaN causes no issue.
     unit : str
     aside : str, optional
-        Text after the usual figure: for which robot or limit.
+        Text after the usual figure, such as the robot or limit that it is for.
     shown : str, optional
-        The figure in words, if it is more than one number.
+        Text for the figure, if it is not a single number.
     """
     if value > usual:
         figure = f"{shown or f'{value:.6g}'} {unit}"
@@ -156,7 +156,7 @@ def issue_above(
 def angle_issue(
     where: str, value: float, usual: float, more_advice: str = ""
 ) -> Iterator[Issue]:
-    """Yield an issue if the position of a revolute joint, rad, looks like degrees."""
+    """Return an issue if the position of a revolute joint, rad, looks like degrees."""
     shown = f"{value:.6g}"
     advice = f"{shown} degrees are {math.radians(value):.6g} rad{more_advice}"
     message = "the position looks like degrees"
@@ -166,7 +166,7 @@ def angle_issue(
 
 
 def find_locked_in_degrees(robot: Robot) -> Iterator[Issue]:
-    """Look at the angles at which joints are locked."""
+    """Check the angles at which joints are locked."""
     locked = robot.settings.locked_joints
     joints = read_tree(robot.urdf, robot.source).joints if locked else {}
     for name, value in locked.items():
@@ -179,7 +179,7 @@ def find_locked_in_degrees(robot: Robot) -> Iterator[Issue]:
 
 
 def link_lengths(robot: Robot) -> list[float]:
-    """Distances from joint to joint, and from the last joint to the tool frame, m."""
+    """Return the distances from joint to joint, and from the last joint to the tool frame, m."""
     placements = [
         *list(robot.model.jointPlacements)[2:],
         robot.model.frames[robot.frame_id].placement,
@@ -188,7 +188,7 @@ def link_lengths(robot: Robot) -> list[float]:
 
 
 def reach(robot: Robot) -> float:
-    """How far the tool frame can be from the first joint at most, m, in the ranges of slides that the URDF states."""
+    """Return an upper bound on the distance of the tool frame from the first joint, m, for the slides' ranges."""
     farthest = np.abs(robot.limits.both_ways("position")).max(axis=0)
     slides = [
         max(farthest[i], abs(urdf.lower or 0.0), abs(urdf.upper or 0.0))
@@ -201,17 +201,17 @@ def reach(robot: Robot) -> float:
 def distances_from_base(
     robot: Robot, axes: Sequence[int], positions: np.ndarray
 ) -> np.ndarray:
-    """Distances of positions, (..., p), from the first joint, (...), m, along p axes of the world."""
+    """Return the distances, (...), m, of positions, (..., p), from the first joint, along p axes of the world."""
     base = np.array(robot.model.jointPlacements[1].translation)[list(axes)]
     return np.linalg.norm(positions - base, axis=-1)
 
 
 _ROUNDED = 1e-3
-"""m, or entries of a rotation matrix: positions are given to the millimetre."""
+"""Tolerance for positions, m, and entries of rotation matrices: positions are given to the millimetre."""
 
 
 def position_hint(value: float, lower: float, upper: float, unit: str) -> str | None:
-    """Return what a position, rad or m, beyond its range looks like, if it would be within it in degrees or mm."""
+    """Return a hint if a position outside its range, rad or m, would be inside it in degrees or mm."""
     angle = math.radians(value)
     if unit == "rad" and abs(value) > 2.0 * math.pi and lower <= angle <= upper:
         return f"It looks like degrees: {value:.6g} deg are {angle:.6g} rad"
@@ -223,8 +223,8 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
 
 
 def distance_hint(away: float, far: float) -> str | None:
-    """Return that a path looks like mm if it is `away` from the first joint, m, and the arm reaches `far`, m."""
-    # A path that is only a little too long is not hundreds of times as far.
+    """Return a hint if a path at a distance `away` from the first joint, m, looks like mm for the reach `far`, m."""
+    # A path that is only slightly out of reach is not hundreds of times as far away.
     if 0.05 * far < away / 1000.0 < 3.0 * far:
         return (
             f"The path looks like mm: divided by 1000 it is {away / 1000.0:.3g} m away"
@@ -233,7 +233,7 @@ def distance_hint(away: float, far: float) -> str | None:
 
 
 def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str | None:
-    """Return what a stated position, (p,), looks like if the tool is elsewhere: mm, or rows that are swapped."""
+    """Return a hint if a stated position, (p,), where the tool is not, looks like mm or like swapped rows."""
     if not np.abs(here - stated).max(initial=0.0) > _ROUNDED:
         return None
     is_at_origin = np.abs(here).max() <= _ROUNDED
@@ -249,7 +249,7 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
 
 
 def turn_hint(here: np.ndarray, stated: np.ndarray) -> str | None:
-    """Return that an orientation, a matrix (3, 3), looks like a quaternion with w last, if read so it is `here`."""
+    """Return a hint if an orientation, (3, 3), read as a quaternion with w last would be the orientation `here`."""
     read = pin.Quaternion(stated)
     meant = pin.Quaternion(read.z, read.w, read.x, read.y).matrix()
     near = np.abs(meant - here).max() <= _ROUNDED < np.abs(stated - here).max()

@@ -25,11 +25,11 @@ def read_posture(
     joints : (n,) array, sequence or mapping of str to float
         rad or m.
     names : sequence of str
-        The chain's joints.
+        The joints of the chain.
     defaults : mapping of str to float
         Positions of the last joints, which may be left out.
     where : str
-        Where the posture stands, for messages.
+        Where the posture is given, for messages.
 
     Returns
     -------
@@ -38,7 +38,8 @@ def read_posture(
     Raises
     ------
     InputError, UnknownNameError
-        A joint is missing, unknown, not a number or not finite, or the list has another length than the chain.
+        The position of a joint is missing, not a number or not finite; a joint is unknown; or the list has the wrong
+        length.
     """
     if isinstance(joints, Mapping):
         joints = {**defaults, **joints}

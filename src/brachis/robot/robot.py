@@ -1,4 +1,4 @@
-"""The robot: a Pinocchio model of the chain from base to tool, its limits and friction."""
+"""The robot: a Pinocchio model of the chain from base to tool, with limits and friction."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ from brachis.task.fields import merge
 class Robot(Summary):
     """A serial chain of one-coordinate joints with limits.
 
-    Robots, like their limits, are equal only if they are the same object.
+    Robots are equal only if they are the same object. The same holds for their limits.
 
     Attributes
     ----------
     model : pinocchio.Model
-        The chain alone, mounted, with payload and tool offset; ``nq == nv == n``. Treat it as read-only.
+        The chain alone, with mounting, payload and tool offset; ``nq == nv == n``. Treat it as read-only.
     joint_names : tuple of str
         Names of the n joints, from base to tool.
     tool_frame, base_frame : str
@@ -63,19 +63,19 @@ class Robot(Summary):
     limits : Limits
         Limits of the n joints.
     urdf_limits : tuple of UrdfLimit
-        Limits as the URDF states them.
+        Limits as stated in the URDF.
     urdf_dynamics : UrdfDynamics
-        Joints, bodies and friction as the URDF states them, without payload, mounting and tool offset.
+        Joints, bodies and friction as stated in the URDF, without payload, mounting and tool offset.
     friction : Friction
-        Torque terms that the rigid-body model lacks.
+        Torque terms that are not in the rigid-body model.
     settings : RobotSettings
-        What the robot was made with, as the ``robot`` part of a task.
+        The settings from which the robot was built, as in the ``robot`` part of a task.
     source : str
         The URDF file that the robot was read from.
     urdf : str
         Text of that file.
     tool_joints : tuple of ToolJoint
-        The last joints of the chain, which are virtual: by them the tool may leave the path; see `bind`.
+        Virtual joints at the end of the chain, by which the tool may deviate from the path; see `bind`.
 
     Examples
     --------
@@ -99,7 +99,7 @@ class Robot(Summary):
     tool_joints: tuple[ToolJoint, ...] = ()
 
     def __new__(cls, *arguments: object, **named_fields: object) -> Self:
-        """Refuse a file name, which is for `from_urdf`."""
+        """Refuse a file name: it belongs to `from_urdf`."""
         if arguments or (named_fields and "model" not in named_fields):
             raise InputError(
                 "a robot cannot be made from these arguments",
@@ -117,48 +117,49 @@ class Robot(Summary):
         urdf_text: str | None = None,
         **keywords: Unpack[RobotKeywords],
     ) -> Robot:
-        """Build the model of the chain base -> tool; every joint off the chain is locked.
+        """Build the robot from a URDF. Every joint that is not between base and tool is locked.
 
         Parameters
         ----------
         path : path
-            URDF file, whose mesh files are not read; or MJCF file.
+            URDF file, whose mesh files are not read, or MJCF file.
         urdf_text : str, optional
-            Text of the URDF where it is already known; `path` then only names it.
+            Text of the URDF, if it is already known; `path` is then only a name.
         **keywords
-            Keys of the ``robot`` part of a task; None for the default.
+            Keys of the ``robot`` part of a task. None stands for the default.
         tool_frame : str, optional
-            Link at the end of the chain; the only leaf link if left out.
+            Link at the end of the chain. Default: the only leaf link.
         base_frame : str, optional
-            Link at the beginning of the chain; the root link if left out. Positions are those in the world frame,
-            which is the URDF's root link unless `mounting` says otherwise.
+            Link at the beginning of the chain. Default: the root link. Positions are in the world frame, which is the
+            root link of the URDF unless `mounting` places it elsewhere.
         gravity : (3,) sequence of float, optional
-            Gravitational acceleration in the world frame, m/s^2; (0, 0, -9.81) if left out.
+            Gravitational acceleration in the world frame, m/s^2. Default: (0, 0, -9.81).
         locked_joints : mapping of str to float, optional
-            Joints held at a position, rad or m.
+            Joints that are held at a position, rad or m.
         limits : LimitSpec or mapping, optional
-            Limits that override or complete the URDF's; those of joints off the chain have no effect.
+            Limits that override or complete those of the URDF. Limits of joints outside the chain have no effect.
         friction : mapping, optional
-            ``armature``, ``viscous``, ``coulomb``, ...: keys of `FrictionSettings`; the others are taken from the URDF.
+            ``armature``, ``viscous``, ``coulomb``, ...: keys of `FrictionSettings`. Keys that are left out keep the
+            values of the URDF.
         payload : mapping or Payload, optional
             ``mass``, kg; ``com``, (3,) m, and ``inertia`` about it, kg m^2, in the tool frame of the URDF.
         tool_offset : mapping or Placement, optional
-            ``xyz``, m, and ``rpy_deg``: where the frame that follows the path is in the tool frame of the URDF.
+            ``xyz``, m, and ``rpy_deg``: pose of the frame that follows the path, in the tool frame of the URDF.
         mounting : {"floor", "wall", "ceiling"}, mapping or Placement, optional
-            Where the URDF's root link is in the world.
+            Pose of the URDF's root link in the world.
         speed_override : float, optional
             Factor in (0, 1] on all velocity limits.
 
         Raises
         ------
         UrdfError, UnknownNameError, LimitError, InputError
-            TaskError, one of them, where a keyword has a wrong form.
+            A `TaskError` is an `InputError`: a keyword has a wrong form.
         """
         content = {key: value for key, value in keywords.items() if value is not None}
         content["urdf"] = str(Path(path).absolute())
         unchecked = {}
         if isinstance(content.get("limits"), LimitSpec):
-            # It is checked below, where the joints are known.
+            # It is checked later, when the joints are known.
             unchecked["limits"] = content.pop("limits")
         settings = check_robot_settings(content).model_copy(update=unchecked)
         return cls.from_settings(settings, str(path), urdf_text)
@@ -172,16 +173,16 @@ class Robot(Summary):
         geometry: pin.GeometryModel | None = None,
         **keywords: Unpack[RobotKeywords],
     ) -> Robot:
-        """Build the robot from a Pinocchio model: its frames, inertias, limits, friction, armature and gravity.
+        """Build the robot from a Pinocchio model: from its frames, inertias, limits, friction, armature and gravity.
 
         Parameters
         ----------
         model : pinocchio.Model
-            Joints of the chain have one axis; others, such as a free base, are held.
+            Joints of the chain must have one axis. Other joints, such as a free base, are held.
         frame : str, optional
-            Body or added frame that follows the path, in place of ``tool_frame``.
+            Body or added frame that follows the path; used in place of ``tool_frame``.
         geometry : pinocchio.GeometryModel, optional
-            Solids of the links, for distances.
+            Solids of the links, for the computation of distances.
         **keywords
             As for `from_urdf`.
 
@@ -205,16 +206,16 @@ class Robot(Summary):
         Parameters
         ----------
         settings : RobotSettings
-            ``urdf`` is not read.
+            The settings; their ``urdf`` is not read.
         source : str
             The URDF file.
         urdf_text : str, optional
-            Its text, if it is known already.
+            Text of the file, if it is already known.
 
         Raises
         ------
         TaskError
-            A file of limits was not read, because `load_task` did not make the task.
+            The limits file was not read, because the task was not made by `load_task`.
         UrdfError, UnknownNameError, LimitError, InputError
             See `from_urdf`.
         """
@@ -261,8 +262,8 @@ class Robot(Summary):
         Parameters
         ----------
         **limits
-            Arguments of `LimitSpec`. A mapping by joint name changes those joints alone; ``scale`` multiplies the
-            limits that the robot has.
+            Arguments of `LimitSpec`. A mapping by joint name changes only these joints; ``scale`` multiplies the
+            robot's present limits.
 
         Raises
         ------
@@ -297,7 +298,7 @@ class Robot(Summary):
         com: Sequence[float] = (0.0, 0.0, 0.0),
         inertia: Mapping[str, float] | None = None,
     ) -> Robot:
-        """Return the robot with another payload, in place of the one that it has.
+        """Return the robot with a new payload, which replaces its present payload.
 
         Parameters
         ----------
@@ -306,7 +307,7 @@ class Robot(Summary):
         com : (3,) sequence of float, optional
             Centre of mass in the tool frame of the URDF, m.
         inertia : mapping, optional
-            ``ixx``, ``iyy``, ... about the centre of mass, kg m^2; a point mass unless given.
+            ``ixx``, ``iyy``, ... about the centre of mass, kg m^2. Default: a point mass.
 
         Raises
         ------
@@ -332,7 +333,7 @@ class Robot(Summary):
         return replace(robot, limits=self.limits, friction=self.friction)
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
+        """Return the entries that are shown to the user."""
         limits = self.limits
         payload = self.settings.payload
         return {
@@ -347,7 +348,7 @@ class Robot(Summary):
         }
 
     def in_words(self, values: np.ndarray, quantity: str = "position") -> str:
-        """Write a value for each joint, (n,), with the unit of such a quantity."""
+        """Write the values of a quantity, (n,), with their units."""
         units = [UNITS[quantity][unit] for unit in self.position_units]
         numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
         if len(set(units)) == 1:
@@ -359,12 +360,12 @@ class Robot(Summary):
 
     @property
     def has_masses(self) -> bool:
-        """Whether the URDF has the masses that torques need."""
+        """Whether the URDF contains the masses that torques need."""
         return not self.urdf_dynamics.without_mass
 
     @property
     def name(self) -> str:
-        """Name that the URDF gives the robot; empty where it gives none."""
+        """Name of the robot in the URDF; empty if it has none."""
         return read_tree(self.urdf, self.source).robot.get("name") or ""
 
     @property
@@ -374,11 +375,11 @@ class Robot(Summary):
 
     @property
     def urdf_joints(self) -> tuple[str, ...]:
-        """Names of the joints without the virtual ones."""
+        """Names of the joints, without the virtual joints."""
         return self.joint_names[: self.n - len(self.tool_joints)]
 
     def of_real_joints(self, values: np.ndarray) -> np.ndarray:
-        """Return values of joints, (..., n), with zeros for the virtual ones, which do not move the tool."""
+        """Set values of joints, (..., n), to zero for the virtual joints, which do not move the tool."""
         if not self.tool_joints:
             return values
         return np.where(np.arange(self.n) < len(self.urdf_joints), values, 0.0)
@@ -399,19 +400,19 @@ class Robot(Summary):
 
     @property
     def revolute(self) -> np.ndarray:
-        """Which joints turn, (n,) bool; the others slide."""
-        return np.array([unit == "rad" for unit in self.position_units])
+        """Which joints are revolute, (n,) bool; the others are prismatic."""
+        return np.array(self.position_units) == "rad"
 
     @cached_property
     def scales(self) -> np.ndarray:
-        """How far joints move, about, (n,): 1 rad or m; a virtual joint with a range half of it."""
+        """Typical motion of each joint, (n,): 1 rad or m; for a virtual joint at most half of its range."""
         halves = [0.5 * (joint.upper - joint.lower) for joint in self.tool_joints]
         return np.append(np.ones(len(self.urdf_joints)), np.minimum(halves, 1.0))
 
     def posture(self, joints: object, where: str) -> np.ndarray:
-        """Check a list or mapping of joint positions and return it as (n,) in chain order, rad or m.
+        """Check a list or mapping of joint positions, and return them in chain order, (n,), rad or m.
 
-        Positions of virtual joints may be left out; they are zero then, or at the end of the range that is nearer.
+        Positions of virtual joints may be left out. They are then zero, or at the closest end of the range.
 
         Raises
         ------
@@ -426,11 +427,11 @@ class Robot(Summary):
 
     @cached_property
     def chain(self) -> Chain:
-        """The chain as the compiled kernel takes it."""
+        """The chain in the form that the compiled kernel needs."""
         return chain_of(self.model, self.frame_id, self.friction.table)
 
     def check_masses(self, *users: str) -> None:
-        """Refuse users of masses, by default those of the task, if the URDF lacks masses.
+        """Refuse features that need masses, by default those of the task, if the URDF lacks masses.
 
         Raises
         ------
@@ -441,9 +442,9 @@ class Robot(Summary):
         check_masses(dynamics, self.source, known)
 
     def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
-        """Yield Pinocchio's placements of all joints and of the tool frame in postures (K, n), one after the other.
+        """Yield Pinocchio's placements of all joints and of the tool frame, posture by posture, for postures (K, n).
 
-        They share one workspace: copy what you keep.
+        They share one workspace: copy the data that you keep.
         """
         model = self.model
         data = model.createData()
@@ -454,7 +455,7 @@ class Robot(Summary):
             yield data
 
     def tool_placement(self, q: ArrayLike | Mapping[str, float]) -> pin.SE3:
-        """Placement of the tool frame in the world frame at one posture.
+        """Return the placement of the tool frame in the world frame in one posture.
 
         Parameters
         ----------
@@ -470,7 +471,7 @@ class Robot(Summary):
         return data.oMf[self.frame_id].copy()
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame in the world frame, from postures (K, n)."""
+        """Return positions, (K, 3), m, and rotations, (K, 3, 3), of the tool frame in the world in postures (K, n)."""
         positions = np.empty((len(q), 3))
         rotations = np.empty((len(q), 3, 3))
         tool = self.frame_id
@@ -481,9 +482,9 @@ class Robot(Summary):
         return positions, rotations
 
     def heights(self, q: np.ndarray) -> np.ndarray:
-        """Heights of the tool frame above the plane on which the robot stands, (K,) m, from postures (K, n).
+        """Return the heights of the tool frame above the plane on which the robot stands, (K,) m, for postures (K, n).
 
-        The plane goes through the base frame; its normal is the z axis of the URDF's root link.
+        The plane contains the origin of the base frame. Its normal is the z axis of the URDF's root link.
         """
         base = self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
         floor = self.model.frames[base].placement.translation
@@ -492,7 +493,7 @@ class Robot(Summary):
 
 
 def _without_defaults(settings: RobotSettings) -> RobotSettings:
-    """Leave out settings that have their default, so that others can be added."""
+    """Leave out settings that have their default value, so that they can be set later."""
     default = RobotSettings()
     return RobotSettings(
         **{key: value for key, value in settings if value != getattr(default, key)}

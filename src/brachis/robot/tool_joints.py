@@ -1,12 +1,12 @@
-"""Virtual joints between the tool and the path, one for each direction in which the tool may leave the path.
+"""Virtual joints between the tool and the path, one for each direction in which the tool may deviate from the path.
 
-The tool is where the path says, then moved and turned in the axes of the path's orientation:
+The pose of the tool is the pose on the path, displaced and turned in the axes of the path's orientation:
 
     tool = path Tr(x, y, z) Rx(-side) Ry(lead) Rz(roll).
 
-So the path's place is the end of a longer chain. From the tool on its joints turn about -z, -y and x and slide along
--x, -y and -z; they have no mass, and no limits but their ranges. The position of such a joint says how far the tool is
-from where the path wants it.
+So the pose on the path is the end of a longer chain. Beyond the tool, its joints turn about -z, -y and x and slide
+along -x, -y and -z. They have no mass, and no limits except their ranges. The position of such a joint is a deviation
+of the tool from the path.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from brachis.task import Tolerances
 from brachis.task.fields import POSITION
 
 FREE_ROLL = "pose_free_roll"
-"""The task space of poses whose roll about the tool axis is free."""
+"""Name of the task space of poses whose roll about the tool axis is free."""
 AXIS = "axis"
-"""Word for the direction of the tool's z axis, among rows of a task space or alone."""
+"""Word for the direction of the tool's z axis, as a row of a task space or alone."""
 _DIRECTIONS = {
     "roll": (0.0, 0.0, -1.0),
     "lead": (0.0, -1.0, 0.0),
@@ -33,7 +33,7 @@ _DIRECTIONS = {
 """Axes of the virtual joints, in the order of the chain."""
 _TURNING = ("roll", "lead", "side")
 _Range = tuple[float, float, str]
-"""Ends, rad or m, and the key of the task that sets them."""
+"""Ends of a range, rad or m, and the key of the task that sets them."""
 _FREE: _Range = (-math.inf, math.inf, "task_space")
 
 
@@ -44,9 +44,9 @@ class ToolJoint:
     Attributes
     ----------
     direction : {"roll", "lead", "side", "x", "y", "z"}
-        How it moves the tool.
+        Direction in which it moves the tool.
     lower, upper : float
-        Its range, rad or m; infinite where it is free.
+        Ends of its range, rad or m; infinite if the joint is free.
     key : str
         Key of the task that sets the range.
     """
@@ -63,17 +63,17 @@ class ToolJoint:
 
     @property
     def axis(self) -> tuple[float, float, float]:
-        """Direction about which it turns, or along which it slides."""
+        """Axis about which the joint turns, or along which it slides."""
         return _DIRECTIONS[self.direction]
 
     @property
     def turns(self) -> bool:
-        """Whether it turns; it slides otherwise."""
+        """Whether the joint is revolute; otherwise it is prismatic."""
         return self.direction in _TURNING
 
     @property
     def is_ranged(self) -> bool:
-        """Whether it has a range."""
+        """Whether the joint has a range."""
         return math.isfinite(self.upper)
 
 
@@ -87,8 +87,8 @@ def tool_joints_of(
 ) -> tuple[ToolJoint, ...]:
     """List the virtual joints that a task space and its tolerances need, in the order of the chain.
 
-    A cone is as wide in lead and side, a sphere, or a box in the world's axes, as large along all axes. Ranges that are
-    not asked for are a little wider, so that the cone, sphere or box itself is the limit.
+    A cone has the same width in lead and side. A sphere, and a box in the world's axes, have the same size along all
+    axes. Ranges that the task does not state are slightly wider, so that the cone, sphere or box itself is the limit.
     """
     tolerances = tolerances or Tolerances()
     ranges: dict[str, _Range] = {}
@@ -125,7 +125,7 @@ def tool_joints_of(
 
 
 def _within(ends: _Range | None, reach: float, key: str) -> _Range:
-    """Cut a range down to a little more than both sides of zero; without one, `key` is what sets it."""
+    """Limit a range to slightly more than `reach` on both sides of zero; `key` sets it if there was no range."""
     wide = 1.01 * reach
     low, high, own_key = ends or (-wide, wide, key)
     return max(low, -wide), min(high, wide), own_key

@@ -1,6 +1,6 @@
-"""The chain from base to tool of a URDF: which joints it has, where the others are held, and what is refused.
+"""The chain from base to tool of a URDF: its joints, the positions of all other joints, and what is refused.
 
-Of a robot with several limbs, or with fingers, also the chain that is taken unless the user names another.
+For a robot with several limbs or with fingers, also the default chain.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from brachis.robot.urdf_elements import (
 )
 
 LINK = "link:"
-"""Prefix of link names in the URDF that Pinocchio reads; it keeps them apart from joint names."""
+"""Prefix of link names in the URDF that Pinocchio reads, which distinguishes them from joint names."""
 _WORLD = "universe"
 _MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
@@ -47,9 +47,9 @@ _MOVING_TYPES = ("revolute", "continuous", "prismatic")
 def _check_joints(
     tree: UrdfTree, path: Sequence[str], chain: Sequence[str], where: str
 ) -> None:
-    """Refuse joints that a serial chain of one-coordinate joints cannot have.
+    """Refuse joints that a serial chain of one-coordinate joints cannot contain.
 
-    Those on the path from base to tool that do not move are not in the chain. A mimic joint beside the path is held.
+    Joints on the path from base to tool that do not move are not in the chain. A mimic joint beside the path is held.
     """
     if _WORLD in tree.joints:
         raise UrdfError(
@@ -90,7 +90,7 @@ def _check_joints(
 
 
 def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
-    """Refuse a negative mass, a mass without moments of inertia, and moments that no body can have."""
+    """Refuse a negative mass, a mass without moments of inertia, and moments of inertia that no body can have."""
     for body in bodies:
         hint = (
             f"Correct it in the URDF; or lock the joints from the base to {body.joint} with robot.locked_joints, if "
@@ -121,24 +121,24 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
 
 @dataclass(frozen=True)
 class UrdfChain:
-    """The chain from base to tool of a URDF, all other joints fixed.
+    """The chain from base to tool of a URDF, with all other joints fixed.
 
     Attributes
     ----------
     joint_names : tuple of str
         Moving joints of the chain, from base to tool.
     limits : tuple of UrdfLimit
-        Their limits as the URDF states them.
+        Limits of these joints as stated in the URDF.
     locked : dict of str to float
-        Every other moving joint and the position it is held at, rad or m.
+        Position at which each of the other moving joints is held, rad or m.
     tool_frame, base_frame : str
         Link names.
     xml : str
-        The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
-        every joint has one coordinate, and unsupported joints off the chain have become fixed. Names of links begin
-        with `LINK`.
+        The URDF that Pinocchio reads. In it ``continuous`` joints are ``revolute`` joints without a range, so that
+        every joint has one coordinate; unsupported joints outside the chain are fixed; and names of links begin with
+        `LINK`.
     dynamics : UrdfDynamics
-        Joints, bodies and friction as the text states them, read without Pinocchio.
+        Joints, bodies and friction as stated in the text, read without Pinocchio.
     """
 
     joint_names: tuple[str, ...]
@@ -158,7 +158,7 @@ def read_chain(
     base_frame: str | None = None,
     locked_joints: tuple[tuple[str, float], ...] = (),
 ) -> UrdfChain:
-    """Read a URDF and find the chain from `base_frame` to `tool_frame`; kept for the next plan of the robot.
+    """Read a URDF and find the chain from `base_frame` to `tool_frame`. The result is cached for further plans.
 
     Parameters
     ----------
@@ -167,9 +167,9 @@ def read_chain(
     where : str
         Name of the file, for messages.
     tool_frame : str, optional
-        Link at the chain's end; None takes the URDF's only leaf link.
+        Link at the end of the chain. Default: the only leaf link of the URDF.
     base_frame : str, optional
-        Link at the chain's beginning; None takes the root link.
+        Link at the beginning of the chain. Default: the root link.
     locked_joints : tuple of (str, float), optional
         Joints held at a position, rad or m.
 
@@ -216,7 +216,7 @@ def read_chain(
 
 
 def _check_locked_position(joint: Element, name: str, position: float) -> None:
-    """Refuse a position, rad or m, that a locked joint cannot have."""
+    """Refuse a position of a locked joint, rad or m, that is out of its range."""
     lowest, highest = (_clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST))
     if not lowest - tolerances.ANGLE <= position <= highest + tolerances.ANGLE:
         unit = _unit_of(joint)
@@ -231,9 +231,9 @@ def _check_locked_position(joint: Element, name: str, position: float) -> None:
 def _lock(
     tree: UrdfTree, names: Sequence[str], positions: Mapping[str, float], where: str
 ) -> dict[str, float]:
-    """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else nearest to 0.
+    """Find the positions, rad or m, of held joints: as given, else as mimicked, else as close to 0 as possible.
 
-    What a joint mimics may put it beyond its own range, as the file says.
+    A mimic joint may be outside its own range, if the file says so.
     """
     locked = {
         name: float(positions.get(name, _clip_to_range(tree.joints[name], 0.0)))
@@ -272,7 +272,7 @@ def _lock(
 
 
 def _leader_of(joint: Element) -> str:
-    """Return the name of the joint that a joint mimics; empty if it mimics none."""
+    """Return the name of the joint that this joint mimics; empty if it mimics none."""
     mimic = joint.find("mimic")
     return "" if mimic is None else mimic.get("joint", "")
 
@@ -283,12 +283,12 @@ def _unit_of(joint: Element) -> str:
 
 
 def read_file(path: Path) -> str:
-    """Text of a URDF file; an MJCF file is written as a URDF.
+    """Return the text of a URDF file; convert an MJCF file to a URDF.
 
     Raises
     ------
     UrdfError
-        The file is missing, not text, another file of brachis, or not a regular file of a size that a URDF may have; or
+        The file is missing, is not text, is another kind of file of brachis, is not a regular file or is too long; or
         MuJoCo refuses it.
     """
     files.check_kind(path, files.Kind.URDF, UrdfError)
@@ -326,7 +326,7 @@ def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[st
 
 
 def _clip_to_range(joint: Element, position: float) -> float:
-    """Return a position, or the end of the joint's range that is next to it."""
+    """Return the position in the joint's range that is closest to a position."""
     if joint.get("type") == "continuous":
         return position
     lower = number_of(joint, "limit", "lower", -np.inf)
@@ -335,12 +335,12 @@ def _clip_to_range(joint: Element, position: float) -> float:
 
 
 def _read_limit(joint: Element) -> UrdfLimit:
-    """Read the limits of one joint; the range of a revolute or prismatic joint may have to come from the task."""
+    """Read the limits of one joint. The task may have to state the range of a revolute or prismatic joint."""
     lower, upper, velocity, effort = (
         number_of(joint, "limit", key, None)
         for key in ("lower", "upper", "velocity", "effort")
     )
-    effort = effort or None  # exporters write 0 for a limit that nobody stated
+    effort = effort or None  # exporters write 0 if no limit was stated
     turns_freely = joint.get("type") == "continuous"
     if turns_freely or lower is None or upper is None:
         return UrdfLimit(None, None, velocity, effort, needs_range=not turns_freely)
@@ -348,9 +348,9 @@ def _read_limit(joint: Element) -> UrdfLimit:
 
 
 def _plain_xml(tree: UrdfTree) -> str:
-    """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates.
+    """Write the URDF with one-coordinate joints only, because Pinocchio gives a continuous joint two coordinates.
 
-    Pinocchio looks joints and links up by name alone: those of links begin with `LINK`.
+    Pinocchio looks up joints and links by name alone, so the names of links get the prefix `LINK`.
     """
     robot = etree.Element("robot", name="robot")
     for name, link in tree.links.items():
@@ -371,7 +371,7 @@ def _plain_xml(tree: UrdfTree) -> str:
 
 
 def _copy_parts(owner: Element, *tags: str) -> list[Element]:
-    """Copy parts of a checked link or joint, with its numbers as Python writes them."""
+    """Copy elements of a checked link or joint, with numbers as Python writes them."""
     attributes = {entry.attribute for kind in ENTRIES.values() for entry in kind}
     children = [copy.deepcopy(child) for child in owner if child.tag in tags]
     for child in children:
@@ -384,16 +384,16 @@ def _copy_parts(owner: Element, *tags: str) -> list[Element]:
 
 @dataclass(frozen=True)
 class DefaultChain:
-    """The chain that is taken from a robot unless the user names another.
+    """The chain of a robot that is used unless the user names another chain.
 
     Attributes
     ----------
     base : str or None
-        The link from which several limbs part; None for a single limb, which begins at the URDF's root.
+        Link from which several limbs branch off; None for a single limb, which begins at the root of the URDF.
     tool : str
-        The last link before the limb itself parts, into fingers for example; of a single chain its end.
+        Last link before the limb itself branches, for example into fingers; the end of a single chain.
     leaves : tuple of str
-        Links at the limb's ends.
+        Links at the ends of the limb.
     """
 
     base: str | None
@@ -402,9 +402,9 @@ class DefaultChain:
 
 
 def default_chain(text: str, where: str) -> DefaultChain:
-    """Find the chain of most joints in a URDF: an arm without its fingers, and without the trunk that it shares.
+    """Find the chain with the most joints in a URDF: an arm without its fingers, and without a shared trunk.
 
-    Limbs share less than half of their joints. Of several the first one in the file is taken.
+    Limbs are chains that share less than half of their joints. Of several limbs, the first in the file is used.
 
     Raises
     ------
@@ -427,7 +427,7 @@ def default_chain(text: str, where: str) -> DefaultChain:
     longest = [chain for chain in chains.values() if count_moving(chain) == most_joints]
     limb = {}
     for leaf, chain in chains.items():
-        # What parts from the limb in its upper half, and moves there, is a branch of it; frames are not fingers.
+        # A chain that leaves the limb in its upper half, and moves there, is a branch of it; frames are not fingers.
         shared = count_moving(_common_beginning([longest[0], chain]))
         if 2 * shared >= most_joints and (
             count_moving(chain) > shared or shared == most_joints

@@ -1,4 +1,4 @@
-"""A URDF's chain as its text states it, read without Pinocchio: to verify motions by."""
+"""The chain of a URDF as stated in its text, read without Pinocchio, for the verification of motions."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from brachis.task import Placement
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Body(Summary):
-    """What one joint of a chain moves: its child link and all that is held to it.
+    """The body that one joint of a chain moves: its child link and all links that are fixed to it.
 
     Attributes
     ----------
     joint : str
     placement : (4, 4) ndarray
-        Of the joint at zero in the frame of the joint before it, of the first one in the root link.
+        Placement of the joint at position zero in the frame of the joint before it, or in the root link for the first
+        joint.
     axis : (3,) ndarray
-        Unit vector of the joint's axis in its own frame.
+        Unit vector of the joint's axis in the joint's own frame.
     sliding : bool
         Whether the joint is prismatic.
     links : tuple of str
     mass : float
         kg.
     com : (3,) ndarray
-        Centre of mass in the frame of the joint's child link, m; zeros where the mass is zero.
+        Centre of mass in the frame of the joint's child link, m; zeros if the mass is zero.
     inertia : (3, 3) ndarray
-        About the centre of mass, axes of the same frame, kg m^2.
+        Inertia about the centre of mass, along the axes of the same frame, kg m^2.
     """
 
     joint: str
@@ -48,20 +49,20 @@ class Body(Summary):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UrdfDynamics(Summary):
-    """What a URDF says of a chain.
+    """The dynamics of a chain as stated in a URDF.
 
     Attributes
     ----------
     bodies : tuple of Body
-        What each joint moves, in the order of the chain.
+        The body that each joint moves, in the order of the chain.
     tool : (4, 4) ndarray
         Placement of the tool frame in the frame of the last joint.
     friction : dict of str to (n,) ndarray
-        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N; ``armature``, kg m^2 or kg, which
-        only `write_urdf` writes. Zero by default.
+        ``viscous``: damping, Nm s/rad or N s/m. ``coulomb``: friction, Nm or N. ``armature``: kg m^2 or kg, written
+        only by `write_urdf`. Zero if not stated.
     links : dict of str to tuple of int and (4, 4) ndarray
-        Of every link the number of the joint that moves it, from 1 on, and its placement in the joint's frame; 0 and
-        the placement in the root link where none does.
+        For every link the number of the joint that moves it, counted from 1, and the link's placement in the joint's
+        frame. For a link that does not move: 0, and its placement in the root link.
     """
 
     bodies: tuple[Body, ...]
@@ -71,25 +72,25 @@ class UrdfDynamics(Summary):
 
     @property
     def without_mass(self) -> tuple[Body, ...]:
-        """Bodies of which no link has a mass."""
+        """The bodies without any mass."""
         return tuple(body for body in self.bodies if not body.mass)
 
 
 def read_dynamics(
     tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str
 ) -> UrdfDynamics:
-    """Read a chain of a checked URDF, and sum up the inertias of what each joint moves.
+    """Read a chain of a checked URDF, and sum up the inertias of the links that each joint moves.
 
     Parameters
     ----------
     tree : UrdfTree
-        Its numbers have been checked.
+        The URDF; its numbers have been checked.
     chain : sequence of str
         Moving joints.
     locked : mapping of str to float
-        Where the others are held, rad or m.
+        Positions of the other joints, rad or m.
     tool : str
-        Link at the chain's end.
+        Link at the end of the chain.
     """
     carried = {tree.root: (0, np.eye(4))}  # see UrdfDynamics.links
     befores = {}  # placements of joints of the chain
@@ -125,7 +126,7 @@ def read_dynamics(
 def _read_body(
     tree: UrdfTree, name: str, placement: np.ndarray, links: Mapping[str, np.ndarray]
 ) -> Body:
-    """Sum up links with their placements in the joint's frame."""
+    """Sum up the links of a body, given with their placements in the joint's frame."""
     joint = tree.joints[name]
     mass = 0.0
     moment = np.zeros(3)
@@ -167,12 +168,12 @@ def _axis(joint: Element) -> np.ndarray:
 
 
 def mass_of(link: Element) -> float:
-    """Return the mass of a checked link, kg; without one its moments of inertia do not count."""
+    """Return the mass of a checked link, kg. Without a mass, its moments of inertia are ignored."""
     return number_of(link, "inertial/mass", "value", 0.0)
 
 
 def inertia_matrix(link: Element) -> np.ndarray:
-    """Matrix of moments and products, (3, 3) kg m^2, of a checked link; zeros where it states none."""
+    """Return the inertia matrix, (3, 3) kg m^2, of a checked link; zeros if it states none."""
     keys = _MOMENTS.ravel()
     return symmetric_matrix(
         {key: number_of(link, "inertial/inertia", key, 0.0) for key in keys}
@@ -196,7 +197,7 @@ def check_inertia(
     error: type[InputError],
     hint: str | None = None,
 ) -> None:
-    """Refuse an inertia matrix, (3, 3) kg m^2, that no rigid body has."""
+    """Refuse an inertia matrix, (3, 3) kg m^2, that no rigid body can have."""
     moments = np.linalg.eigvalsh(matrix)
     slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
     if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
@@ -211,12 +212,12 @@ def check_inertia(
 
 
 def _spread(lever: np.ndarray) -> np.ndarray:
-    """Second moment of a point of 1 kg at `lever`, (3,) m, about the origin, kg m^2."""
+    """Return the inertia of a point of 1 kg at `lever`, (3,) m, about the origin, kg m^2."""
     return np.dot(lever, lever) * np.eye(3) - np.outer(lever, lever)
 
 
 def origin_of(owner: Element, path: str) -> np.ndarray:
-    """Return the placement, (4, 4), that an origin describes."""
+    """Return the placement, (4, 4), given by an ``<origin>``."""
     zeros = "0 0 0"
     return _place(
         numbers_of(owner, path, "xyz", zeros), numbers_of(owner, path, "rpy", zeros)
@@ -233,7 +234,7 @@ def _place(xyz: Sequence[float], rpy: Sequence[float] | np.ndarray) -> np.ndarra
 
 
 def _displacement(joint: Element, position: float) -> np.ndarray:
-    """Displacement, (4, 4), of a joint that is held at a position, rad or m."""
+    """Return the displacement, (4, 4), of a joint that is held at a position, rad or m."""
     placed = np.eye(4)
     if joint.get("type") == "prismatic":
         placed[:3, 3] = position * _axis(joint)

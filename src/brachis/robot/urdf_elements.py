@@ -1,6 +1,6 @@
-"""The elements of a URDF: well-formed XML without macros, unique names, joints between links that form one tree.
+"""The elements of a URDF: well-formed XML without macros, unique names, links that joints connect to one tree.
 
-Every number that is used is checked to be finite: other parsers drop an inertia with a NaN in silence.
+Every number that is used must be finite: other parsers silently drop an inertia that contains a NaN.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class UrdfTree:
     robot : lxml element
         The ``<robot>`` element.
     links, joints : mapping of str to lxml element
-        By name, in the order of the file.
+        Links and joints by name, in the order of the file.
     above : mapping of str to str
-        For every link but the root the name of the joint that it hangs from.
+        Name of the joint above each link, except for the root.
     downward : tuple of str
-        All links, from the root on, every one after the link that it hangs from.
+        All links, beginning with the root; each link comes after its parent.
     """
 
     robot: Element
@@ -45,7 +45,7 @@ class UrdfTree:
 
     @property
     def root(self) -> str:
-        """The link that hangs from no joint."""
+        """The link without a joint above it."""
         return self.downward[0]
 
 
@@ -61,9 +61,10 @@ def read_tree(text: str, where: str) -> UrdfTree:
     Raises
     ------
     UrdfError
-        The text is not XML or not a URDF; xacro macros are left in it; a link or joint has no name or that of another
-        one; a joint has no known type, or hangs from or holds a link that is not there; the links are not one tree; a
-        number is missing or wrong, or an element is there twice. The message names file, line, and link or joint.
+        The text is not XML or not a URDF, or contains xacro macros; a link or joint has no name, or two have the same
+        name; the type of a joint is unknown, or its parent or child link does not exist; the links do not form one
+        tree; a number is missing or wrong; or an element occurs twice. The message names the file, the line, and the
+        link or joint.
     """
     robot = _robot_element(text, where)
     links = _by_name(robot, "link", where)
@@ -89,7 +90,7 @@ def read_tree(text: str, where: str) -> UrdfTree:
 
 
 def _place_of(element: Element, where: str) -> str:
-    """Return where an element is: the file, its line, and the link or joint that it is part of."""
+    """Return the place of an element: the file, the line, and the link or joint that contains it."""
     place = f"{where}, line {element.sourceline}"
     for ancestor in (element, *element.iterancestors()):
         if ancestor.tag in ("link", "joint"):
@@ -98,13 +99,13 @@ def _place_of(element: Element, where: str) -> str:
 
 
 def end_of(joint: Element, end: str) -> str:
-    """Name of the link at a joint's ``parent`` or ``child`` end; empty if none is named."""
+    """Return the name of the link at a joint's ``parent`` or ``child`` end; empty if none is named."""
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
 
 
 def _robot_element(text: str, where: str) -> Element:
-    """Parse the text, and refuse anything but an expanded URDF."""
+    """Parse the text, and refuse everything except an expanded URDF."""
     if not text.lstrip("\ufeff\t\r\n ").startswith("<"):
         raise UrdfError(
             "the file is not a URDF",
@@ -118,7 +119,7 @@ def _robot_element(text: str, where: str) -> Element:
     )
     robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
     for entry in parser.error_log:
-        # ROS reads undeclared prefixes of tags, such as sensor:camera, as a part of the name.
+        # ROS reads an undeclared prefix of a tag, as in sensor:camera, as part of the name.
         if entry.type_name != "NS_ERR_UNDEFINED_NAMESPACE":
             raise UrdfError(
                 "the URDF file is not well-formed XML",
@@ -148,7 +149,7 @@ def _robot_element(text: str, where: str) -> Element:
 
 
 def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
-    """Links or joints by their names."""
+    """Return the links or joints by their names."""
     named: dict[str, Element] = {}
     repeated: dict[str, None] = {}
     for element in robot.findall(kind):
@@ -173,7 +174,7 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
 def _connect(
     links: Mapping[str, Element], joints: Mapping[str, Element], where: str
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the joint above every link but the root, and all links, every one after the link that it hangs from."""
+    """Return the joint above each link except the root; and all links, each after its parent."""
     above: dict[str, str] = {}
     below: dict[str, list[str]] = {name: [] for name in links}
     flaws = []
@@ -199,7 +200,7 @@ def _connect(
     if len(downward) != 1:
         flaws.append(f"root links: {', '.join(downward) or 'none'}")
     if not flaws:
-        for link in downward:  # which grows on the way
+        for link in downward:  # the list grows during the loop
             downward.extend(below[link])
         looped = links.keys() - set(downward)
         if looped:
@@ -220,7 +221,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 @dataclass(frozen=True)
 class Entry:
-    """An attribute that holds numbers.
+    """An attribute that contains numbers.
 
     Attributes
     ----------
@@ -229,9 +230,9 @@ class Entry:
     attribute : str
     unit : str
     count : int, optional
-        How many numbers, separated by spaces.
+        How many numbers there are, separated by spaces.
     required : bool, optional
-        Whether the attribute has to be there where the element is.
+        Whether the element must have the attribute.
     largest : float, optional
         Largest magnitude.
     """
@@ -269,13 +270,13 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
         Entry("dynamics", "armature", "kg m^2 or kg"),
     ),
 }
-"""All that is read from links and joints, and what a number there means."""
+"""All attributes of links and joints that are read, with the meaning of their numbers."""
 
 
 def numbers_of(
     owner: Element, path: str, attribute: str, absent: str
 ) -> tuple[float, ...]:
-    """Numbers of a checked attribute of a link or joint; those of `absent` where it is not there."""
+    """Return the numbers of a checked attribute of a link or joint; those of `absent` if it is missing."""
     element = owner.find(path)
     text = absent if element is None else element.get(attribute, absent)
     return tuple(float(word) for word in text.split())
@@ -287,13 +288,13 @@ _Absent = TypeVar("_Absent", float, None)
 def number_of(
     owner: Element, path: str, attribute: str, absent: _Absent
 ) -> float | _Absent:
-    """Return the number of a checked attribute of a link or joint; `absent` if it is not there."""
+    """Return the number of a checked attribute of a link or joint; `absent` if it is missing."""
     numbers = numbers_of(owner, path, attribute, "")
     return numbers[0] if numbers else absent
 
 
 def _check_entry(owner: Element, entry: Entry, where: str) -> None:
-    """Refuse an attribute of a link or joint that is not a finite number, or an element that is there twice."""
+    """Refuse an attribute of a link or joint that is not a finite number, or an element that occurs twice."""
     elements = [owner]
     for tag in entry.path.split("/"):
         elements = elements[0].findall(tag)

@@ -1,4 +1,4 @@
-"""A Pinocchio model as the text of a URDF: all other parts of brachis read, save and verify robots as such text."""
+"""Conversion of a Pinocchio model to the text of a URDF, from which brachis reads, saves and verifies robots."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ def write_urdf(model: pin.Model, geometry: pin.GeometryModel | None = None) -> s
     Parameters
     ----------
     model : pinocchio.Model
-        Joints that neither turn about nor slide along one axis become ``floating``: they can be held, not moved. Limits
-        that are infinite, or as large as the largest number, are left out. ``model.armature`` becomes the attribute
-        ``armature`` of ``<dynamics>``, which only brachis knows.
+        Joints that neither turn about nor slide along one axis become ``floating`` joints, which can be held but not
+        moved. Infinite limits, and limits as large as the largest number, are left out. ``model.armature`` becomes the
+        attribute ``armature`` of ``<dynamics>``, which only brachis reads.
     geometry : pinocchio.GeometryModel, optional
-        Solids, which become ``<collision>`` elements: boxes, balls, cylinders, capsules (which only brachis knows) and
-        mesh files.
+        Solids, which become ``<collision>`` elements: boxes, balls, cylinders, capsules (read only by brachis) and mesh
+        files.
 
     Returns
     -------
     str
-        Every body and every frame, but those of joints, is a link. What a joint moves has the name of the body that is
-        placed there; without one, that of the joint. A name that another link has gets an underscore.
+        The text of the URDF. Every body is a link, and so is every frame except the frames of joints. The link that a
+        joint moves has the name of the body at the joint's frame, or the name of the joint if there is no such body. A
+        name that is already taken gets an underscore.
 
     Raises
     ------
     UrdfError
-        A solid has another shape.
+        A solid has a different shape.
     """
     bodies = {
         frame.parentJoint: number
@@ -58,7 +59,7 @@ def write_urdf(model: pin.Model, geometry: pin.GeometryModel | None = None) -> s
     names = {name for name, _ in origins}
     parents = [origins[parent] for parent in model.parents]
     carriers = [origins[0]]
-    """Of every frame the link that is nearest above it, with its placement in the frame of the same joint."""
+    """For every frame the closest link above it, with the link's placement in the frame of the same joint."""
     for number, frame in enumerate(model.frames[1:], 1):
         joint = frame.parentJoint
         above = model.frames[frame.parentFrame].parentJoint
@@ -87,7 +88,7 @@ _LINKS = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 
 
 def write_numbers(*numbers: float) -> str:
-    """Write numbers as the shortest text from which the same numbers are read again."""
+    """Write numbers as the shortest text that reproduces them exactly."""
     return " ".join(repr(float(number) + 0.0).removesuffix(".0") for number in numbers)
 
 
@@ -102,14 +103,14 @@ def _write_placement(placement: pin.SE3) -> str:
 
 
 def _write_ends(parent: tuple[str, pin.SE3], child: str, placement: pin.SE3) -> str:
-    """Hang a link from another one, which has a placement in the frame that the link's placement is in."""
+    """Write the ends and the origin of a joint between a parent link and a child link, both placed in one frame."""
     name, placed = parent
     origin = _write_placement(placed.actInv(placement))
     return f"<parent link={quoteattr(name)}/><child link={quoteattr(child)}/>{origin}"
 
 
 def _write_inertial(inertia: pin.Inertia) -> str:
-    """Write a mass and its inertia about its centre, if the body has a mass."""
+    """Write a mass and its inertia about the centre of mass; empty for a body without a mass."""
     matrix = inertia.inertia
     if not inertia.mass and not matrix.any():
         return ""

@@ -1,4 +1,4 @@
-"""Building a scene: the solids of a task and of its robot, and the pairs of them that must not touch."""
+"""Building a scene: the solids of a task and of its robot, and the pairs of solids that must not touch."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from brachis.task import Task
 from brachis.task.settings import place_frame
 
 _MOST_PAIRS = 4000
-"""Pairs of bodies whose distances a plan looks at: all take 0.9 GB of memory and half a minute."""
+"""Largest number of pairs of bodies in a plan: so many take 0.9 GB of memory and half a minute."""
 _POSTURES = 100
-"""Random postures in which links that always touch are found."""
+"""Number of random postures in which links that always touch are found."""
 
 
 def scene_of(robot: Robot, task: Task) -> Scene | None:
-    """Put the bodies of a task's scene and of the robot together; None where the task looks at none.
+    """Build the scene from the bodies of the task and of the robot; None if collisions are switched off.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     known = sorted({*tree.links, *(solid.name for solid in solids)})
     check_names("link or body", listed, known, "collisions.disable")
     disabled = {*map(frozenset, [*settings.disable, *_read_srdf(settings.srdf)])}
-    # The robot's own solids have the names of their links, too; bodies of the scene only their own.
+    # Solids of the robot also have the names of their links; bodies of the scene only have their own names.
     names = [{solid.name, solid.link} for solid in robot_solids]
     names += [{solid.name} for solid in solids[len(robot_solids) :]]
     pairs = [
@@ -96,9 +96,9 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
 
 
 def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.ndarray:
-    """Tell which pairs to look at, (P,): of those within the robot the ones that do not belong together.
+    """Select the pairs to check, (P,) bool: within the robot only those that do not belong together.
 
-    Links that a joint joins may touch, and so may those that overlap in every one of many random postures.
+    Links that are connected by a joint may touch. So may links that overlap in all of many random postures.
     """
     is_within = scene.pairs[:, 1] < scene.robot_count  # the robot's solids come first
     is_hazard = ~is_within
@@ -120,7 +120,7 @@ def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.
 def _always_closer(
     scene: Scene, robot: Robot, distance: float, count: int
 ) -> np.ndarray:
-    """Tell which pairs, (P,), are closer than a distance, m, in every one of so many random postures."""
+    """Tell which pairs, (P,) bool, are closer than a distance, m, in all of `count` random postures."""
     ends = robot.limits.both_ways("position")
     half = np.where(robot.revolute, np.pi, 1.0)  # rad or m, for joints without an end
     low, high = np.where(np.isfinite(ends), ends, [-half, half])
@@ -130,11 +130,11 @@ def _always_closer(
 
 
 MANY_POSTURES = 2000
-"""Random postures in which pairs that are never free are found: one in a hundred that is free is not missed."""
+"""Number of random postures for pairs that are never free: a pair that is free in 1 % of them is not missed."""
 
 
 def find_never_free(scene: Scene, robot: Robot, clearance: float) -> Scene:
-    """Return the scene with the pairs that keep the clearance, m, in none of `MANY_POSTURES` random postures."""
+    """Keep only the pairs that violate the clearance, m, in all of `MANY_POSTURES` random postures."""
     suspects = scene.with_pairs(_always_closer(scene, robot, clearance, _POSTURES))
     return suspects.with_pairs(
         _always_closer(suspects, robot, clearance, MANY_POSTURES)
@@ -142,7 +142,7 @@ def find_never_free(scene: Scene, robot: Robot, clearance: float) -> Scene:
 
 
 def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:
-    """List the pairs of links that an SRDF file disables."""
+    """Return the pairs of links that an SRDF file disables."""
     if srdf is None:
         return []
     where = f"collisions.srdf: {srdf}"

@@ -1,4 +1,4 @@
-"""Where the joints of a robot are, in many postures at once, and how points on them move."""
+"""Placements of a robot's joints in many postures at once, and the motion of points on them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 Placed = tuple[np.ndarray, np.ndarray]
-"""Rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and of all joints in K postures."""
+"""Rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and all joints in K postures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class Chain:
     Attributes
     ----------
     placements : (n, 4, 4) ndarray
-        Of every joint at zero in the frame of the one before.
+        Placement of every joint, at position zero, in the frame of the previous joint.
     axes : (n, 3) ndarray
         Unit vectors in the joints' own frames.
     revolute : (n,) bool ndarray
@@ -30,7 +30,7 @@ class Chain:
 
     @classmethod
     def of(cls, model: pin.Model) -> Chain:
-        """Take the chain of a Pinocchio model."""
+        """Return the chain of a Pinocchio model."""
         joints = range(1, model.njoints)
         placements = [model.jointPlacements[i].homogeneous for i in joints]
         twists = [model.joints[i].createData().S for i in joints]
@@ -69,16 +69,16 @@ class Chain:
         points: np.ndarray,
         directions: np.ndarray,
     ) -> np.ndarray:
-        """Differentiate the places of points on joints, along directions, by q, (M, n).
+        """Differentiate the positions of points on joints, along directions, with respect to q, (M, n).
 
         Parameters
         ----------
         placed : Placed
-            Of K postures.
+            Placements of the joints in K postures.
         posture, joint : (M,) int ndarray
-            Which of the postures, and which joint carries the point, 0 for none.
+            Index of the posture, and number of the joint that carries the point; 0 if none does.
         points, directions : (M, 3) ndarray
-            In the world, m.
+            Points, m, and directions, both in the world frame.
         """
         rotations, origins = placed
         axes = np.einsum("kjab,jb->kja", rotations[:, 1:], self.axes)[posture]

@@ -1,7 +1,7 @@
-"""The scene: solids on the joints that carry them, pairs of them that must not touch, and the distances of pairs.
+"""The scene: solids on joints, the pairs of solids that must not touch, and the distances of pairs.
 
-Balls and boxes around the solids select close pairs. Coal computes the signed distance of these only, with its
-two nearest points.
+Balls and boxes around the solids select close pairs. Only for these, Coal computes the signed distance and the two
+closest points.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from brachis.scene.chain import Placed
 from brachis.scene.solids import Solid
 
 UNIT = 0.1
-"""Scale of the values of limits and of ratios: 1 means so many m."""
+"""Distance that corresponds to 1 in the values and ratios of limits, m."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosePairs:
-    """Pairs that are close to each other in some postures: M of them.
+    """M pairs of solids that are close to each other in some postures.
 
     Attributes
     ----------
     posture, pair : (M,) int ndarray
     distance : (M,) ndarray
-        m, negative where they overlap.
+        Distance, m; negative if the solids overlap.
     points : (M, 2, 3) ndarray
-        Nearest points of both, in the world, m.
+        Closest points of both solids, in the world, m.
     normal : (M, 3) ndarray
         Unit vector from the first solid to the second one.
     """
@@ -42,24 +42,24 @@ class ClosePairs:
     normal: np.ndarray
 
     def only(self, chosen: np.ndarray) -> ClosePairs:
-        """Return some of them, by number or mask."""
+        """Select some of the pairs, by index or mask."""
         return ClosePairs(*(value[chosen] for value in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Solids and the pairs of them that must not touch.
+    """Solids, and the pairs of solids that must not touch.
 
     Attributes
     ----------
     solids : tuple of Solid
     joints : (S,) int ndarray
-        Joint that moves each, from 1 on; 0: it stands still.
+        Number of the joint that moves each solid, counted from 1; 0 if it does not move.
     placements : (S, 4, 4) ndarray
-        Of each in the frame of its joint, or in the world.
+        Placement of each solid in the frame of its joint, or in the world.
     pairs : (P, 2) int ndarray
     robot_count : int
-        How many of the solids, in front, are the robot's own.
+        Number of solids that belong to the robot; they come first.
     """
 
     solids: tuple[Solid, ...]
@@ -69,12 +69,12 @@ class Scene:
     robot_count: int
 
     def names(self, pair: int) -> str:
-        """Name both solids of a pair."""
+        """Return the names of both solids of a pair."""
         first, second = self.pairs[pair]
         return f"{self.solids[first].name} and {self.solids[second].name}"
 
     def with_pairs(self, chosen: np.ndarray) -> Scene:
-        """Return the scene with some of its pairs, by number or mask."""
+        """Return the scene with some of its pairs, selected by index or mask."""
         return replace(self, pairs=self.pairs[chosen])
 
     def __getstate__(self) -> dict[str, object]:
@@ -90,7 +90,7 @@ class Scene:
 
     @cached_property
     def balls(self) -> tuple[np.ndarray, np.ndarray]:
-        """Balls around the solids: centres in the joints' frames, (S, 3), and radii, (S,), m."""
+        """Balls around the solids: centres in the frames of the joints, (S, 3), and radii, (S,), m."""
         radii = np.array([solid.radius for solid in self.solids])
         local = np.array([solid.geometry.aabb_center for solid in self.solids])
         local = np.where(np.isfinite(radii)[:, None], local, 0.0)
@@ -104,7 +104,7 @@ class Scene:
         return turned + origins[:, self.joints]
 
     def bounds(self, placed: Placed) -> np.ndarray:
-        """Return least distances that the pairs can have, (K, P), by the balls around them, m."""
+        """Return lower bounds on the distances of the pairs, (K, P), m, from the balls around the solids."""
         centres = self.centres(placed)
         radii = self.balls[1]
         first, second = self.pairs.T
@@ -122,7 +122,7 @@ class Scene:
 
     @cached_property
     def _boxes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Boxes around the solids in their own axes: middles, (S, 3), and half lengths, (S, 3), m."""
+        """Boxes around the solids along their own axes: centres, (S, 3), and half lengths, (S, 3), m."""
         boxes = [solid.geometry.aabb_local for solid in self.solids]
         low = np.array([box.min_ for box in boxes])
         high = np.array([box.max_ for box in boxes])
@@ -138,14 +138,14 @@ class Scene:
         return turned, origins + placed[1][:, self.joints]
 
     def find_close(self, placed: Placed, within: float) -> ClosePairs:
-        """Find the pairs that are closer than `within`, m, where the joints are placed so."""
+        """Find the pairs that are closer than `within`, m, for placed joints."""
         posture, pair = np.nonzero(self.bounds(placed) < within)
         is_close = self._gaps(placed, posture, pair) < within
         close = self.measure(placed, posture[is_close], pair[is_close])
         return close.only(close.distance < within)
 
     def find_closest(self, placed: Placed) -> ClosePairs:
-        """Find the pair in each posture that is closest."""
+        """Find the closest pair in each posture."""
         bounds = self.bounds(placed)
         every = np.arange(len(bounds))
         estimate = self.measure(placed, every, bounds.argmin(axis=1))
@@ -158,7 +158,7 @@ class Scene:
     def _gaps(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
     ) -> np.ndarray:
-        """Gaps, (M,), m, between the boxes around the solids of pairs along the boxes' axes; no distance is less."""
+        """Return the gaps, (M,), m, between the boxes of pairs along the boxes' axes; no distance is smaller."""
         turned, origins = self._place(placed)
         middles, halves = self._boxes
         origins = origins + np.einsum("ksij,sj->ksi", turned, middles)
@@ -181,7 +181,7 @@ class Scene:
     def measure(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
     ) -> ClosePairs:
-        """Compute the distances of pairs, (M,), in so many of the postures, (M,), in which the joints are placed."""
+        """Compute the distances of M pairs, each in one of the postures of the placed joints."""
         count = len(posture)
         distance = np.empty(count)
         points = np.empty((count, 2, 3))
@@ -190,7 +190,7 @@ class Scene:
         first = coal.Transform3s()
         second = coal.Transform3s()
         request = coal.DistanceRequest()
-        # Of solids that are apart, m. The depth of overlaps is less exact: Coal gives up where it is asked for more.
+        # For solids that are apart, m. The depth of overlaps is less exact: Coal fails if more is required.
         request.gjk_tolerance = 1e-10
         request.gjk_max_iterations = 500
         result = coal.DistanceResult()
@@ -205,6 +205,6 @@ class Scene:
             points[m, 0] = result.getNearestPoint1()
             points[m, 1] = result.getNearestPoint2()
             normal[m] = result.normal
-        # Where Coal gives up, the solids overlap deeply; more than 1 m does not count.
+        # If Coal fails, the solids overlap deeply; depths above 1 m are cut off.
         distance = np.maximum(np.nan_to_num(distance, nan=-np.inf), -1.0)
         return ClosePairs(posture, pair, distance, points, normal)

@@ -1,6 +1,6 @@
-"""Solids: convex bodies of the scene and of a robot's links, from the task and from the URDF's ``<collision>``.
+"""Solids: convex bodies of the scene and of a robot's links, from the task and from ``<collision>`` in the URDF.
 
-A mesh stands for its convex hull.
+A mesh is replaced by its convex hull.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of, r
 from brachis.task.scene import Round, SceneBody
 
 _LARGEST = 1e4
-"""Largest radius of a ball around a body, m. Distances from a rod of 100 km are off by more than 0.1 mm: plans near it
-end unverified; near one of 10 km they do not."""
+"""Largest radius of a ball around a body, m. Distances from a rod of 100 km have errors above 0.1 mm, so that plans
+close to it remain unverified. Close to a rod of 10 km, plans are verified."""
 _LARGEST_FILE = 32.0
-"""Size of a mesh file that is read, MB: its hull takes 20 s and 0.8 GB of memory."""
+"""Largest size of a mesh file, MB: its hull takes 20 s and 0.8 GB of memory."""
 _HULL = (True, "Qt")
-"""Keep the triangles; options of Qhull."""
+"""Arguments for the hull: keep the triangles; options of Qhull."""
 _THICKNESS = 0.02
-"""Radius of capsules along links, as a part of the lengths of all links together."""
+"""Radius of capsules along links, as a fraction of the total length of all links."""
 Geometry = Any  # coal comes without types
 
 
@@ -41,12 +41,12 @@ class Solid:
     ----------
     name : str
     link : str or None
-        None: it is fixed to the world.
+        Link that carries the solid; None if it is fixed to the world.
     geometry : coal.CollisionGeometry
     placement : (4, 4) ndarray
-        In the link's frame, or in the world.
+        Placement in the frame of the link, or in the world.
     padding : float
-        By how much it is larger than the geometry says, m.
+        Distance by which the solid is larger than its geometry, m.
     """
 
     name: str
@@ -56,25 +56,25 @@ class Solid:
     padding: float = 0.0
 
     def __post_init__(self) -> None:
-        """Give the geometry its padding and its box.
+        """Apply the padding to the geometry, and check its size.
 
         Raises
         ------
         InputError
-            It is too large.
+            The solid is too large.
         """
         self.geometry.setSweptSphereRadius(self.padding)
         _check_size(self.geometry, self.name, self.padding)
 
     @property
     def radius(self) -> float:
-        """Radius of a ball around it, m; infinite of a half-space."""
-        # Coal leaves the padding out of the ball around a sphere.
+        """Radius of a ball around the solid, m; infinite for a half-space."""
+        # Coal does not include the padding in the ball around a sphere.
         return self.geometry.aabb_radius + self.padding
 
 
 def build_solids(body: SceneBody, frame: np.ndarray) -> Iterator[Solid]:
-    """Make the solids of a scene's body, whose frame is placed so, (4, 4): one, or those of its URDF.
+    """Build the solids of a body of the scene: one, or those of its URDF. `frame`, (4, 4), is the body's frame.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _build_solid(body: SceneBody, frame: np.ndarray) -> Solid:
     shape = getattr(body, body.shape)
     placement = frame @ placement_matrix(body.placement)
     if body.half_space is not None:
-        # Its plane is in the world, whatever its frame.
+        # Its plane is given in the world frame.
         normal = frame[:3, :3] @ shape.normal / np.linalg.norm(shape.normal)
         geometry = coal.Halfspace(normal, shape.offset + normal @ frame[:3, 3])
         placement = np.eye(4)
@@ -138,7 +138,7 @@ def _build_solid(body: SceneBody, frame: np.ndarray) -> Solid:
 def read_solids(
     tree: UrdfTree, folder: Path, padding: Mapping[str, float]
 ) -> Iterator[Solid]:
-    """Make the solids of a URDF's links, each larger by the link's padding, m.
+    """Build the solids of a URDF's links, each enlarged by the padding of its link, m.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def read_solids(
 
 
 def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Solid]:
-    """Make capsules from the joint of every link to the joints that hang from it, a share of all lengths thick."""
+    """Build capsules from each link's joint to its child joints, with a fraction of all lengths as the radius."""
     ends = [
         (end_of(joint, "parent"), origin_of(joint, "origin")[:3, 3])
         for joint in tree.joints.values()
@@ -212,11 +212,11 @@ _SHAPES: dict[str, tuple[Any, tuple[str, ...], int]] = {
     "cylinder": (coal.Cylinder, ("radius", "length"), 2),
     "capsule": (coal.Capsule, ("radius", "length"), 2),
 }
-"""Shapes but meshes: what they become, the attributes with their lengths, and how many these are together."""
+"""Shapes except meshes: the class, the attributes with lengths, and the total number of lengths."""
 
 
 def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[float]:
-    """Read so many lengths from attributes."""
+    """Read `count` lengths from attributes."""
     words = " ".join(shape.get(attribute, "") for attribute in attributes).split()
     try:
         lengths = [float(word) for word in words]
@@ -232,7 +232,7 @@ def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[fl
 
 
 def _check_size(geometry: Geometry, where: str, padding: float = 0.0) -> None:
-    """Refuse a body that is too large; a half-space is infinite."""
+    """Refuse a body that is too large; an infinite half-space is allowed."""
     geometry.computeLocalAABB()
     if not isinstance(geometry, coal.Halfspace):
         radius = geometry.aabb_radius + padding

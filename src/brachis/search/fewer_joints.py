@@ -92,7 +92,7 @@ def _plan_simpler(
 ) -> FinishedCandidate | None:
     """Plan with fewer joints, by a search or from a known motion alone; the motion need not be verified."""
     try:
-        simpler = Problem.of(robot, task, problem.user_limits)
+        simpler = Problem.of(robot, task, problem.own_limits)
         search = open_search(simpler, deadline)
         if known_motion is None:
             search.run()

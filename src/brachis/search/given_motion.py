@@ -185,7 +185,7 @@ def widen_plan(planned: Planned, problem: Problem) -> Planned:
         qddot_before=widen(motion.qddot_before),
         chart_rows=rows,
     )
-    verification = verify_trajectory(motion, own_limits=problem.user_limits)
+    verification = verify_trajectory(motion, own_limits=problem.own_limits)
     return replace(planned, trajectory=motion, verification=verification)
 
 

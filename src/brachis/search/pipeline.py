@@ -77,7 +77,7 @@ def rank_candidate(
     ----------
     guess : InitialGuess
     deadline : Deadline
-    listener : callable
+    _listener : callable
 
     Returns
     -------

@@ -90,7 +90,7 @@ def verify(
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract_trajectory(problem.task, refined.program, refined.x)
-            verification = verify_trajectory(trajectory, own_limits=problem.user_limits)
+            verification = verify_trajectory(trajectory, own_limits=problem.own_limits)
     joint_map = refined.program.phases[0].joint_map
     tolerance = problem.task.refinement.tolerance
     known = facts_of(candidate) | {

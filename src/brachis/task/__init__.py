@@ -2,7 +2,7 @@
 
 from brachis.task.fitted import fit_path
 from brachis.task.keywords import RobotKeywords, TaskKeywords, check_keywords, task_with
-from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords
+from brachis.task.limit_kinds import LIMIT_KINDS, ROBOT_LIMITS, LimitKeywords
 from brachis.task.limit_models import (
     FROM_URDF,
     LimitSpec,
@@ -48,6 +48,7 @@ from brachis.task.tolerances import Tolerances
 __all__ = [
     "FROM_URDF",
     "LIMIT_KINDS",
+    "ROBOT_LIMITS",
     "AlongTangent",
     "CsvSegment",
     "FitReport",

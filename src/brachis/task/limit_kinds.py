@@ -1,7 +1,8 @@
 """The table of the kinds of joint limits, read by task models, robot, limits, verification, messages and plots.
 
-A new kind needs a row of this table, a keyword in `LimitKeywords`, a class in `brachis.limits.joint` and a formula in
-`brachis.verify.limits.joint`.
+A new kind of joint limit is a row of `LIMIT_KINDS`, its keyword in `LimitKeywords`, a class in `brachis.limits.joint`
+and a formula in `brachis.verify.limits.joint`. A limit on one figure of the whole robot is a row of `ROBOT_LIMITS`, its
+keyword, a class in `brachis.limits.drives` that `brachis.limits` lists, and a formula.
 """
 
 from __future__ import annotations
@@ -106,6 +107,24 @@ class LimitKind:
         return (f"{self.name}_lower", f"{self.name}_upper")
 
 
+@dataclass(frozen=True)
+class RobotLimit:
+    """A kind of limit on one figure of the whole robot, which needs its masses.
+
+    Attributes
+    ----------
+    unit : str
+    description : str
+        Of the key below ``robot.limits``.
+    scale : str
+        Key below ``robot.limits.scale`` of the factor that acts on it too; empty for none.
+    """
+
+    unit: str
+    description: str
+    scale: str = ""
+
+
 FASTEST: Final[PerUnit] = {"rad": 60.0, "m": 50.0}
 """Fastest usual speeds, rad/s or m/s: axes of small SCARA and delta robots reach 50 rad/s, and rails 10 m/s."""
 _ANY = {"rad": math.inf, "m": math.inf}
@@ -188,6 +207,12 @@ _ROWS = (
 )
 LIMIT_KINDS: Final = {row.name: row for row in _ROWS}
 """By key below ``robot.limits``, in the order in which limits are built and checked."""
+ROBOT_LIMITS: Final = {
+    "total_power": RobotLimit(
+        "W", "Largest sum of all joints' powers, drawn or returned, W.", scale="power"
+    ),
+}
+"""Limits on one figure of the whole robot, by key below ``robot.limits``."""
 
 # What a program may give: NumPy arrays stand for lists and numbers too.
 _StatedPair = Array | Sequence[float | None] | None
@@ -218,7 +243,7 @@ class LimitScale(_Factors):  # type: ignore[misc]
 
 
 class LimitKeywords(TypedDict, total=False):
-    """Arguments of `LimitSpec`: every row of `LIMIT_KINDS`, and limits that are not single numbers for joints."""
+    """Arguments of `LimitSpec`: every row of `LIMIT_KINDS` and of `ROBOT_LIMITS`, and further ones."""
 
     torque: StatedLimit
     velocity: StatedLimit
@@ -228,6 +253,6 @@ class LimitKeywords(TypedDict, total=False):
     rms_torque: StatedLimit
     jerk: StatedLimit
     torque_rate: StatedLimit
-    scale: Mapping[str, float] | LimitScale | None
     total_power: float | None
+    scale: Mapping[str, float] | LimitScale | None
     torque_speed: StatedCurves

@@ -37,7 +37,12 @@ from brachis.task.fields import (
     must,
     plain,
 )
-from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
+from brachis.task.limit_kinds import (
+    LIMIT_KINDS,
+    ROBOT_LIMITS,
+    LimitKeywords,
+    LimitScale,
+)
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the limit of the URDF holds."""
@@ -93,8 +98,8 @@ TorqueCurve = Annotated[
 """Points [speed, torque]."""
 
 _FORMS = {"number": NumberEntry, "pair": PairEntry, "range": RangeEntry}
-_JointLimits: Any = make_dataclass(
-    "_JointLimits",
+_TabledLimits: Any = make_dataclass(
+    "_TabledLimits",
     [
         (
             row.name,
@@ -102,13 +107,21 @@ _JointLimits: Any = make_dataclass(
             None if row.form == "number" else FROM_URDF,
         )
         for row in LIMIT_KINDS.values()
+    ]
+    + [
+        (
+            name,
+            Annotated[AnyPositive | None, Field(description=row.description)],
+            None,
+        )
+        for name, row in ROBOT_LIMITS.items()
     ],
     frozen=True,
 )
 
 
 @dataclass(frozen=True)
-class LimitSpec(_JointLimits):  # type: ignore[misc]
+class LimitSpec(_TabledLimits):  # type: ignore[misc]
     """Joint limits: with an absent key the URDF's limit holds, and null removes it (see the module's documentation).
 
     They are checked when a robot is made with them, because its joints are then known.
@@ -124,10 +137,10 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     acceleration, power, rms_torque, jerk, torque_rate : float, sequence, array, mapping or None, optional
         rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. One number, several or None as for the torque.
         Limits on jerk and torque rate need ``spline.degree`` >= 3 and zero acceleration at rest.
-    scale : mapping or LimitScale, optional
-        Factors on limits, applied last.
     total_power : float or None, optional
         Largest sum of the powers of all joints, W.
+    scale : mapping or LimitScale, optional
+        Factors on limits, applied last.
     torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
         Points [speed, torque] by joint name.
 
@@ -140,8 +153,6 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
-    total_power: AnyPositive | None = None
-    """Largest sum of the powers of all joints, drawn or returned, W."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
     N), the first at speed 0. Torques never rise. The curve is linear between points, and its last slope continues to

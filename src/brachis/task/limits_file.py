@@ -24,7 +24,7 @@ from brachis.task.fields import (
     merge,
     plain,
 )
-from brachis.task.limit_kinds import LimitScale
+from brachis.task.limit_kinds import ROBOT_LIMITS, LimitScale
 from brachis.task.limit_models import (
     FROM_URDF,
     LimitSpec,
@@ -57,10 +57,10 @@ class LimitsFile(CheckedModel):
             )
 
     def by_kind(self, where: str) -> dict[str, Any]:
-        """Return the limits by kind and joint, and the total power; `where` names the file."""
+        """Return the limits by kind and joint, and the figures of the whole robot; `where` names the file."""
         return {
             kind: value
-            if kind == "total_power"
+            if kind in ROBOT_LIMITS
             else map_by_joint(f"{where}: limits.{kind}", value, self.joints, FROM_URDF)
             for kind, value in without_defaults(self.limits).items()
         }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from brachis.task.limit_kinds import ROBOT_LIMITS
+
 _UNITS = {
     name: unit
     for unit, names in {
@@ -22,7 +24,7 @@ _UNITS = {
         "N m (force, N)": "limits.torque limits.rms_torque",
         "rad/s (m/s)": "limits.velocity friction.coulomb_velocity",
         "rad/s^2 (m/s^2)": "limits.acceleration",
-        "W": "limits.power limits.total_power",
+        "W": "limits.power",
         "rad/s^3 (m/s^3)": "limits.jerk",
         "N m/s (force, N/s)": "limits.torque_rate",
         "kg m^2 (kg)": "friction.armature",
@@ -34,7 +36,7 @@ _UNITS = {
         "rad/s": "tool_limits.angular_speed",
     }.items()
     for name in names.split()
-}
+} | {f"limits.{name}": row.unit for name, row in ROBOT_LIMITS.items()}
 """Units by the last two names of a key; the unit of prismatic joints is in brackets."""
 
 

@@ -1,16 +1,16 @@
 """Kinematics and torques from the text of the URDF, by Newton's and Euler's equations, joint by joint.
 
-The frame of each joint is placed in the frame of the previous joint. Vectors are in the joint's own frame. From the
-base outwards, with x the vector from the previous origin, z the joint's axis, angular velocity w, angular acceleration
-e and acceleration a:
+Each joint's frame is placed in the one before; vectors are in the joint's own frame. From the base outwards, with the
+vector p from the origin of the frame before, the joint's axis z, the angular velocity omega, the angular acceleration
+alpha and the acceleration a:
 
-    a' = a + e x x + w x (w x x)
-    revolute     e' = e + z qddot + w x z qdot,  w' = w + z qdot
-    prismatic    a' = a' + 2 w x z qdot + z qddot
+    a' = a + alpha x p + omega x (omega x p)
+    revolute     alpha' = alpha + z qddot + omega x z qdot,  omega' = omega + z qdot
+    prismatic    a' = a' + 2 omega x z qdot + z qddot
 
-The recursion begins with a = -gravity. It then returns to the base with the forces F = m a_com and the moments
-I e + w x I w of all bodies. The payload is an additional body beside those of the URDF. The torque is the sum of the
-moment, or force, along z and of
+The recursion begins with a = -gravity. It returns to the base with the forces F = m a_com and the moments
+I alpha + omega x I omega of all bodies; the payload is a body of its own beside those of the URDF. The torque is the
+moment, or force, along z, and
 
     armature qddot + viscous qdot + coulomb tanh(qdot / v_eps).
 
@@ -33,8 +33,6 @@ from brachis.robot.urdf_bodies import (
     turns_about,
 )
 
-_AXES = np.eye(3)
-
 
 def tool_placements(
     robot: Robot, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray]
@@ -55,12 +53,8 @@ def tool_placements(
         for direction in ("x", "y", "z", "side", "lead", "roll")
     )
     # The path's axes in the tool frame.
-    turned = (
-        turns_about(_AXES[2], -roll)
-        @ turns_about(_AXES[1], -lead)
-        @ turns_about(_AXES[0], side)
-    )
-    rotation = rotation @ turned
+    about_x, about_y, about_z = map(turns_about, np.eye(3), (side, -lead, -roll))
+    rotation = rotation @ (about_z @ about_y @ about_x)
     return origin - np.einsum("kij,jk->ki", rotation, np.array([x, y, z])), rotation
 
 
@@ -137,17 +131,17 @@ def _rigid(
     base = placement_matrix(robot.settings.mounting)[:3, :3]
     upwards = base.T @ -np.array(robot.model.gravity.linear)
     motions = _motions(robot, q, qdot, qddot, upwards)
-    force = np.zeros((3, len(q)))
-    moment = np.zeros((3, len(q)))
+    force = moment = np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
         body = bodies[joint]
-        spin, gain, acceleration = motions[joint]
-        for weight in _weights(robot, joint):
-            com = weight.com[:, None]
-            push = weight.mass * _accelerate(com, spin, gain, acceleration)
-            turn = weight.inertia @ gain + cross(spin, weight.inertia @ spin)
-            force = force + push
-            moment = moment + (turn + cross(com, push))
+        omega, alpha, acceleration = motions[joint]
+        for carried in _carried_bodies(robot, joint):
+            com = carried.com[:, None]
+            body_force = carried.mass * _accelerate(com, omega, alpha, acceleration)
+            momentum = carried.inertia @ omega
+            body_moment = carried.inertia @ alpha + cross(omega, momentum)
+            force = force + body_force
+            moment = moment + (body_moment + cross(com, body_force))
         tau[:, joint] = body.axis @ (force if body.sliding else moment)
         position = q[:, joint]
         if body.sliding:
@@ -166,7 +160,8 @@ def tool_accelerations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return acceleration, m/s^2, and angular acceleration, rad/s^2, of the tool frame in its own axes, (3, K) each.
 
-    Virtual joints do not move the tool. With qdot = 0, accelerations depend on qddot as velocities depend on qdot.
+    Virtual joints do not move the tool. If qdot is zero, accelerations depend on qddot as velocities do on qdot. So
+    passing zeros and qdot, in the places of qdot and qddot, gives the velocities.
     """
     motion = _motions(robot, q, qdot, qddot, np.zeros(3))[-1]
     tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
@@ -178,40 +173,41 @@ def _motions(
     q: np.ndarray,
     qdot: np.ndarray,
     qddot: np.ndarray,
-    of_base: np.ndarray,
+    base_acceleration: np.ndarray,
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return angular velocity, angular acceleration and acceleration of every joint's frame, (3, K) each.
+    """Compute omega, alpha and the acceleration of every joint's frame, (3, K) each.
 
-    `of_base`, (3,), is the acceleration of the base in its own axes.
+    `base_acceleration`, (3,), is in the axes of the base.
     """
-    spin = np.zeros((3, len(q)))
-    gain = np.zeros((3, len(q)))
-    acceleration = np.tile(of_base[:, None], len(q))
+    omega = alpha = np.zeros((3, len(q)))
+    acceleration = np.tile(base_acceleration[:, None], len(q))
     motions = []
     for joint, body in enumerate(robot.urdf_dynamics.bodies):
         axis = body.axis[:, None]
         offset = body.placement[:3, 3, None]
         rotation = body.placement[:3, :3].T
-        acceleration = rotation @ _accelerate(offset, spin, gain, acceleration)
-        spin = rotation @ spin
-        gain = rotation @ gain
-        rate = axis * qdot[:, joint]
-        push = axis * qddot[:, joint]
+        acceleration = rotation @ _accelerate(offset, omega, alpha, acceleration)
+        omega = rotation @ omega
+        alpha = rotation @ alpha
+        joint_velocity = axis * qdot[:, joint]
+        joint_acceleration = axis * qddot[:, joint]
         if body.sliding:
-            moved = _accelerate(axis * q[:, joint], spin, gain, acceleration)
-            acceleration = moved + 2.0 * cross(spin, rate) + push
-        else:
-            spin, gain, acceleration = (
-                _rotate(body.axis, -q[:, joint], vectors)
-                for vectors in (spin, gain, acceleration)
+            moved = _accelerate(axis * q[:, joint], omega, alpha, acceleration)
+            acceleration = (
+                moved + 2.0 * cross(omega, joint_velocity) + joint_acceleration
             )
-            gain = gain + push + cross(spin, rate)
-            spin = spin + rate
-        motions.append((spin, gain, acceleration))
+        else:
+            omega, alpha, acceleration = (
+                _rotate(body.axis, -q[:, joint], vectors)
+                for vectors in (omega, alpha, acceleration)
+            )
+            alpha = alpha + joint_acceleration + cross(omega, joint_velocity)
+            omega = omega + joint_velocity
+        motions.append((omega, alpha, acceleration))
     return motions
 
 
-def _weights(robot: Robot, joint: int) -> list[Body]:
+def _carried_bodies(robot: Robot, joint: int) -> list[Body]:
     """List the bodies that a joint carries: its own and, at the end of the chain, the payload."""
     bodies = robot.urdf_dynamics.bodies
     body = bodies[joint]
@@ -229,10 +225,10 @@ def _weights(robot: Robot, joint: int) -> list[Body]:
 
 
 def _accelerate(
-    point: np.ndarray, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
+    point: np.ndarray, omega: np.ndarray, alpha: np.ndarray, acceleration: np.ndarray
 ) -> np.ndarray:
-    """Return the acceleration, (3, K), of points fixed in a frame that moves with w, e and a."""
-    return acceleration + cross(gain, point) + cross(spin, cross(spin, point))
+    """Compute the acceleration, (3, K), of a point that is fixed in a frame which moves with omega, alpha and a."""
+    return acceleration + cross(alpha, point) + cross(omega, cross(omega, point))
 
 
 def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:

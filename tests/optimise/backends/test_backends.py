@@ -15,7 +15,7 @@ import brachis
 from brachis.errors import UnknownNameError
 from brachis.optimise.backends import (
     NAMES,
-    TABLE,
+    SOLVERS,
     SolverOptions,
     SolveStatus,
     residual,
@@ -210,11 +210,11 @@ def test_registry(is_installed, interior, monkeypatch):
     automatic = [backend.name for backend in solvers_for("auto")]
     assert automatic == ["uno", interior]
     large = solver_for_large("auto")
-    assert large is TABLE[interior]
+    assert large is SOLVERS[interior]
     assert large.is_interior
     assert solver_for_large("uno") is None
-    for each in {*TABLE} - {"ipopt"}:
-        assert solvers_for(each) == (TABLE[each],)
+    for each in {*SOLVERS} - {"ipopt"}:
+        assert solvers_for(each) == (SOLVERS[each],)
     with pytest.raises(UnknownNameError, match="Did you mean 'ipopt'") as caught:
         solvers_for("ipop")
     assert caught.value.valid == NAMES

@@ -1,7 +1,7 @@
 """Coupled joint ranges: lower <= q_a + q_b <= upper.
 
-Arms whose third joint is driven through a parallelogram keep the sum of two angles within a range of its own, beside
-the ranges of the joints; a URDF has no word for it.
+Arms whose third joint is driven through a parallelogram limit the sum of two angles, besides the range of each joint. A
+URDF cannot express that.
 """
 
 from __future__ import annotations
@@ -13,47 +13,41 @@ from brachis.errors import UnknownNameError
 from brachis.limits import JointStates, Label, Limit, Partials
 
 
-class CoupledRange:
-    """Range of the sum of two joints' positions, rad; what a task gives as ``custom_limits: {coupled_range: ...}``."""
+class CoupledRange(Limit):
+    """Range of the sum of two joint positions, rad. Its one value is the sum itself.
+
+    A task gives it as ``custom_limits: {coupled_range: {joints: [a, b], lower: ..., upper: ...}}``.
+    """
+
+    kind = "coupled_range"
+    at_rest = "turns"
 
     def __init__(self, joints: tuple[str, str], lower: float, upper: float) -> None:
         if len(joints) != 2 or joints[0] == joints[1]:
             raise ValueError(f"two different joints are coupled, found {list(joints)}")
         if not lower < upper:
             raise ValueError(f"lower must be below upper, found [{lower}, {upper}]")
-        self.joints, self.lower, self.upper = tuple(joints), lower, upper
+        self.joints = tuple(joints)
+        key = "custom_limits.coupled_range"
+        self.labels = (Label(" + ".join(joints), "range", "rad", key),)
+        self.lower, self.upper = np.array([lower]), np.array([upper])
 
-    def bind(self, robot: Robot) -> BoundRange:
-        """Return the limit for a robot."""
+    def bind(self, robot: Robot) -> CoupledRange:
+        """Return the limit for a robot, whose joints are known only here."""
+        names = robot.joint_names
         for name in self.joints:
-            if name not in robot.joint_names:
-                raise UnknownNameError(
-                    "joint",
-                    name,
-                    robot.joint_names,
-                    where="custom_limits.coupled_range.joints",
-                )
-        return BoundRange(self, robot)
-
-
-class BoundRange(Limit):
-    """A `CoupledRange` on a robot: one value, the sum itself, in rad."""
-
-    kind = "coupled_range"
-    at_rest = "turns"
-
-    def __init__(self, given: CoupledRange, robot: Robot) -> None:
-        subject = " + ".join(given.joints)
-        self.labels = (Label(subject, "range", "rad", "custom_limits.coupled_range"),)
-        self.lower, self.upper = np.array([given.lower]), np.array([given.upper])
-        self._sum = np.array(
-            [[float(name in given.joints) for name in robot.joint_names]]
-        )
+            if name not in names:
+                where = "custom_limits.coupled_range.joints"
+                raise UnknownNameError("joint", name, names, where=where)
+        bound = super().bind(robot)
+        bound.weights = np.array([[float(name in self.joints) for name in names]])
+        return bound
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Sum of the two positions, (K, 1)."""
-        return motion.q @ self._sum.T
+        """Compute the sum of the two positions, (K, 1)."""
+        return motion.q @ self.weights.T
 
     def partials(self, motion: JointStates) -> Partials:
-        """Differentiate the sum."""
-        return Partials(q=np.broadcast_to(self._sum, (len(motion.q), *self._sum.shape)))
+        """Differentiate the sum with respect to q, (K, 1, n)."""
+        shape = (len(motion.q), *self.weights.shape)
+        return Partials(q=np.broadcast_to(self.weights, shape))

@@ -1,4 +1,4 @@
-"""Solver backends: each has a file and a line in `TABLE`. Their libraries are imported when used."""
+"""Solver backends: each has a file and a line in `SOLVERS`. Their libraries are imported when used."""
 
 from importlib.util import find_spec
 
@@ -31,12 +31,12 @@ __all__ = [
     "solver_for_large",
     "solvers_for",
 ]
-TABLE = {
+SOLVERS = {
     backend.NAME: Solver(backend.NAME, backend.run, backend in (ipopt, uno_interior))
     for backend in (uno, ipopt, uno_interior)
 }
 """Backends by name, in the order in which ``auto`` tries them; it uses only one of the two interior-point methods."""
-NAMES = ("auto", *TABLE)
+NAMES = ("auto", *SOLVERS)
 
 
 def solvers_for(name: str) -> tuple[Solver, ...]:
@@ -53,20 +53,20 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
         The name is ``ipopt``, and its package, which has wheels for one platform only, is not installed.
     """
     if name == "auto":
-        return TABLE["uno"], _interior()
-    if name not in TABLE:
+        return SOLVERS["uno"], _interior()
+    if name not in SOLVERS:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
-    if name == "ipopt" and _interior() is not TABLE[name]:
+    if name == "ipopt" and _interior() is not SOLVERS[name]:
         library = "ipyopt (it has wheels only for Linux on x86_64)"
         error = NotInstalledError("solver.name: ipopt", library, "ipopt")
         error.put_advice("Set solver.name: auto, uno or uno_interior")
         raise error
-    return (TABLE[name],)
+    return (SOLVERS[name],)
 
 
 def _interior() -> Solver:
     """Return IPOPT if it is installed, otherwise Uno's interior-point method."""
-    return TABLE["ipopt" if find_spec("ipyopt") else "uno_interior"]
+    return SOLVERS["ipopt" if find_spec("ipyopt") else "uno_interior"]
 
 
 def solver_for_large(name: str) -> Solver | None:

@@ -1,8 +1,8 @@
-"""The task map that a task asks for: of the tool, with a tool that may leave the path, or of the joints themselves.
+"""The task map for a task: for the tool, for a tool that may deviate from the path, or for the joints themselves.
 
-A way in which the tool may leave the path, such as a roll about its axis, is a virtual joint after the tool frame. A
-pose of which one row is left open is then a pose of six rows again, and the joint is one more that may be redundant:
-the closed forms for poses serve both.
+Each direction in which the tool may deviate from the path, such as a roll about its axis, is a virtual joint after the
+tool frame. A pose with one open row thus becomes a pose of six rows again, and there is one more joint that may be
+redundant. The closed forms for poses serve both cases.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from brachis.task import Tolerances
 class JointSpace(TaskMap):
     """All n joint positions; the Jacobian is the identity.
 
-    Whole turns count in differences, since the path says in which turn a joint is.
+    Whole turns count in differences, because the path prescribes the turn of each joint.
     """
 
     @property
@@ -72,12 +72,13 @@ JOINTS = "joints"
 
 
 def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
-    """Bind the asked rows, or the word for them, to a robot.
+    """Bind rows of a task space, or the word for them, to a robot.
 
     Raises
     ------
     InputError
-        A row or word is unknown, a joint tilts the tool against the axis of an angle, or the tool cannot roll freely.
+        A row or word is unknown, a joint tilts the tool relative to the axis of an angle, or the tool cannot roll
+        freely.
 
     Examples
     --------
@@ -125,7 +126,7 @@ def _rows_and_angle(robot: Robot, names: tuple[str, ...]) -> RowsAndAngle:
     Raises
     ------
     InputError
-        A joint turns about another axis than the angle, or no axis of the tool frame lies across that axis.
+        A joint turns about a different axis than the angle, or no axis of the tool frame is perpendicular to that axis.
     """
     angle = names[-1]
     world_axis = ANGLES.index(angle)
@@ -162,7 +163,7 @@ def bind(
     space: str | Sequence[str],
     tolerances: Tolerances | None = None,
 ) -> tuple[Robot, TaskMap]:
-    """Return the robot as a task space needs it, and the task map bound to it.
+    """Return the robot that a task space needs, and the task map bound to it.
 
     Parameters
     ----------
@@ -170,12 +171,13 @@ def bind(
     space : str or sequence of str
         Rows, or one of ``position``, ``pose``, ``pose_free_roll``, ``joints``.
     tolerances : Tolerances, optional
-        For each way in which the tool may leave the path a virtual joint is added, unless the robot has it already.
+        A virtual joint is added for each direction in which the tool may deviate from the path, unless the robot
+        already has it.
 
     Raises
     ------
     InputError
-        See `task_map_of`; or the robot has a joint of a virtual joint's name.
+        See `task_map_of`; or a joint of the robot has the name of a virtual joint.
     """
     joints = tool_joints_of(space, tolerances)
     if robot.tool_joints and robot.tool_joints != joints:
@@ -197,7 +199,7 @@ def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
     Raises
     ------
     InputError
-        The robot has a joint of such a name.
+        A joint of the robot has the name of a virtual joint.
     """
     model = robot.model.copy()
     frame = model.frames[robot.frame_id]

@@ -1,4 +1,4 @@
-"""What a task map is: from joint positions to task coordinates, with its derivatives; and how their rows are called."""
+"""The protocol of task maps, from joint positions to task coordinates with derivatives; and the names of rows."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from brachis.task import ToolPose
 
 AXES: Final = ("x", "y", "z")
 ANGLES: Final = ("roll", "pitch", "yaw")
-"""Angles about the world's x, y and z axis, of tools that turn about this axis alone."""
+"""Angles about the world's x, y and z axes, for tools that turn about only one of these axes."""
 ROWS: Final = (*AXES, *ANGLES, AXIS)
-"""What a task space of rows may consist of."""
+"""Rows of which a task space may consist."""
 TURN_ROWS: Final = ("rx", "ry", "rz")
 POSE_ROWS: Final = (*AXES, *TURN_ROWS)
-"""Rows of a pose: displacement and rotation along and about the tool frame's axes."""
+"""Rows of a pose: displacements along, and rotations about, the axes of the tool frame."""
 
 
 _JOINT: Final = "joint "
 
 
 def position_rows(rows: Sequence[str]) -> tuple[str, ...]:
-    """Return the rows whose change is a path's length: those of the position, which come first, or all joints."""
+    """Return the rows whose change is the length of a path: the position, which comes first, or all joints."""
     return tuple(row for row in rows if row not in {*ANGLES, *TURN_ROWS, AXIS})
 
 
 def joint_rows(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the rows of a space of joints, from their names; no other row is called so."""
+    """Return the rows of a space of joints with these names; no other row has such a name."""
     return tuple(_JOINT + name for name in names)
 
 
 def joints_of(rows: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the joints whose space has these rows; none where it is the space of a tool."""
+    """Return the names of the joints whose space has these rows; none for the space of a tool."""
     return tuple(row.removeprefix(_JOINT) for row in rows if row.startswith(_JOINT))
 
 
 @dataclass(frozen=True)
 class TaskDerivatives:
-    """Derivatives of task velocity and acceleration for K states, each (K, m, n).
+    """Derivatives of task velocity and acceleration for K states, (K, m, n) each.
 
     Attributes
     ----------
     velocity_q : (K, m, n) ndarray
         V_q = d(J qdot)/dq.
     acceleration_q, acceleration_qdot : (K, m, n) ndarray
-        A_q and A_v, of J qddot + Jdot qdot.
+        A_q and A_v, the derivatives of J qddot + Jdot qdot.
     """
 
     velocity_q: np.ndarray
@@ -63,13 +63,13 @@ class TaskDerivatives:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TaskMap(Summary):
-    """Map from the joint positions of a robot to the c task coordinates of its tool, whose velocity has m rows.
+    """Map from the joint positions of a robot to the c task coordinates of its tool; the task velocity has m rows.
 
     Attributes
     ----------
     robot : Robot
     rows : tuple of str
-        Names of the m rows, those of the position (m) first, then the angles (rad).
+        Names of the m rows: first the position (m), then the angles (rad).
 
     Examples
     --------
@@ -80,7 +80,7 @@ class TaskMap(Summary):
     """
 
     in_tool_axes: ClassVar[bool] = False
-    """Whether twists are in the axes of the tool frame; else they are in those of the world."""
+    """Whether twists are along the axes of the tool frame; otherwise they are along those of the world."""
 
     robot: Robot
     rows: tuple[str, ...]
@@ -92,12 +92,12 @@ class TaskMap(Summary):
 
     @property
     def angles(self) -> tuple[str, ...]:
-        """Rows behind those of the position: an angle, or three of rotation; none in a space of joints."""
+        """Rows after the position: an angle, or three rows of rotation; none in a space of joints."""
         return () if joints_of(self.rows) else self.rows[len(self.axes) :]
 
     @cached_property
     def prescribed(self) -> Prescribed:
-        """What of the tool is prescribed, as the kernel takes it; a space of joints has none."""
+        """The prescribed quantities of the tool, in the form that the kernel needs; none in a space of joints."""
         return Prescribed(self.axes, len(self.angles), in_tool_axes=self.in_tool_axes)
 
     @property
@@ -111,12 +111,12 @@ class TaskMap(Summary):
         return tuple("m" if row in AXES else "rad" for row in self.rows)
 
     def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
-        """Task coordinates, (c,), from what a task states: its rows, or a pose.
+        """Return the task coordinates, (c,), that a task states as rows or as a pose.
 
         Raises
         ------
         InputError
-            They are not as many as the rows.
+            Their number differs from the number of rows.
         """
         if isinstance(stated, ToolPose):
             rotation = stated.rotation.as_matrix()
@@ -131,52 +131,52 @@ class TaskMap(Summary):
         return np.array(stated, dtype=float)
 
     def value(self, q: np.ndarray) -> np.ndarray:
-        """Task coordinates, (c,), of one posture, (n,)."""
+        """Return the task coordinates, (c,), of one posture, (n,)."""
         return self.values(q[None])[0]
 
     def values(self, q: np.ndarray) -> np.ndarray:
-        """Task coordinates, (K, c), of postures (K, n)."""
+        """Return the task coordinates, (K, c), of postures, (K, n)."""
         return self.of_placements(*self.robot.tool_placements(q))
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); a space of joints has none."""
+        """Return the task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); not for joints."""
         return positions[:, list(self.axes)]
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Displacement (..., m) that leads from the `second` task coordinates (..., c) to the `first`; row by row."""
+        """Return the displacement, (..., m), from `second` to `first` task coordinates, (..., c), row by row."""
         return np.asarray(first - second, dtype=float)
 
     def norms(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sizes (...) of displacements (..., m): of their position part, m, and of their angle part, rad."""
+        """Return the norms, (...), of the position part, m, and the angle part, rad, of displacements, (..., m)."""
         position, angle = np.split(displacement, [len(self.axes)], axis=-1)
         return np.linalg.norm(position, axis=-1), np.linalg.norm(angle, axis=-1)
 
     def twists(self, q: np.ndarray) -> np.ndarray:
-        """Columns (6, K, n) of the tool frame's Jacobian at K postures (K, n): linear, then angular velocity."""
+        """Return the tool frame's Jacobian, (6, K, n), in postures (K, n): linear, then angular velocity."""
         return self.place(self.robot.chain, q)[2]
 
     def place(
         self, chain: Chain, q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Place the tool of a chain at K postures, and find its `twists`; see `Chain.tool`."""
+        """Return the placements of a chain's tool in K postures, and its `twists`; see `Chain.tool`."""
         return chain.tool(q, in_tool_axes=self.in_tool_axes)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Rows (m, ...) of the task velocity that twists (6, ...) of the tool make; a space of joints has none."""
+        """Return the task velocity, (m, ...), of twists of the tool, (6, ...); not for a space of joints."""
         return twists[self.prescribed.parts]
 
     def jacobian(self, twists: np.ndarray) -> np.ndarray:
-        """Task Jacobian J (K, m, n) from the `twists` at K postures."""
+        """Return the task Jacobian J, (K, m, n), from the `twists` in K postures."""
         return np.moveaxis(self.rates(twists), 0, 1)
 
     def sample_jacobians(self) -> np.ndarray:
-        """Task Jacobians J (20, m, n) at random postures, the same ones each time, from -1 to 1 rad or m."""
+        """Return task Jacobians J, (20, m, n), in random postures from -1 to 1 rad or m, which are always the same."""
         postures = np.random.default_rng(0).uniform(-1.0, 1.0, (20, self.robot.n))
         return self.jacobian(self.twists(postures))
 
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
-        """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""
+        """Return V_q, A_q and A_v of K states, from the `twists` in their postures."""
         slopes = tool_derivatives(twists, qdot, qddot, in_tool_axes=self.in_tool_axes)
         return TaskDerivatives(*map(self.jacobian, slopes))

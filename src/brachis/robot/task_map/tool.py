@@ -1,4 +1,4 @@
-"""The tool as task space: its pose, rows of its position in the world, and behind these an angle or its orientation."""
+"""Task maps of the tool: its pose; or rows of its position in the world, followed by an angle or the orientation."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from brachis.robot.task_map.protocol import ANGLES, POSE_ROWS, TaskMap
 class RowsAndOrientation(TaskMap):
     """Rows of the tool frame's position in the world frame, and its orientation.
 
-    Its rows are velocities along the world's axes and rotation about them; task coordinates are the rows of the
-    position, then the rotation matrix row by row (9). Where a virtual joint rolls the tool, they prescribe the
-    direction of its z axis.
+    The rows are velocities along the world's axes and rotations about them. The task coordinates are the rows of the
+    position, then the rotation matrix row by row (9). If a virtual joint rolls the tool, they prescribe the direction
+    of the tool's z axis.
     """
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return the rows of the positions, then rotation matrices row by row, (K, c)."""
+        """Return the rows of the positions, then the rotation matrices row by row, (K, c)."""
         rows = super().of_placements(positions, rotations)
         return np.concatenate([rows, rotations.reshape(-1, 9)], axis=1)
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the displacement row by row, and the rotation vector, (..., m), in the world."""
+        """Return the displacement row by row, then the rotation vector, (..., m), in the world frame."""
         first, second = np.broadcast_arrays(first, second)
         count = len(self.axes)
         to = first[..., count:].reshape(-1, 3, 3)
@@ -42,8 +42,7 @@ class Pose(RowsAndOrientation):
     """The tool frame's pose.
 
     Its 12 coordinates are the position (3) and the rotation matrix (9) in the world frame. Its rows are those of the
-    body twist: displacement (m) and rotation (rad) along and about the tool frame's own axes, as the formulas of
-    `twists` give them.
+    body twist: displacements (m) along, and rotations (rad) about, the axes of the tool frame; see `twists`.
     """
 
     in_tool_axes: ClassVar[bool] = True
@@ -60,15 +59,15 @@ class Pose(RowsAndOrientation):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RowsAndAngle(TaskMap):
-    """Rows of the tool frame's position in the world frame and, last, the angle about a world axis (rad).
+    """Rows of the tool frame's position in the world frame and, as the last row, the angle about a world axis (rad).
 
-    The tool turns about this axis alone. The angle is that of the tool-frame axis `tool_axis` to the world's x axis, or
-    of roll to the y axis, by the right-hand rule.
+    The tool turns about this axis alone. The angle is measured from the world's x axis, or from its y axis for roll, to
+    the axis `tool_axis` of the tool frame, by the right-hand rule.
 
     Attributes
     ----------
     tool_axis : int
-        Axis of the tool frame (0, 1, 2).
+        Index of an axis of the tool frame (0, 1, 2).
     """
 
     tool_axis: int
@@ -82,29 +81,29 @@ class RowsAndAngle(TaskMap):
 
     @property
     def world_axis(self) -> int:
-        """World axis (0, 1, 2) about which the angle turns."""
+        """Index of the world axis (0, 1, 2) about which the tool turns."""
         return ANGLES.index(self.rows[-1])
 
     @property
     def plane(self) -> tuple[int, int]:
-        """World axes across: that from which the angle counts, and the other one."""
+        """Indices of the perpendicular world axes: first the axis from which the angle is measured."""
         first, second = (axis for axis in range(3) if axis != self.world_axis)
         return first, second
 
     @property
     def sign(self) -> float:
-        """+1 where the angle turns the first axis of `plane` towards the second one, else -1."""
+        """+1 if a positive angle turns the first axis of `plane` towards the second one, else -1."""
         return -1.0 if self.world_axis == 1 else 1.0
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return the rows of the positions, and the angle in (-pi, pi]."""
+        """Return the rows of the positions, then the angle in (-pi, pi]."""
         first, second = self.plane
         pointer = rotations[:, :, self.tool_axis]
         angle = np.arctan2(self.sign * pointer[:, second], pointer[:, first])
         return np.column_stack([super().of_placements(positions, rotations), angle])
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the displacement row by row; the angle in [-pi, pi)."""
+        """Return the displacement row by row, with the angle in [-pi, pi)."""
         delta = super().difference(first, second).copy()
         delta[..., -1] = principal(delta[..., -1])
         return delta

@@ -17,15 +17,16 @@ from brachis.robot.custom_limits import (
     list_models,
 )
 from brachis.verify.limits.clearance import worst_clearance
-from brachis.verify.limits.joint import JOINT_CHECKS
+from brachis.verify.limits.joint import DRIVE_CHECKS, JOINT_CHECKS
 from brachis.verify.limits.margins import MARGIN_CHECKS
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.limits.tool import TOOL_CHECKS
 from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.report import Check
 
-TABLE: dict[str, LimitCheck] = {
+LIMIT_CHECKS: dict[str, LimitCheck] = {
     **JOINT_CHECKS,
+    **DRIVE_CHECKS,
     **TOOL_CHECKS,
     **MARGIN_CHECKS,
     "clearance": worst_clearance,
@@ -34,11 +35,13 @@ TABLE: dict[str, LimitCheck] = {
 
 
 def check_limits(
-    motion: CheckedMotion, user_limits: Sequence[LimitModel]
+    motion: CheckedMotion, own_limits: Sequence[LimitModel]
 ) -> list[Check]:
     """Check all kinds of limits, then those of the task's ``custom_limits`` and the user's own."""
-    results = [(kind.replace("_", " "), find(motion)) for kind, find in TABLE.items()]
-    models = list_models(motion.task, user_limits)
+    results = [
+        (kind.replace("_", " "), find(motion)) for kind, find in LIMIT_CHECKS.items()
+    ]
+    models = list_models(motion.task, own_limits)
     results += [_check_model(where, model, motion) for where, model in models.items()]
     allowed = 1.0 + motion.options.ratio_tolerance
     return [

@@ -149,8 +149,6 @@ JOINT_CHECKS: dict[str, LimitCheck] = {
     "power": partial(
         _worst_quantity, "power", lambda _, states: states.tau * states.qdot
     ),
-    "total_power": _worst_total_power,
-    "torque_speed": _worst_torque_at_speed,
     "rms_torque": _worst_rms_torque,
     "jerk": partial(_worst_derivative, "jerk"),
     "torque_rate": partial(
@@ -161,4 +159,9 @@ JOINT_CHECKS: dict[str, LimitCheck] = {
         ),
     ),
 }
-"""Checks of all rows of `LIMIT_KINDS`, and of the limits of drives."""
+"""The check of every row of `LIMIT_KINDS`."""
+DRIVE_CHECKS: dict[str, LimitCheck] = {
+    "total_power": _worst_total_power,
+    "torque_speed": _worst_torque_at_speed,
+}
+"""The checks of `brachis.limits.drives`: limits of drives and of the whole robot."""
