@@ -48,10 +48,12 @@ def plan_for_controller(
     ----------
     profile : Profile, str or path
         Name of an included profile, or the file of one.
-    robot_or_task, task, **keywords
+    robot_or_task, task
         As for `brachis.plan`.
     listener : callable, optional
         Called with a line of text about each step.
+    **keywords
+        As for `brachis.plan`.
 
     Returns
     -------

@@ -77,7 +77,6 @@ def rank_candidate(
     ----------
     guess : InitialGuess
     deadline : Deadline
-    _listener : callable
 
     Returns
     -------

@@ -143,7 +143,7 @@ def test_a_remark_doubts_a_recorded_motion_far_faster_than_its_limits_allow(
         verification=both_motions.result.verification,
     )
     remarks = dataclasses.replace(both_motions, result=slow).remarks
-    said = f"{factor:.0f} times as fast as the plan: its times may have another unit"
+    said = f"{factor:.0f} times as fast as the plan: the unit of its times may not"
     assert any(said in remark for remark in remarks) == is_doubted
 
 

@@ -114,6 +114,9 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
             problems.append(f"{_describe(*key)} occurs twice")
         if key is not None:
             columns[key] = (i, unit)
+    with_torques = {joint for kind, joint in columns if kind == "tau"}
+    if with_torques != set(joints):  # torques of some joints are left out
+        columns = {key: column for key, column in columns.items() if key[0] != "tau"}
     kinds = dict.fromkeys(["q", *(kind for kind, joint in columns if joint)])
     required = [("t", ""), *((kind, joint) for kind in kinds for joint in joints)]
     missing = [key for key in required if key not in columns]
@@ -214,8 +217,6 @@ class Recording:
         Positions, rad or m.
     qdot, qddot : (K, n) ndarray or None
         Velocities and accelerations if the file has them, rad/s or m/s, rad/s^2 or m/s^2.
-    tau : (K, n) ndarray or None
-        Torques if the file has them, Nm or N.
     rounding : (n,) ndarray
         Half of the last digit of every joint's positions, rad or m; 0 if the file has all digits.
     units : tuple of str
@@ -224,17 +225,19 @@ class Recording:
         Name of the file.
     notes : tuple of str
         Notes on how the file was read.
+    tau : (K, n) ndarray or None
+        Torques if the file has them, Nm or N.
     """
 
     t: np.ndarray
     q: np.ndarray
     qdot: np.ndarray | None
     qddot: np.ndarray | None
-    tau: np.ndarray | None
     rounding: np.ndarray
     units: tuple[str, ...]
     source: str
     notes: tuple[str, ...]
+    tau: np.ndarray | None = None
 
 
 def read_recording(
@@ -295,11 +298,11 @@ def read_recording(
         moved["q"],
         moved.get("qdot"),
         moved.get("qddot"),
-        moved.get("tau"),
         rounding,
         robot.position_units,
         str(source),
         (*notes, *left_out),
+        moved.get("tau"),
     )
 
 
