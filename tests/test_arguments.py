@@ -12,7 +12,7 @@ SCARA = brachis.robots.path_of("scara3")
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    "make, told",
     [
         (
             lambda: brachis.Line(bye=[0.1, 0.0]),
@@ -75,7 +75,7 @@ def test_wrong_arguments_have_a_message_with_the_right_ones(make, told):
 
 
 @pytest.mark.parametrize(
-    ("keywords", "told"),
+    "keywords, told",
     [
         (
             {"tolerance": 1e-3},
@@ -124,7 +124,7 @@ def test_a_key_of_a_section_is_found_in_a_file():
 
 
 @pytest.mark.parametrize(
-    ("use", "told"),
+    "use, told",
     [
         (
             lambda motion: motion.position("a"),
@@ -178,7 +178,7 @@ def test_files_of_motions_are_taken_as_motions(line_trajectory, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "meant"),
+    "module, name, meant",
     [
         (brachis.robots, "scara4", "scara3"),
         (brachis.examples, "scara_lin", "scara_line"),

@@ -130,7 +130,7 @@ def test_a_chart_that_is_not_broken_is_read(saved_file):
 
 
 @pytest.mark.parametrize(
-    ("robot", "space", "by"),
+    "robot, space, by",
     [
         ("scara3", ["x", "y"], [-0.3, 0.2]),
         ("gen3", "pose", [0.0, 0.1, -0.1]),

@@ -196,7 +196,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "words"), REFUSED)
+@pytest.mark.parametrize("changes, words", REFUSED)
 def test_what_is_an_error(changes, words):
     with pytest.raises(brachis.BrachisError, match=words):
         plan(**changes)

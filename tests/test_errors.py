@@ -63,7 +63,7 @@ def test_keys_that_were_set_are_named_with_the_task_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("error", "named"),
+    "error, named",
     [
         (errors.UrdfError("not well-formed XML", where="a.urdf"), False),
         (errors.NotInstalledError("a table", "pandas", "pandas"), False),

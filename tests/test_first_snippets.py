@@ -124,7 +124,7 @@ def test_segments_are_those_of_the_task_file():
 
 
 @pytest.mark.parametrize(
-    ("kind", "keys", "parts"),
+    "kind, keys, parts",
     [
         ("Line", {}, ["Line", "exactly one of its forms"]),
         ("Line", {"by": ["a", 1]}, ["Line", "line.by[0]"]),

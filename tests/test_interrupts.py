@@ -88,7 +88,7 @@ def test_what_was_heard_is_forgotten(presses):
 
 
 @pytest.mark.parametrize(
-    ("hold", "listening"),
+    "hold, listening",
     [
         (interrupts.defer, True),
         (interrupts.defer, False),

@@ -80,7 +80,7 @@ def test_calmest_motion_auto_intervals_and_free_knots(spline):
 
 
 @pytest.mark.parametrize(
-    ("changes", "reason"),
+    "changes, reason",
     [
         (
             {"path": brachis.Line(to=[0, 3.0, 0, 0, 0, 0, 0])},
@@ -134,7 +134,7 @@ def test_bottlenecks_of_the_saved_motion_are_those_of_the_plan(joint_motion, tmp
     assert again.t_end == pytest.approx(joint_motion.t_end, rel=1e-4)
 
 
-@pytest.mark.parametrize(("row", "excess"), [(0, 1e-8), (1, 5e-5), (2, 1e-8)])
+@pytest.mark.parametrize("row, excess", [(0, 1e-8), (1, 5e-5), (2, 1e-8)])
 def test_a_path_of_joints_may_leave_a_range_within_the_tolerance(row, excess):
     upper = brachis.robots.iiwa14.limits.position_upper[0]
     waypoints = np.tile(REST, (3, 1))
@@ -146,7 +146,7 @@ def test_a_path_of_joints_may_leave_a_range_within_the_tolerance(row, excess):
 
 
 @pytest.mark.parametrize("excess", [1.01e-4, 0.1])
-@pytest.mark.parametrize(("end", "kind"), [(1, PathError), (0, StartError)])
+@pytest.mark.parametrize("end, kind", [(1, PathError), (0, StartError)])
 def test_beyond_the_tolerance_the_message_tells_the_numbers_apart(excess, end, kind):
     waypoints = np.tile(REST, (2, 1))
     waypoints[end, 0] = brachis.robots.iiwa14.limits.position_upper[0] + excess

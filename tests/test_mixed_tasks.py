@@ -27,7 +27,7 @@ def problem_of(case):
     return Problem.of(robot_for(None, task.robot), task)
 
 
-@pytest.mark.parametrize(("robot", "number"), CASES)
+@pytest.mark.parametrize("robot, number", CASES)
 def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(
     bench, robot, number, folder
 ):
@@ -48,7 +48,7 @@ def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(
         assert given is None or np.allclose(given, own, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("robot", "number"), [("tx90l_rail", 1), ("planar4", 1)])
+@pytest.mark.parametrize("robot, number", [("tx90l_rail", 1), ("planar4", 1)])
 def test_derivatives_of_the_plain_transcription(bench, robot, number, folder):
     case = bench("mixed_cases").case(robot, 0, number, folder)
     program = bench("full_space").FullSpace(problem_of(case), 3)

@@ -29,7 +29,7 @@ def made(random_plans, tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("name", "number"),
+    "name, number",
     [("scara3", 1), ("gantry2", 1), ("gantry2", 2), ("gantry2", 3), ("gantry2", 4)],
 )
 def test_a_verified_plan_is_within_its_limits(random_plans, name, number, tmp_path):
@@ -54,7 +54,7 @@ def test_the_second_look_agrees_with_the_verification(random_plans, made):
 
 
 @pytest.mark.parametrize(
-    ("name", "by", "kind"),
+    "name, by, kind",
     [("q", 1e-4, "torque"), ("qddot", 5.0, "torque"), ("q", 3.0, "position")],
 )
 def test_the_second_look_finds_what_is_wrong(

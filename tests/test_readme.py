@@ -296,7 +296,7 @@ def test_example_13():
 
 
 @pytest.mark.parametrize(
-    ("name", "changes"),
+    "name, changes",
     [
         ("14_round_the_post", {}),
         ("15_tilted_torch", {"intervals": 10}),

@@ -82,7 +82,7 @@ def test_notebooks_show_a_figure_beside_a_table_and_figures_as_pictures(result):
 
 
 @pytest.mark.parametrize(
-    ("value", "text"),
+    "value, text",
     [
         (1.23456789, "1.23457"),
         (np.zeros((3, 4)), "array (3, 4)"),

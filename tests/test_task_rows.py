@@ -57,7 +57,7 @@ def tool_along(trajectory):
 
 
 @pytest.mark.parametrize(
-    ("word", "start", "by"),
+    "word, start, by",
     [
         (SCARA, [0.3, 1.2, 0.1, 0.2], [-0.1, 0.12, 0.05, 0.8]),
         (SCARA, [0.3, 1.2, 0.1, 0.2], [0.0, 0.0, 0.0, -1.5]),
@@ -88,7 +88,7 @@ BANG_BANG = [
 ]
 
 
-@pytest.mark.parametrize(("word", "start", "by", "accelerations"), BANG_BANG)
+@pytest.mark.parametrize("word, start, by, accelerations", BANG_BANG)
 def test_the_time_where_one_joint_decides(word, start, by, accelerations):
     tool = (0.0, 0.0, -0.1)  # on the last axis
     robot = chain(word, tool).with_limits(**LIMITS, acceleration=accelerations)
@@ -113,7 +113,7 @@ def test_the_time_of_a_quill_by_its_force():
 
 
 @pytest.mark.parametrize(
-    ("word", "rows", "family"),
+    "word, rows, family",
     [
         (SCARA, YAWING, "planar"),
         (SCARA, ["z", "y", "x", "yaw"], "planar"),
@@ -134,7 +134,7 @@ def test_closed_forms(word, rows, family):
 
 
 @pytest.mark.parametrize(
-    ("word", "rows", "start", "by"),
+    "word, rows, start, by",
     [
         (SCARA, ["x", "z", "yaw"], [0.3, 1.2, 0.1, 0.2], [-0.1, 0.1, 0.3]),
         (SCARA, ["yaw"], [0.3, 1.2, 0.1, 0.2], [1.0]),
@@ -158,7 +158,7 @@ ABOUT_Y = {"rotate": {"axis": [0, 1, 0], "angle_deg": 20}}
 
 
 @pytest.mark.parametrize(
-    ("space", "segment", "by"),
+    "space, segment, by",
     [
         ("axis", {"turn": ABOUT_Y}, []),
         (
@@ -223,7 +223,7 @@ def test_samples_of_a_path_with_the_axis_against_differences():
 
 
 @pytest.mark.parametrize(
-    ("word", "space"),
+    "word, space",
     [
         (SCARA, YAWING),
         (PALLETISER, YAWING),
@@ -242,7 +242,7 @@ TURN = [{"turn": ABOUT_Y}]
 
 
 @pytest.mark.parametrize(
-    ("word", "space", "path", "texts"),
+    "word, space, path, texts",
     [
         ("zZz", ["x", "y", "yaw"], None, ["x, y of the tool depend", "moved by j2", "[x, yaw]"]),
         ("ZZZZ", YAWING, None, ["no joint changes z", "allowed: [x, y, yaw]"]),

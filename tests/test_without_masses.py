@@ -72,7 +72,7 @@ def saved_file(result, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "limits"),
+    "text, limits",
     [
         (six_axes(), {"torque": None, "acceleration": 8.0}),
         (six_axes(GRAM), {"acceleration": 8.0}),
@@ -135,7 +135,7 @@ def test_bottlenecks_and_report(result):
 
 
 @pytest.mark.parametrize(
-    ("text", "key"),
+    "text, key",
     [
         (f"limits: {{acceleration: 8.0, {kind}: {{a2: 5.0}}}}", f"limits.{kind}.a2")
         for kind in ("torque", "power", "rms_torque", "torque_rate")

@@ -5,9 +5,7 @@ import pytest
 from brachis.common.words import name_first, write_apart, write_count
 
 
-@pytest.mark.parametrize(
-    ("count", "text"), [(0, "0 rows"), (1, "1 row"), (2, "2 rows")]
-)
+@pytest.mark.parametrize("count, text", [(0, "0 rows"), (1, "1 row"), (2, "2 rows")])
 def test_counts_are_written_with_their_noun(count, text):
     assert write_count(count, "row") == text
 

@@ -64,7 +64,7 @@ PARAMETERS = [
 ]
 
 
-@pytest.mark.parametrize(("robot", "redundant"), PARAMETERS)
+@pytest.mark.parametrize("robot, redundant", PARAMETERS)
 def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     bench = bench_of(robot, redundant)
     q, solver = bench.q, bench.solver
@@ -101,7 +101,7 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
 
 
 @pytest.mark.parametrize(
-    ("robot", "redundant"),
+    "robot, redundant",
     [(ur, ()), (iiwa, (2,)), (panda_lengths, (5,)), (much_redundant, (0, 1, 4, 9))],
 )
 def test_margin_gradient(robot, redundant):
@@ -109,7 +109,7 @@ def test_margin_gradient(robot, redundant):
 
 
 @pytest.mark.parametrize(
-    ("robot", "redundant"),
+    "robot, redundant",
     [
         (iiwa, (2,)),
         (iiwa, (4,)),
@@ -153,7 +153,7 @@ def rows(robot, *names):
 
 
 @pytest.mark.parametrize(
-    ("robot", "redundant", "names", "reason"),
+    "robot, redundant, names, reason",
     [
         (
             iiwa,

@@ -28,7 +28,7 @@ def macro_mini(first, second, turn, plane_rows):
 
 
 @pytest.mark.parametrize(
-    ("axes", "rows"),
+    "axes, rows",
     [
         ([X, Y], ["x", "y"]),
         ([Y, X], ["x", "y"]),
@@ -55,7 +55,7 @@ def test_gantries(axes, rows):
 
 
 @pytest.mark.parametrize(
-    ("rows", "singular"),
+    "rows, singular",
     [
         (["x", "y"], []),
         (["x", "y", "yaw"], []),

@@ -170,7 +170,7 @@ def test_a_third_party_family_comes_first_where_it_fits(arm, plane):
 
 
 @pytest.mark.parametrize(
-    ("change", "reason"),
+    "change, reason",
     [
         (lambda answers: answers + 1e-4, "do not contain all postures"),
         (
@@ -214,7 +214,7 @@ def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane
 
 
 @pytest.mark.parametrize(
-    ("member", "change", "reason"),
+    "member, change, reason",
     [
         (
             "branches",

@@ -136,7 +136,7 @@ def test_arms_as_their_urdf_states_them(name):
 
 
 @pytest.mark.parametrize(
-    ("arm", "redundant"),
+    "arm, redundant",
     [
         (UR.with_slide(0, Z), "j2"),
         (UR.with_slide(0, Z), "j6"),

@@ -37,7 +37,7 @@ def roots(pattern, rows, redundant):
     return 2 if "R" in left else 1
 
 
-@pytest.mark.parametrize(("pattern", "plane", "rows"), CASES)
+@pytest.mark.parametrize("pattern, plane, rows", CASES)
 def test_every_decomposition_that_exists_is_found_and_right(pattern, plane, rows):
     bench = Bench(robot_of(pattern, plane), rows, POSTURES[plane])
     for redundant, exists in bench.decompositions():

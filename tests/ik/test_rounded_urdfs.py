@@ -70,7 +70,7 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
             assert candidate.reasons == ideal.reasons
 
 
-@pytest.mark.parametrize(("name", "joints"), CASES, ids=str)
+@pytest.mark.parametrize("name, joints", CASES, ids=str)
 def test_all_answers_are_right_and_one_is_the_posture(name, joints):
     bench = bench_of(name, joints)
     solved = bench.solve(bench.q)
@@ -95,7 +95,7 @@ def test_all_answers_are_right_and_one_is_the_posture(name, joints):
     )
 
 
-@pytest.mark.parametrize(("name", "joints"), CASES, ids=str)
+@pytest.mark.parametrize("name, joints", CASES, ids=str)
 def test_no_answer_is_given_twice(name, joints):
     bench = bench_of(name, joints, 500)
     solved = bench.solve(bench.q)
@@ -107,7 +107,7 @@ def test_no_answer_is_given_twice(name, joints):
 
 
 @pytest.mark.parametrize(
-    ("name", "joint"),
+    "name, joint",
     [
         ("iiwa", 6),
         ("UR10", 2),

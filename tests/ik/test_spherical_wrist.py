@@ -34,7 +34,7 @@ RAILS = {
 
 
 @pytest.mark.parametrize(
-    ("rail", "exist"),
+    "rail, exist",
     [("across", {0, 1, 2, 3}), ("along", {0, 2, 3}), ("at an angle to", {0, 1})],
     ids=str,
 )

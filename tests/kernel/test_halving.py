@@ -49,7 +49,7 @@ def halve(timing, pieces, tolerance, shortest, most):
 
 
 @pytest.mark.parametrize(
-    ("tolerance", "shortest", "most"),
+    "tolerance, shortest, most",
     [(1e-3, 1e-4, 10_000), (0, 0.01, 300), (0, 0, 50)],
 )
 @pytest.mark.parametrize("seed", range(5))

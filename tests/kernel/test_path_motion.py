@@ -204,7 +204,7 @@ def test_rows_that_are_the_same_everywhere_are_given_once():
 
 
 @pytest.mark.parametrize(
-    ("row", "side", "fault"),
+    "row, side, fault",
     [
         ([0.0, 0.0, 0.0], 0.0, Fault.SINGULAR),
         ([0.0, 0.0, 1.0], 0.0, None),
@@ -233,7 +233,7 @@ ROWS = {"rows": np.zeros((1, 4))}
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    "given, message",
     [
         (
             {"rows": np.zeros((1, 1, 4)), "row_derivatives": np.zeros((2, 1, 1, 4))},

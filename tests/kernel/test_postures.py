@@ -95,7 +95,7 @@ def test_turns_are_counted_by_velocities():
     assert_allclose(motion.q[:, 1], q, atol=1e-12)
 
 
-@pytest.mark.parametrize(("ranged", "fault"), [(1, Fault.TURNS_TOO_FAR), (0, None)])
+@pytest.mark.parametrize("ranged, fault", [(1, Fault.TURNS_TOO_FAR), (0, None)])
 def test_turns_that_are_not_certain(ranged, fault):
     _, q, _, _ = fast_motion(9)
     q[4:] += 0.4 * TURN

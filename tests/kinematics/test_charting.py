@@ -57,7 +57,7 @@ def once_around():
 
 
 @pytest.mark.parametrize(
-    ("rows", "start", "make"),
+    "rows, start, make",
     [
         (["x", "y"], START, scara),
         ("pose", SEVEN, seven_joints),

@@ -20,7 +20,7 @@ def pieces(nodes):
 
 
 @pytest.mark.parametrize(
-    ("pattern", "start", "redundant"),
+    "pattern, start, redundant",
     [
         ("RRR", [0.4, 1.0, 0.5], ["j2"]),
         ("RPR", [0.4, 0.2, 0.9], ["j1"]),

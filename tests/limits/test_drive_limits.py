@@ -183,7 +183,7 @@ def task_with_limit(task, kind, free):
 
 
 @pytest.mark.parametrize(
-    ("kind", "check", "label"),
+    "kind, check, label",
     [
         ("speed", "tool speed", "tool speed"),
         ("acceleration", "tool acceleration", "tool acceleration"),

@@ -122,7 +122,7 @@ def test_a_kind_without_its_plugin_is_unknown():
 
 
 @pytest.mark.parametrize(
-    ("parameters", "said"),
+    "parameters, said",
     [
         ("{joints: [j2, j3], lower: 1.0, upper: 0.0}", "lower must be below upper"),
         ("joints: [j2, j3]", "missing"),
@@ -188,7 +188,7 @@ def refusal_at(place, **parts):
 
 
 @pytest.mark.parametrize(
-    ("name", "spoilt", "place", "said"),
+    "name, spoilt, place, said",
     [
         ("labels", (), ".lower", "found (1,); allowed: (0,)"),
         ("lower", np.ones(1), "", "the lower bounds are not below the upper bounds"),
@@ -224,7 +224,7 @@ def test_a_limit_of_no_values_is_an_error():
 
 
 @pytest.mark.parametrize(
-    ("member", "wrong", "allowed"),
+    "member, wrong, allowed",
     [
         ("kind", None, "a name"),
         ("kind", "torque", "a kind of its own"),
@@ -295,7 +295,7 @@ def test_two_limits_may_have_one_kind_and_not_one_label():
 
 
 @pytest.mark.parametrize(
-    ("ratios", "said"),
+    "ratios, said",
     [
         (lambda _q: None, "found NoneType None; allowed: a numpy array"),
         (lambda q: q[:, :1] * np.nan, "not finite"),
@@ -396,7 +396,7 @@ class Alike:
 
 
 @pytest.mark.parametrize(
-    ("own_limits", "said"),
+    "own_limits, said",
     [
         (
             [Rate],

@@ -143,7 +143,7 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
 
 
 @pytest.mark.parametrize(
-    ("lower", "upper"),
+    "lower, upper",
     [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)],
 )
 def test_a_ratio_is_above_one_exactly_beyond_the_bounds(lower, upper):

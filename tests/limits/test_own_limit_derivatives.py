@@ -64,7 +64,7 @@ def bind(limit):
 
 
 @pytest.mark.parametrize(
-    ("partials", "where", "joint"),
+    "partials, where, joint",
     [
         (lambda m: partials_with(m, q=1.1 * right_partials(m).q), "q", "j2"),
         (lambda m: partials_with(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
@@ -126,7 +126,7 @@ def speed_in_steps(motion):
 
 
 @pytest.mark.parametrize(
-    ("values", "partials"),
+    "values, partials",
     [
         (right_values, right_partials),
         (
@@ -194,7 +194,7 @@ def test_built_in_limits_pass():
         check_partials(limit, sample_moments(robot), robot)
 
 
-@pytest.mark.parametrize(("left_out", "is_refused"), [(2, False), (4, True)])
+@pytest.mark.parametrize("left_out, is_refused", [(2, False), (4, True)])
 def test_values_may_be_undefined_in_some_postures_and_not_in_most(left_out, is_refused):
     angles = np.sort(sample_moments(ROBOT).q[:, 0])
     least = 0.5 * (angles[left_out - 1] + angles[left_out])

@@ -57,7 +57,7 @@ def test_the_limit_holds_everywhere_and_is_active(kind, free, result):
     assert result.t_end > 1.01 * free.t_end
 
 
-@pytest.mark.parametrize(("follows", "factor"), [(True, 1.0), (False, 9.0)])
+@pytest.mark.parametrize("follows, factor", [(True, 1.0), (False, 9.0)])
 def test_verification_finds_a_rate_within_a_microsecond(kind, result, follows, factor):
     """A jerk that is constant over so short a piece, and that of a quintic whose acceleration alone has changed.
 
@@ -87,7 +87,7 @@ def test_verification_finds_a_rate_within_a_microsecond(kind, result, follows, f
     assert check.time == pytest.approx(at.t[0], abs=2e-6)
 
 
-@pytest.mark.parametrize(("step", "above"), [(0.01, 1e-4), (0.0005, 5e-6)])
+@pytest.mark.parametrize("step, above", [(0.01, 1e-4), (0.0005, 5e-6)])
 def test_prediction_is_what_solving_again_gives(kind, result, step, above):
     """Within 1 % other limits take over, here and there; within small steps none do."""
     found = check_sensitivities(
@@ -101,7 +101,7 @@ def test_prediction_is_what_solving_again_gives(kind, result, step, above):
 
 
 @pytest.mark.parametrize(
-    ("degree", "key", "ends"),
+    "degree, key, ends",
     [
         (2, "degree", "found 2, .*; allowed: >= 3"),
         (3, "rest", "found velocity, .*; allowed: full or jerk"),

@@ -117,7 +117,7 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
 
 
 @pytest.mark.parametrize(
-    ("tolerances", "space", "match"),
+    "tolerances, space, match",
     [
         ("orientation: {tilt: 15}", "position", "prescribe the orientation"),
         ("position: {sphere: 0.1}", ["x", "y"], "no tolerances of the position"),

@@ -60,7 +60,7 @@ HEAVY = 2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE)
 
 
 @pytest.mark.parametrize(
-    ("robot", "friction", "spline", "expected"),
+    "robot, friction, spline, expected",
     [
         (slide(damping=VISCOUS), {}, EVEN, viscous_time()),
         (slide(), {"viscous": VISCOUS}, EVEN, viscous_time()),

@@ -135,7 +135,7 @@ def test_it_ends_with_the_time_or_with_a_reason():
     assert run(FIRST, nothing).not_completed == ""
 
 
-@pytest.mark.parametrize(("t_end", "best"), [(4.0, 4.0), (6.0, 5.0)])
+@pytest.mark.parametrize("t_end, best", [(4.0, 4.0), (6.0, 5.0)])
 def test_an_early_end_counts_if_it_is_faster_than_its_beginning(t_end, best):
     changes, _ = changes_to(Fake(t_end, usable=False))
     result = run(FIRST, changes, early=True)

@@ -21,7 +21,7 @@ def finer(phase):
 
 
 @pytest.mark.parametrize(
-    ("degree", "rest"),
+    "degree, rest",
     [(2, "velocity"), (3, "full"), (3, "velocity"), (4, "full"), (5, "full")],
 )
 @pytest.mark.parametrize("case", ["r0", "r1", "r2"])

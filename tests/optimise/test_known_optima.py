@@ -53,7 +53,7 @@ def bang_bang(mass):
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 @pytest.mark.parametrize(
-    ("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)]
+    "first, last", [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)]
 )
 def test_slide_between_speeds(first, last, rest):
     """Full force forwards up to the speed v with 2 v^2 = 2 a L + v0^2 + v1^2, full force back from there."""
@@ -73,7 +73,7 @@ def test_slide_between_speeds(first, last, rest):
 
 
 @pytest.mark.parametrize(
-    ("by", "mass"),
+    "by, mass",
     [([LENGTH, 0.0], 2.0 * MASS), ([0.0, LENGTH], MASS)],
     ids=["lower slide", "upper slide"],
 )

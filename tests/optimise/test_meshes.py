@@ -59,7 +59,7 @@ class Broken:
 
 
 @pytest.mark.parametrize(
-    ("joint", "intervals", "longest"),
+    "joint, intervals, longest",
     [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)],
 )
 def test_free_knots_make_few_intervals_fast(joint, intervals, longest):

@@ -92,7 +92,7 @@ def test_multipliers_belong_to_all_rows(solve):
 
 
 @pytest.mark.parametrize(
-    ("start", "is_few"),
+    "start, is_few",
     [([0.1, -0.2, 0.0], False), ([0.0, -1.3, 0.0], True), ([0.0, -1.6, 0.0], False)],
     ids=["few rows hold it back", "a little beyond the rows", "far beyond the rows"],
 )
@@ -182,7 +182,7 @@ def test_values_that_an_answer_violates_come_back(solve):
     assert report.violation <= 1e-8
 
 
-@pytest.mark.parametrize(("is_answer", "rows"), [(True, COUNT // 2), (False, COUNT)])
+@pytest.mark.parametrize("is_answer, rows", [(True, COUNT // 2), (False, COUNT)])
 def test_an_answer_goes_on_with_whole_values_where_few_rows_hold_it(
     solve, is_answer, rows
 ):

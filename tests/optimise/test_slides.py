@@ -27,7 +27,7 @@ def least_time(speed, force):
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 @pytest.mark.parametrize(
-    ("speed", "degree"), [(0.02, 3), (0.5, 3), (0.5, 4), (0.5, 5), (10.0, 3)]
+    "speed, degree", [(0.02, 3), (0.5, 3), (0.5, 4), (0.5, 5), (10.0, 3)]
 )
 def test_slides_of_any_force_are_as_fast_as_their_trapezoid(speed, degree, rest):
     times = []

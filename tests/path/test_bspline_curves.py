@@ -197,7 +197,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("keywords", "message"), WRONG)
+@pytest.mark.parametrize("keywords, message", WRONG)
 def test_the_error_names_what_is_wrong_with_arrays(keywords, message):
     with pytest.raises(TaskError, match=message):
         fit_path(**keywords)

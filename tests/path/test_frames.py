@@ -91,7 +91,7 @@ def test_every_kind_of_segment_and_orientation_is_in_the_frame():
 
 
 @pytest.mark.parametrize(
-    ("names", "place"),
+    "names, place",
     [
         (["x", "y"], FLAT),
         (["x", "y", "yaw"], FLAT),
@@ -181,7 +181,7 @@ TWO_FRAMES = {"workpiece": PLACE, "table": PLACE}
 
 
 @pytest.mark.parametrize(
-    ("path", "keys", "message"),
+    "path, keys, message",
     [
         (
             SEGMENTS,

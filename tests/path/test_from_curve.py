@@ -67,7 +67,7 @@ def test_functions_are_met_within_the_tolerance():
 
 
 @pytest.mark.parametrize(
-    ("curve", "more", "words"),
+    "curve, more, words",
     [
         (CubicSpline(TIMES, WAYPOINTS), (), "derivative 3 at .*make_interp_spline"),
         (lambda u: (abs(u - 0.4), u, u), ((0.0, 1.0),), "not smooth enough"),

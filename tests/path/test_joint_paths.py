@@ -97,7 +97,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("segment", "message"), REFUSED)
+@pytest.mark.parametrize("segment, message", REFUSED)
 def test_the_error_says_what_a_path_of_joints_cannot_be(segment, message):
     with pytest.raises(BrachisError, match=message):
         build([yaml.safe_load(segment)])
@@ -111,7 +111,7 @@ def test_a_corner_is_refused_with_its_place():
 
 
 @pytest.mark.parametrize(
-    ("parts", "words"),
+    "parts, words",
     [
         ({"degree": 3}, "degree"),
         ({"knots": [0] * 5 + [1] * 6}, "wrong number of knots; found 11; allowed: 10"),
@@ -129,7 +129,7 @@ def test_bsplines_that_are_none(parts, words):
 
 
 @pytest.mark.parametrize(
-    ("key", "more"),
+    "key, more",
     [
         ("redundant_joints", {"redundant_joints": ["a"]}),
         ("branch", {"branch": "elbow up"}),

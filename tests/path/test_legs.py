@@ -77,7 +77,7 @@ LEAD = 0.1
 
 
 @pytest.mark.parametrize(
-    ("parts", "boundary", "held"),
+    "parts, boundary, held",
     [
         # Lengths along the path of three lines of 0.2 m, in m.
         (part(0.1, 0.0, 0.2), {}, [(0.1, 0.01, 0.12)]),
@@ -104,7 +104,7 @@ SEAM = {**RIGHT, "speed": 0.1}
 
 
 @pytest.mark.parametrize(
-    ("path", "expected"),
+    "path, expected",
     [
         # A blend of 0.02 m takes 0.0341 of the parameter; a lead takes 0.1 s.
         ([{**RIGHT, "blend": 0.02}, {**UP, "speed": 0.1, "blend": 0.02}, RIGHT], [(0.1, 0.2141, 0.3741)]),

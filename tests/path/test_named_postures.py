@@ -96,7 +96,7 @@ def test_a_change_of_a_posture_moves_start_and_path():
 
 
 @pytest.mark.parametrize(
-    ("keys", "message"),
+    "keys, message",
     [
         ({"start": "hom"}, r"start: this posture is not defined in postures; found 'hom' .*free, home, away"),
         ({"end": "hom"}, r"end: this posture is not defined in postures"),
@@ -122,7 +122,7 @@ ELSEWHERE = brachis.Line(by=[0.1, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(
-    ("keys", "key", "message"),
+    "keys, key, message",
     [
         ({"away": FAR}, "postures.away", "out of its range"),
         ({"end": "home", "home": FAR, "path": [ELSEWHERE]}, "postures.home", "out of its range"),

@@ -171,7 +171,7 @@ SEGMENTS = [
 ]
 
 
-@pytest.mark.parametrize(("segment", "rows", "message"), SEGMENTS)
+@pytest.mark.parametrize("segment, rows, message", SEGMENTS)
 def test_the_error_names_what_is_wrong_with_a_segment(segment, rows, message):
     assert re.search(message, str(error_of([yaml.safe_load(segment)], rows)))
 
@@ -191,7 +191,7 @@ def test_a_corner_names_place_angle_and_key():
 
 
 @pytest.mark.parametrize(
-    ("angle", "advice"),
+    "angle, advice",
     [
         (180.0, "each other. Set path[0].stop: true to stop there"),
         (172.5, "each other. Set path[0].stop: true to stop there"),
@@ -220,7 +220,7 @@ def test_the_error_names_all_corners():
 
 
 @pytest.mark.parametrize(
-    ("segments", "rows", "message"),
+    "segments, rows, message",
     [
         (
             "[{line: {by: [1, 0]}}, {arc: {center: [1, 0.5], angle_deg: 90}}]",
@@ -249,7 +249,7 @@ def test_the_error_says_what_jumps_at_a_join(segments, rows, message):
 
 
 @pytest.mark.parametrize(
-    ("order", "jump", "expected"),
+    "order, jump, expected",
     [
         (1, [0.1, 0.0], "the parameter's speed changing from 1 to 1.1"),
         (1, [-1.0, 0.0], "the parameter's speed changing from 1 to 0"),
@@ -283,7 +283,7 @@ def test_a_blend_that_is_too_long_is_told_the_longest():
 
 
 @pytest.mark.parametrize(
-    ("length", "written"),
+    "length, written",
     [
         (0.3 - 0.27, "0.015 m"),  # which is 2.7e-17 m less than 0.03
         (2.0 / 3.0, "0.333333 m"),

@@ -92,7 +92,7 @@ SEGMENTS = [
 ]
 
 
-@pytest.mark.parametrize(("segment", "message"), SEGMENTS)
+@pytest.mark.parametrize("segment, message", SEGMENTS)
 def test_the_error_names_what_is_wrong_with_a_segment(segment, message):
     assert re.search(message, str(error_of([yaml.safe_load(segment)])))
 
@@ -109,7 +109,7 @@ def test_a_jump_of_the_turning_rate_is_told_in_words():
 
 
 @pytest.mark.parametrize(
-    ("segments", "message"),
+    "segments, message",
     [
         (
             (

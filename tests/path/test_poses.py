@@ -219,7 +219,7 @@ def test_targets_are_poses(path):
     assert_allclose(path.sample([0.0]).target[0], pose(START, TURNED), atol=1e-12)
 
 
-@pytest.mark.parametrize(("name", "breaks"), [("blends", 8), ("two turns", 3)])
+@pytest.mark.parametrize("name, breaks", [("blends", 8), ("two turns", 3)])
 def test_the_twist_and_two_derivatives_continue_across_joins(name, breaks):
     path = pose_path(SEGMENTS[name])
     assert path.breaks.size == breaks

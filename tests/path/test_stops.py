@@ -46,7 +46,7 @@ FRAME = PathFrame.of(
 )
 
 
-@pytest.mark.parametrize(("space", "frame"), [("position", FRAME), ("pose", None)])
+@pytest.mark.parametrize("space, frame", [("position", FRAME), ("pose", None)])
 def test_a_part_of_a_path_is_the_path(space, frame):
     """Inside its ends to rounding, in the same s and frame, to all derivatives."""
     spline = {

@@ -36,7 +36,7 @@ def law_of(leg, task_map, path):
     return law
 
 
-@pytest.mark.parametrize(("segment", "length"), [(LINE, 0.2), (CIRCLE, 0.6 * np.pi)])
+@pytest.mark.parametrize("segment, length", [(LINE, 0.2), (CIRCLE, 0.6 * np.pi)])
 def test_it_is_linear_on_lines_and_circles(segment, length):
     task_map, path = path_and_map([segment])
     law = law_of(Leg(0.2, 0.7, speed=0.1), task_map, path)

@@ -182,7 +182,7 @@ def test_the_masses_of_all_bodies_are_told_of_the_robot():
 
 
 @pytest.mark.parametrize(
-    ("payload", "where"),
+    "payload, where",
     [
         ({"mass": 500.0}, "robot.payload.mass"),
         ({"mass": 5000.0}, "robot.payload.mass"),
@@ -201,7 +201,7 @@ def test_a_payload_in_g_and_mm(payload, where):
 
 
 @pytest.mark.parametrize(
-    ("limits", "remark"),
+    "limits, remark",
     [
         (
             "speed: 250.0",
@@ -323,7 +323,7 @@ WAVE = np.linspace(0.0, 1.5, 50)[:, None]
 
 
 @pytest.mark.parametrize(
-    ("tolerance", "remark"),
+    "tolerance, remark",
     [
         (
             0.1,
@@ -366,7 +366,7 @@ def test_yaw_of_the_path_start_in_degrees():
 
 
 @pytest.mark.parametrize(
-    ("joints", "hint"),
+    "joints, hint",
     [
         ([0, 17, 11, 86, 11, 69, 6], "It looks like degrees: 17 deg are 0.296706 rad"),
         ([300, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "It looks like mm: 300 mm are 0.3 m"),
@@ -392,7 +392,7 @@ def test_the_hint_of_a_posture_out_of_range(joints, hint):
 
 
 @pytest.mark.parametrize(
-    ("line", "changes"),
+    "line, changes",
     [
         ("{length: 500.0, angle_deg: 90}", {}),
         ("to: [1500.0, 300.0]", {}),
@@ -442,7 +442,7 @@ def test_a_robot_in_mm_is_told_before_its_posture_fails():
 
 
 @pytest.mark.parametrize(
-    ("limits", "told_of", "sound"),
+    "limits, told_of, sound",
     [
         (
             "torque: 320000.0",
@@ -494,7 +494,7 @@ def test_limits_beside_those_of_the_urdf(limits, told_of, sound):
 
 
 @pytest.mark.parametrize(
-    ("name", "mass"), [("scara3", 300.0), ("iiwa14", 100.0), ("tx90l_rail", 300.0)]
+    "name, mass", [("scara3", 300.0), ("iiwa14", 100.0), ("tx90l_rail", 300.0)]
 )
 def test_a_payload_in_g_that_an_arm_of_this_size_could_carry(name, mass):
     robot = getattr(brachis.robots, name)
@@ -604,7 +604,7 @@ def test_a_quaternion_with_its_scalar_last():
 
 
 @pytest.mark.parametrize(
-    ("angle", "is_doubted"),
+    "angle, is_doubted",
     [(1.57, True), (3.14, True), (-0.785, True), (np.pi, True)]
     + [(angle, False) for angle in (0.0, 0.5, 5.5, 11.0, 45.0)],
 )

@@ -94,7 +94,7 @@ def test_limits_are_combined_joint_by_joint():
 
 
 @pytest.mark.parametrize(
-    ("options", "settings", "key"),
+    "options, settings, key",
     [
         ("{}", "gravity: [0, 0, -1.6]", "gravity"),
         ("tool_frame: tool", "tool_frame: link2", "tool_frame"),

@@ -94,7 +94,7 @@ def test_friction_formula():
 
 
 @pytest.mark.parametrize(
-    ("pattern", "plane"), [("RPR", "xz"), ("CRR", "tilted"), ("RRP", "xy")]
+    "pattern, plane", [("RPR", "xz"), ("CRR", "tilted"), ("RRP", "xy")]
 )
 def test_derivatives_against_central_differences(pattern, plane):
     robot = planar_robot(pattern, plane, friction=FRICTION, gravity=[1.0, -2.0, -9.81])
@@ -134,7 +134,7 @@ def test_one_joint_alone():
 
 
 @pytest.mark.parametrize(
-    ("friction", "words"),
+    "friction, words",
     [
         ({"viscous": -1.0}, r"friction\.viscous: out of range; found -1\.0"),
         (

@@ -32,7 +32,7 @@ def with_limit(limits=None, **changes):
 
 
 @pytest.mark.parametrize(
-    ("value", "expected"),
+    "value, expected",
     [
         (FROM_URDF, [80.0, 70.0, 60.0]),
         (12.5, [12.5, 12.5, 12.5]),
@@ -50,7 +50,7 @@ def test_forms_of_a_limit(value, expected):
 
 
 @pytest.mark.parametrize(
-    ("value", "lower", "upper"),
+    "value, lower, upper",
     [
         (FROM_URDF, [-3.0] * 3, [2.9] * 3),
         (None, [-INF] * 3, [INF] * 3),
@@ -80,7 +80,7 @@ def test_scale_comes_last():
 
 
 @pytest.mark.parametrize(
-    ("changes", "kind"), [({"effort": -1.0}, "torque"), ({"velocity": 0.0}, "velocity")]
+    "changes, kind", [({"effort": -1.0}, "torque"), ({"velocity": 0.0}, "velocity")]
 )
 def test_limit_of_the_urdf_that_is_not_positive(changes, kind):
     key = f"robot.limits.{kind}.j2"
@@ -232,7 +232,7 @@ def test_ranges_that_a_task_cannot_state_are_errors(pair):
 
 
 @pytest.mark.parametrize(
-    ("friction", "where"),
+    "friction, where",
     [
         ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
         ({"armature": 1e300}, "robot.friction.armature.j1"),
@@ -254,7 +254,7 @@ def test_positions_and_gravity_that_no_robot_has_are_errors():
 
 
 @pytest.mark.parametrize(
-    ("value", "lower", "upper"),
+    "value, lower, upper",
     [
         ({"j2": [-5.0, 7.0]}, [-80.0, -5.0, -60.0], [80.0, 7.0, 60.0]),
         ([[-5.0, 7.0], 9.0, None], [-5.0, -9.0, -INF], [7.0, 9.0, INF]),

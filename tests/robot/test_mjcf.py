@@ -137,7 +137,7 @@ def test_joints_with_several_coordinates_cannot_be_planned_for(tmp_path, joint):
 
 
 @pytest.mark.parametrize(
-    ("actuator", "torque", "text"),
+    "actuator, torque, text",
     [
         ('<position joint="k" ctrlrange="0 1.5" forcerange="-80 80"/>', 80.0, "laws"),
         ('<motor joint="k" ctrlrange="0 1" gear="50"/>', np.inf, "torque limits of 0"),
@@ -154,7 +154,7 @@ def test_ranges_of_actuators_that_begin_at_zero(tmp_path, actuator, torque, text
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    "text, expected",
     [
         ("<mujoco><worldbody><bdy/></worldbody></mujoco>", "unrecognized"),
         ('<mujoco><include file="part.xml"/></mujoco>', "part.xml"),
@@ -176,7 +176,7 @@ def test_without_mujoco(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "example", "redundant"),
+    "name, example, redundant",
     [("scara3", "scara_line", "j1"), ("tx90l_rail", "tx90l_rail_line", "rail")],
 )
 def test_urdf_model_and_mjcf_give_the_same_plan(tmp_path, name, example, redundant):

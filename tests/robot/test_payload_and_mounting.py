@@ -59,7 +59,7 @@ def of(text, **options):
 
 
 @pytest.mark.parametrize(
-    ("parts", "options", "tool"),
+    "parts, options, tool",
     [
         ((LOAD,), {"payload": PAYLOAD}, TOOL),
         ((TIP,), {"tool_offset": OFFSET}, "tip"),
@@ -90,7 +90,7 @@ def test_a_urdf_edited_by_hand_moves_alike(parts, options, tool):
 
 
 @pytest.mark.parametrize(
-    ("word", "direction"),
+    "word, direction",
     [("floor", [0, 0, 1]), ("wall", [1, 0, 0]), ("ceiling", [0, 0, -1])],
 )
 def test_where_the_base_points(word, direction):
@@ -119,7 +119,7 @@ def test_a_rotor_behind_a_gear_counts_as_armature():
 
 
 @pytest.mark.parametrize(
-    ("friction", "words"),
+    "friction, words",
     [
         (
             {"rotor_inertia": 1e-4},
@@ -200,7 +200,7 @@ def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
 
 
 @pytest.mark.parametrize(
-    ("section", "ours", "theirs", "key"),
+    "section, ours, theirs, key",
     [
         ("payload", {"mass": 4.5}, {"mass": 2}, ""),
         ("tool_offset", {"xyz": [0, 0, 1]}, {"xyz": [0, 0, 2]}, ".xyz"),
@@ -217,7 +217,7 @@ def test_contradictions_are_refused_with_their_key(section, ours, theirs, key):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    "options, words",
     [
         ("payload: {mass: -1}", r"robot.*payload\.mass: out of range"),
         ("payload: {com: [0, 0, 0]}", "mass"),

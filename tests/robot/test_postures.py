@@ -31,7 +31,7 @@ def test_the_tool_of_a_posture(posture):
 
 
 @pytest.mark.parametrize(
-    ("posture", "said"),
+    "posture, said",
     [
         ([0.0, 0.0], "found 2; allowed: 3"),
         ([0.0, 0.0, np.nan], "a joint position is out of range"),

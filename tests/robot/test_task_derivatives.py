@@ -47,7 +47,7 @@ def by_joint(function, q, h=1e-5):
     )
 
 
-@pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
+@pytest.mark.parametrize("pattern, plane, rows", CASES, ids=str)
 def test_jacobian(pattern, plane, rows):
     task_map, q, _, _ = case(pattern, plane, rows)
     exact = jacobian_at(task_map, q)
@@ -55,7 +55,7 @@ def test_jacobian(pattern, plane, rows):
     assert_allclose(exact, by_joint(task_map.values, q), atol=1e-9)
 
 
-@pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
+@pytest.mark.parametrize("pattern, plane, rows", CASES, ids=str)
 def test_bias_is_the_acceleration_at_constant_joint_velocity(pattern, plane, rows):
     task_map, q, qdot, _ = case(pattern, plane, rows)
     h = 1e-4
@@ -87,7 +87,7 @@ def check_derivatives(task_map, q, qdot, qddot):
         assert np.abs(derivative).max() > 0.1
 
 
-@pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
+@pytest.mark.parametrize("pattern, plane, rows", CASES, ids=str)
 def test_derivatives(pattern, plane, rows):
     check_derivatives(*case(pattern, plane, rows))
 

@@ -96,7 +96,7 @@ def test_rows_that_make_no_sense(scara, rows):
 
 
 @pytest.mark.parametrize(
-    ("rows", "found", "hint"),
+    "rows, found, hint",
     [
         (["x", "z", "yaw"], "with j1, j2, j3 about other axes", "[x, z, pitch]"),
         (["roll"], "[roll], with j1, j2, j3", "task_space: [pitch]"),

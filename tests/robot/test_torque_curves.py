@@ -42,7 +42,7 @@ def test_a_curve_is_torque_limit_enough():
 
 
 @pytest.mark.parametrize(
-    ("curve", "where", "said"),
+    "curve, where, said",
     [
         ("[[0.0, 50.0]]", "robot: limits.torque_speed.j1", "at least 2"),
         ("[[0.5, 50.0], [1.0, 20.0]]", "robot.limits.torque_speed.j1", "begin at 0"),

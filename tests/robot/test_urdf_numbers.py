@@ -40,7 +40,7 @@ def replace_once(old, new, text=TEXT):
     "bad", ["nan", "inf", "-Infinity", "1e999", "", "1_0", "0x1", "five"]
 )
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    "old, new, words",
     [
         ('xyz="0.21 0.02 0.01"', 'xyz="0.21 {} 0.01"', "link 'link1': <origin xyz>"),
         ('rpy="0.1 0.2 0.3"', 'rpy="{} 0.2 0.3"', "link 'link1': <origin rpy>"),
@@ -64,7 +64,7 @@ def test_what_is_no_finite_number_is_refused_with_its_place(old, new, words, bad
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "unit"),
+    "old, new, unit",
     [
         ('value="2.0"', 'value="1,5"', "a finite number of at most 1e+12 in size, kg"),
         ('value="2.0"', 'value="1e13"', "at most 1e+12 in size, kg"),
@@ -179,7 +179,7 @@ def test_the_error_names_xacro():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    "old, new, words",
     [
         (
             "<link name='link2'>",

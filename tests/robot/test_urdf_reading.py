@@ -98,7 +98,7 @@ AT_TOOL = {"elements": GRIPPER, "tool_frame": "tool"}
 
 
 @pytest.mark.parametrize(
-    ("joints", "options", "kind", "message"),
+    "joints, options, kind, message",
     [
         (
             [TURN],
@@ -269,7 +269,7 @@ def inertial(mass, moments):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text, words",
     [
         ("", "found 0 kg in the links that are moved by j2 (tool, link2);"),
         (
@@ -336,7 +336,7 @@ def test_locked_joint_on_the_chain():
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text, words",
     [
         ("<robot name='x'><link name='a'>", "not well-formed XML"),
         (

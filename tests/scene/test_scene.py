@@ -288,7 +288,7 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
 
 
 @pytest.mark.parametrize(
-    ("body", "message"),
+    "body, message",
     [
         ("{box: [1, 1, 1], sphere: 1.0}", "exactly one shape"),
         ("name: post", "exactly one shape"),

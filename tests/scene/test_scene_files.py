@@ -143,7 +143,7 @@ def test_an_srdf_disables_pairs(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("scene", "says"),
+    "scene, says",
     [
         ({"fil": "cell.yaml"}, r"allowed: a list.*file: cell.yaml"),
         ({"file": "absent.yaml"}, r"absent.yaml"),
@@ -157,7 +157,7 @@ def test_a_wrong_scene_is_an_error(scene, says):
 
 
 @pytest.mark.parametrize(
-    ("changes", "where"),
+    "changes, where",
     [
         ("scene: [{name: post, box: [100, 100, 1200]}]", "scene: post"),
         ("scene: [{name: a, sphere: 0.1, position: [400, 0, 0]}]", "scene: a"),
@@ -242,7 +242,7 @@ def test_a_cell_is_read_from_a_urdf(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    "text, message",
     [
         (
             CELL.replace('"b" type="fixed"', '"b" type="revolute"'),
@@ -325,7 +325,7 @@ def test_a_mesh_file_is_not_read_if_it_is_too_large(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("count", "what"), [(1650, "pairs that keep apart"), (4001, "bodies")]
+    "count, what", [(1650, "pairs that keep apart"), (4001, "bodies")]
 )
 def test_more_bodies_than_a_plan_has_memory_for_are_errors(count, what):
     bodies = [{"sphere": 0.01, "position": [4.0, 0.0, 0.01 * i]} for i in range(count)]

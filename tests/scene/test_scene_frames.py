@@ -115,7 +115,7 @@ def test_a_cell_from_a_file_stands_in_a_frame(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("keys", "message"),
+    "keys, message",
     [
         (
             "frames: {table: {xyz: [0.5, -0.2, 0.3], rpy_deg: [20.0, -35.0, 110.0]}}",

@@ -75,7 +75,7 @@ def test_of_other_task_spaces(space):
 
 
 @pytest.mark.parametrize(
-    ("changes", "reason"),
+    "changes, reason",
     [
         ({"path": Line(by=[-3.0, -0.1])}, "cannot be brought onto the path"),
         ({"path": Line(by=[0.0, 0.6]), "redundant_joints": ["j1"]}, ""),

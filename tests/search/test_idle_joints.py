@@ -91,7 +91,7 @@ def test_limits_and_friction_by_joint_hold_for_the_others():
 
 
 @pytest.mark.parametrize(
-    ("robot", "rows", "idle"),
+    "robot, rows, idle",
     [
         ("gantry2", ["x"], 1),
         ("ur10_rail", ["x", "y", "z"], 1),

@@ -199,7 +199,7 @@ def test_a_free_start_that_no_torque_holds_says_so():
     assert "the torque limit of j1 cannot hold the arm against gravity" in end.cause
 
 
-@pytest.mark.parametrize(("turns", "joints"), [(4, ["j1"]), (30, ["j2"]), (30, ["j3"])])
+@pytest.mark.parametrize("turns, joints", [(4, ["j1"]), (30, ["j2"]), (30, ["j3"])])
 def test_small_circles_have_stations_enough(turns, joints):
     path = [{"circle": {"center": [0.0, 0.0], "turns": turns}}]
     line_problem = problem(

@@ -36,7 +36,7 @@ def plan_pair(bench, tmp_path_factory):
     )
 
 
-@pytest.mark.parametrize(("words", "number"), PAIRS)
+@pytest.mark.parametrize("words, number", PAIRS)
 def test_the_plan_of_the_easier_task_is_not_slower(bench, plan_pair, words, number):
     pair = plan_pair(words, number)
     assert np.isfinite(pair.end_times).all(), pair.messages

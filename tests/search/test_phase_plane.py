@@ -92,7 +92,7 @@ def test_a_given_speed_with_its_run_up_and_run_out():
     assert phase_plane.least_time(problem, s, q) == pytest.approx(sum(expected))
 
 
-@pytest.mark.parametrize(("velocity", "is_possible"), [(0.2, True), (0.19, False)])
+@pytest.mark.parametrize("velocity, is_possible", [(0.2, True), (0.19, False)])
 def test_a_given_speed_that_the_limits_do_not_allow(velocity, is_possible):
     content = {"tool_limits": {"process_speed": {"speed": 0.2, "s": [0.2, 0.6]}}}
     problem, s, q = slide(content, acceleration=3.0, velocity=velocity)

@@ -70,7 +70,7 @@ def without_times(result):
 
 
 @pytest.mark.parametrize(
-    ("changes", "choices"),
+    "changes, choices",
     [
         ({}, {()}),
         (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}),
@@ -186,7 +186,7 @@ def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_pat
 
 
 @pytest.mark.parametrize(
-    ("changes", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
+    "changes, lattices", [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
 )
 def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
     monkeypatch, changes, lattices
@@ -300,7 +300,7 @@ def test_the_time_limit_gives_the_best_motion_so_far(clock):
 
 
 @pytest.mark.parametrize(
-    ("changes", "solved", "remark"),
+    "changes, solved, remark",
     [
         ({}, 1, "of 2 candidates, 1 remained untried"),
         (BRANCH, 2, "of 5 candidates, 3 remained untried, 1 remained unfinished"),

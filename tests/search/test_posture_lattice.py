@@ -152,7 +152,7 @@ COARSE = {"cells_per_turn": 24, "density": 0.2}
 RANGE = {"position": {"j1": [START[0] - 7.0, START[0] + 13.0]}}
 
 
-@pytest.mark.parametrize(("turns", "reached"), [(1, True), (0, False), (2, False)])
+@pytest.mark.parametrize("turns, reached", [(1, True), (0, False), (2, False)])
 def test_the_end_is_reached_in_its_own_turn(turns, reached):
     """Once round the base, so far from it that no other joint can turn in place of the first."""
     end = START + TURN * turns * np.eye(3)[0]
@@ -166,7 +166,7 @@ def test_the_end_is_reached_in_its_own_turn(turns, reached):
         assert_array_equal(joint_path.q[0], START)
 
 
-@pytest.mark.parametrize(("turns", "reached"), [(0, True), (2, True), (-1, False)])
+@pytest.mark.parametrize("turns, reached", [(0, True), (2, True), (-1, False)])
 def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
     """Back from the end: the free start is a turn before it, where that is within the range."""
     robot = scara(RANGE)
@@ -238,7 +238,7 @@ def test_no_layer_is_begun_after_the_deadline():
 
 
 @pytest.mark.parametrize(
-    ("start", "end"),
+    "start, end",
     [
         ([-0.45, 0.77, -1.3, -1.0], [-0.24, 0.14, -0.77, 0.43]),
         ([1.02, 0.68, -0.4, -0.15, -0.4], [0.22, -0.32, 0.07, -0.83, -0.8]),

@@ -65,7 +65,7 @@ def test_work_is_shared_and_comes_back_in_order():
 
 
 @pytest.mark.usefixtures("workers")
-@pytest.mark.parametrize(("seconds", "here"), [(0.3, "123"), (0.5, "13")])
+@pytest.mark.parametrize("seconds, here", [(0.3, "123"), (0.5, "13")])
 def test_auto_shares_what_takes_long(monkeypatch, seconds, here):
     """Of three the first tells how long the others take."""
     clock = SimpleNamespace(perf_counter=partial(next, count(step=seconds)))

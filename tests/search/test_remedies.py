@@ -158,7 +158,7 @@ def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("value", "lower", "upper"),
+    "value, lower, upper",
     [(1.2345, 1.23, 1.24), (0.0098765, 0.00987, 0.00988), (1.13, 1.13, 1.13)],
 )
 def test_numbers_of_three_digits_stay(value, lower, upper):

@@ -217,7 +217,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(
-    ("content", "expected"), MISTAKES, ids=[content[:40] for content, _ in MISTAKES]
+    "content, expected", MISTAKES, ids=[content[:40] for content, _ in MISTAKES]
 )
 def test_wrong_files(content, expected):
     Path("poses.csv").write_text(content, encoding="utf-8")
@@ -305,7 +305,7 @@ AXES = [
 ]
 
 
-@pytest.mark.parametrize(("rows", "message"), AXES)
+@pytest.mark.parametrize("rows, message", AXES)
 def test_the_error_names_wrong_axes(rows, message):
     Path("poses.csv").write_text(f"x,y,z,i,j,k\n0,0,0,{rows}\n")
     with pytest.raises(TaskError, match=message):
@@ -380,7 +380,7 @@ AMBIGUOUS = [
 ]
 
 
-@pytest.mark.parametrize(("header", "keys", "message"), AMBIGUOUS)
+@pytest.mark.parametrize("header, keys, message", AMBIGUOUS)
 def test_the_error_says_what_an_orientation_leaves_open(header, keys, message):
     write(header, np.arange(2.0 * len(header.split(","))).reshape(2, -1))
     with pytest.raises(TaskError, match=message):

@@ -36,7 +36,7 @@ def test_keys_fill_absent_and_null_mappings():
 
 
 @pytest.mark.parametrize(
-    ("key", "expected"),
+    "key, expected",
     [
         ("path.2.line", ["path is a list of 2", "allowed: 0 to 1"]),
         ("path.last", ["path.last", "allowed: 0 to 1"]),
@@ -55,7 +55,7 @@ def test_ways_that_lead_nowhere(key, expected):
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    "text, expected",
     [
         ("spline.intervals=40", ("spline.intervals", 40)),
         ("robot.limits.velocity = null", ("robot.limits.velocity", None)),
@@ -70,7 +70,7 @@ def test_values_are_yaml(text, expected):
 
 
 @pytest.mark.parametrize(
-    ("value", "found"),
+    "value, found",
     [
         ("[30, 0.12]", "a list: put it before each number that has this unit"),
         ("{j1: 30}", "a mapping: put it before each number that has this unit"),

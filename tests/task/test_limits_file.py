@@ -83,7 +83,7 @@ def test_a_program_reads_the_file_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    "changes, message",
     [
         ("brachis_limits: 2", "limits.yaml: brachis_limits"),
         ("brachis_limits: true", "brachis_limits: the version.*found true"),
@@ -225,7 +225,7 @@ def test_a_file_of_universal_robots_is_read(robot_beside, names):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    "changes, words",
     [
         (("  j2:", "  j1:"), ["line 14, column 3", "the key 'j1' occurs twice"]),
         (

@@ -152,7 +152,7 @@ def test_a_table_in_place_of_numbers_is_named_by_its_type():
 
 
 @pytest.mark.parametrize(
-    ("value", "share"),
+    "value, share",
     [("1 %", 0.01), ("0.5%", 0.005), ("100 %", 1.0), (0.02, 0.02), (0, 0.0)],
 )
 def test_a_share_is_a_fraction_or_a_percentage(value, share):
@@ -162,7 +162,7 @@ def test_a_share_is_a_fraction_or_a_percentage(value, share):
 
 
 @pytest.mark.parametrize(
-    ("part", "key", "value", "share"),
+    "part, key, value, share",
     [
         ("spline", "tolerance", "1 %", 0.01),
         ("spline", "shortest_interval", "5 %", 0.05),
@@ -397,7 +397,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), MISTAKES)
+@pytest.mark.parametrize("change, message", MISTAKES)
 def test_the_error_names_the_key_the_value_and_the_alternatives(change, message):
     with pytest.raises(TaskError, match=message) as caught:
         load_task(minimal(**yaml.safe_load(change)))
@@ -446,7 +446,7 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    "text, expected",
     [
         ("brachis: 1\nstart: [1, 2", ["line 2, column ", "not valid YAML"]),
         (
@@ -539,7 +539,7 @@ def test_the_loader_leaves_the_mapping_as_it_is():
 
 
 @pytest.mark.parametrize(
-    ("key", "word"),
+    "key, word",
     [("start.joints", "home"), ("search.effort", "for"), ("path_start", "home")],
 )
 def test_suggestions_are_no_words_of_a_sentence(key, word):

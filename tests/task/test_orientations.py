@@ -193,7 +193,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("segment", "message"), MISTAKES)
+@pytest.mark.parametrize("segment, message", MISTAKES)
 def test_the_error_names_the_key_the_value_and_the_alternatives(segment, message):
     with pytest.raises(TaskError, match=message) as caught:
         task(yaml.safe_load(segment))
@@ -253,7 +253,7 @@ WRONG_STARTS = [
 ]
 
 
-@pytest.mark.parametrize(("path_start", "space", "message"), WRONG_STARTS)
+@pytest.mark.parametrize("path_start, space, message", WRONG_STARTS)
 def test_the_error_says_what_is_wrong_with_the_start_of_a_path(
     path_start, space, message
 ):

@@ -166,7 +166,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("keys", "message"), WRONG)
+@pytest.mark.parametrize("keys, message", WRONG)
 def test_the_error_names_the_mistake(keys, message):
     write(1e3 * bent(900, 0.005 * MM)[0])
     with pytest.raises(TaskError, match=message):
@@ -184,7 +184,7 @@ def test_a_turn_cannot_go_on_over_corners():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "change, message",
     [
         (
             np.nan,

@@ -30,7 +30,7 @@ def test_a_dwell_is_a_stop():
 
 
 @pytest.mark.parametrize(
-    ("keys", "where", "said"),
+    "keys, where, said",
     [
         ("{stop: true, blend: 0.01}", "blend", "so its corner is not rounded"),
         ("{dwell: 0.5, blend: 0.01}", "blend", "so its corner is not rounded"),

@@ -105,7 +105,7 @@ def test_the_schema_tells_an_editor_what_keys_mean():
 
 
 @pytest.mark.parametrize(
-    ("key", "unit"),
+    "key, unit",
     [
         ("robot.payload.mass", "kg"),
         ("robot.payload.com.2", "m"),

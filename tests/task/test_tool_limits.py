@@ -16,7 +16,7 @@ path: [{line: {by: [1.2, 0.0]}}]
 
 
 @pytest.mark.parametrize(
-    ("tool", "where", "said"),
+    "tool, where, said",
     [
         (
             "process_speed: {speed: 0.1, s: [0.6, 0.3]}",

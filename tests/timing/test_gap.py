@@ -59,7 +59,7 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
 
 
 @pytest.mark.parametrize(
-    ("part", "where"),
+    "part, where",
     [
         ((0.2, 0.31), "mostly at s = 0.2 to 0.31;"),
         ((0.0, 1.0), "along the whole path;"),
@@ -72,7 +72,7 @@ def test_the_warning_says_where_time_is_lost(part, where):
 
 
 @pytest.mark.parametrize(
-    ("intervals", "advice"),
+    "intervals, advice",
     [(8, "set spline.intervals: auto"), ("auto", "raise search.time_limit")],
 )
 def test_automatic_intervals_are_not_advised_where_they_are_set(intervals, advice):

@@ -154,7 +154,7 @@ def true_worst_torque(trajectory, pieces=slice(None), places=100):
 
 @pytest.mark.parametrize("joint", range(3))
 @pytest.mark.parametrize(
-    ("gap", "by"), [(1e-6, 5e-10), (1e-7, 5e-12), (1e-5, 1e-9), (1e-4, 2e-8)]
+    "gap, by", [(1e-6, 5e-10), (1e-7, 5e-12), (1e-5, 1e-9), (1e-4, 2e-8)]
 )
 def test_nodes_close_together_that_disagree(planned, gap, by, joint):
     """Two nodes `gap` seconds apart disagree by `by` rad.
@@ -171,7 +171,7 @@ def test_nodes_close_together_that_disagree(planned, gap, by, joint):
 
 
 @pytest.mark.parametrize("joint", range(3))
-@pytest.mark.parametrize(("name", "by"), [("qdot", 1e-5), ("qddot", 1e-2)])
+@pytest.mark.parametrize("name, by", [("qdot", 1e-5), ("qddot", 1e-2)])
 def test_nodes_that_are_a_little_off(planned, name, by, joint):
     assert failing_checks(with_entry(planned, name, (MIDDLE, joint), by))
 

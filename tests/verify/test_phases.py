@@ -102,9 +102,7 @@ def test_a_motion_in_a_dwell():
     assert not failed & {"velocity at stops", "path error"}
 
 
-@pytest.mark.parametrize(
-    ("factor", "passes"), [(1.0 + 5e-7, True), (1.0 + 2e-6, False)]
-)
+@pytest.mark.parametrize("factor, passes", [(1.0 + 5e-7, True), (1.0 + 2e-6, False)])
 def test_another_speed_than_the_given_one(factor, passes):
     limits = {"process_speed": {"speed": factor * SPEED, "s": [0.55, 0.85]}}
     motion = gantry_motion(tool_limits=limits)
@@ -119,7 +117,7 @@ def test_a_given_speed_that_begins_elsewhere():
 
 
 @pytest.mark.parametrize(
-    ("phase", "place", "by", "check"),
+    "phase, place, by, check",
     [
         (3, 2, 1e-5, "process speed"),  # at both ends it is as given, as is its mean
         (2, 1, -1e-6, "ds/dt below zero"),

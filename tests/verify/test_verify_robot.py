@@ -62,7 +62,7 @@ def test_a_saved_motion_passes_again(saved):
 
 
 @pytest.mark.parametrize(
-    ("change", "fault"),
+    "change, fault",
     [
         ({"payload": {**ROBOT["payload"], "mass": 2.5}}, "torque ratio"),
         ({"friction": {**ROBOT["friction"], "coulomb": [8, 6, 4]}}, "torque ratio"),

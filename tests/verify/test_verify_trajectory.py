@@ -122,7 +122,7 @@ def test_every_check_has_its_fault(planned):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
-    ("kind", "quantity"),
+    "kind, quantity",
     [("velocity", "qdot"), ("acceleration", "qddot"), ("torque", "tau")],
 )
 def test_limit(kind, quantity, sign, planned):
@@ -181,7 +181,7 @@ def test_tolerances_are_options(planned):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [('"j2"', '"elbow"'), ('type="continuous"', 'type="fixed"')]
+    "old, new", [('"j2"', '"elbow"'), ('type="continuous"', 'type="fixed"')]
 )
 def test_robot_of_other_joints_is_an_error(old, new, planned):
     place = planned.urdf.index(old)

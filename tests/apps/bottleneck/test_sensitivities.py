@@ -201,7 +201,7 @@ def test_branch_boundary_is_told_apart(scara):
 
 
 @pytest.mark.parametrize("weights", [[1.0, 1e-4], [1.0, 3e-5, 7e-5]])
-@pytest.mark.parametrize(("residual", "cost"), [(1e-6, 1e-4), (1e-3, 0.0)])
+@pytest.mark.parametrize("residual, cost", [(1e-6, 1e-4), (1e-3, 0.0)])
 def test_what_balances_less_than_the_residual_costs_nothing(weights, residual, cost):
     """Alone, or together with another row that holds alike."""
     count = len(weights)

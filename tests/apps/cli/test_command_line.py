@@ -82,7 +82,7 @@ def test_help_of_plot_lists_every_figure(run):
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
+    "words, expected",
     [("brachis pl", ["plan", "plot"]), ("brachis plan --s", ["--set", "--strict"])],
 )
 def test_completion(words, expected):
@@ -119,7 +119,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("command", "message"), WRONG)
+@pytest.mark.parametrize("command, message", WRONG)
 @pytest.mark.parametrize("option", ["", " --json"])
 def test_a_wrong_command_line_is_one_error(
     command, message, option, run, tmp_path, monkeypatch

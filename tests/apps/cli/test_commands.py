@@ -181,7 +181,7 @@ def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
         assert data["verification"]["path_error"] is None
 
 
-@pytest.mark.parametrize(("time_scaled", "is_said"), [(1.0, False), (1.00004, True)])
+@pytest.mark.parametrize("time_scaled, is_said", [(1.0, False), (1.00004, True)])
 def test_a_plan_says_by_how_much_its_end_time_is_longer(
     run, task, write, monkeypatch, time_scaled, is_said
 ):
@@ -199,7 +199,7 @@ def test_a_plan_says_by_how_much_its_end_time_is_longer(
 
 
 @pytest.mark.parametrize(
-    ("search", "choices", "name"),
+    "search, choices, name",
     [
         ("effort: fast", {()}, "chart"),
         ("{guesses: numeric, least_motion: false}", {("j1",), ("j2",), ("j3",)}, "j2"),
@@ -375,7 +375,7 @@ def test_inspect_of_a_task_shows_gravity_postures_and_path(run):
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    "change, words",
     [
         ("start.joints.1=9", "'shoulder_pan_joint' is out of its range; found 9 rad"),
         ("end={joints: [0, 1, -1.3, 1.9, -2.1, -1.4, 0]}", "end posture is off the"),

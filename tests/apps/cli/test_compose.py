@@ -86,7 +86,7 @@ def test_every_figure_of_a_rail_is_required_by_the_command(run, tmp_path, missin
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    "options, message",
     [
         ("--mass -1", "mass: this value is not valid; found -1.0"),
         ("--mount-rpy-deg nan 0 0", "mount_rpy: this value is not valid"),

@@ -66,7 +66,7 @@ def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
 
 
 @pytest.mark.parametrize(
-    ("robot", "joints"),
+    "robot, joints",
     [
         ("tx90l_rail", ["rail", "joint_1", "joint_2", "joint_3"]),
         (

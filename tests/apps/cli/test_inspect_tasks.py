@@ -35,7 +35,7 @@ def place_of(run, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("options", "frame"), [((), pin.SE3.Identity()), (("--frame", "user1"), None)]
+    "options, frame", [((), pin.SE3.Identity()), (("--frame", "user1"), None)]
 )
 def test_every_convention_says_the_same_place(run, tmp_path, options, frame):
     if frame is None:

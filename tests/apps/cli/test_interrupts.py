@@ -42,7 +42,7 @@ def brachis(where, how, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("where", "how"),
+    "where, how",
     [
         ("brachis.apps.cli.main", "swallowed"),
         ("rich.console", "raised"),

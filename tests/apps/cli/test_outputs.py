@@ -101,7 +101,7 @@ REFUSED_AT_ONCE = [
 ]
 
 
-@pytest.mark.parametrize(("command", "message"), REFUSED_AT_ONCE)
+@pytest.mark.parametrize("command, message", REFUSED_AT_ONCE)
 def test_a_wrong_output_is_an_error_before_any_work(
     command, message, error_of, saved, tmp_path, monkeypatch
 ):

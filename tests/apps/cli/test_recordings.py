@@ -66,7 +66,7 @@ def test_compare(run, recording, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    "options, message",
     [
         (("--angle", "grad"), "there is no unit of angle named 'grad'; allowed: rad"),
         (("--angle", "deg", "--task-space", "yaw,x,y"), "yaw"),

@@ -44,7 +44,7 @@ def test_each_part_of_a_wide_table_fits_and_repeats_the_first_column():
     assert text.count("first") == text.count("title") == 3
 
 
-@pytest.mark.parametrize(("width", "has_lines"), [(50, True), (49, False)])
+@pytest.mark.parametrize("width, has_lines", [(50, True), (49, False)])
 def test_lines_go_before_numbers_are_cut(width, has_lines):
     names = ("", "value", "other", "remark")
     row = ("first", "123456.789012", "234567.890123", "of a few short words")

@@ -40,7 +40,7 @@ WRONG_TASKS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), WRONG_TASKS)
+@pytest.mark.parametrize("change, message", WRONG_TASKS)
 def test_a_wrong_task_is_an_error_and_nothing_is_written(
     change, message, run, task, write, tmp_path
 ):
@@ -131,7 +131,7 @@ def test_json_has_the_error_and_its_exit_code(run, task, write, tmp_path, monkey
 
 
 @pytest.mark.parametrize(
-    ("command", "message"),
+    "command, message",
     [
         ("plan scara3", "scara3: this is the name of a robot, not of a task file"),
         ("plan scara4", "there is no robot named 'scara4'"),

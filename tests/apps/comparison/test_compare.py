@@ -134,7 +134,7 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
     assert highest == pytest.approx(use.recorded_up_to, rel=0.02)
 
 
-@pytest.mark.parametrize(("factor", "is_doubted"), [(2.0, False), (1000.0, True)])
+@pytest.mark.parametrize("factor, is_doubted", [(2.0, False), (1000.0, True)])
 def test_a_remark_doubts_a_recorded_motion_far_faster_than_its_limits_allow(
     both_motions, factor, is_doubted
 ):

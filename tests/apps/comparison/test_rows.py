@@ -37,9 +37,7 @@ def worst(trajectory, kind):
     return ratios[kind]
 
 
-@pytest.mark.parametrize(
-    ("digits", "dt"), [(4, 0.008), (5, 0.004), (4, 0.02), (12, 0.004)]
-)
+@pytest.mark.parametrize("digits, dt", [(4, 0.008), (5, 0.004), (4, 0.02), (12, 0.004)])
 def test_rows_of_a_motion_at_its_limit_prove_no_more(digits, dt, tmp_path):
     """The spline through rounded rows overshoots, and fails its verification; that proves nothing."""
     trajectory = import_rows(tmp_path, digits, dt, "acceleration", 1.0)
@@ -51,7 +49,7 @@ def test_rows_of_a_motion_at_its_limit_prove_no_more(digits, dt, tmp_path):
         assert checks["acceleration ratio"] > 1.05
 
 
-@pytest.mark.parametrize(("digits", "dt"), [(4, 0.02), (6, 0.008), (12, 0.004)])
+@pytest.mark.parametrize("digits, dt", [(4, 0.02), (6, 0.008), (12, 0.004)])
 def test_rows_of_a_motion_beyond_its_limit_prove_it(digits, dt, tmp_path):
     trajectory = import_rows(tmp_path, digits, dt, "acceleration", 1.4)
     assert 1.2 < worst(trajectory, "acceleration")[0] <= 1.4 + 1e-9

@@ -73,7 +73,7 @@ def test_the_error_of_one_joint_is_found_in_its_place(planned, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("profile", "message"),
+    "profile, message",
     [
         ("abb_egm_4ms", "the position of 'J1' is missing"),
         ("kuka_rsi_4m", "Did you mean"),

@@ -33,7 +33,7 @@ def anywhere(robot, count):
     return np.random.default_rng(0).uniform(lower, upper, (count, robot.n))
 
 
-@pytest.mark.parametrize(("name", "joints"), JOINTS.items())
+@pytest.mark.parametrize("name, joints", JOINTS.items())
 def test_their_drives_can_hold_them(name, joints):
     robot = load(name)
     assert robot.n == joints

@@ -118,7 +118,7 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    "options, message",
     [
         ({"dt": 0.001}, "no other period; found 0.001 s; allowed: 0.004 s"),
         ({"form": "json"}, "no such format; found json; allowed: csv, program"),

@@ -167,9 +167,7 @@ def simulate(times, nodes, rests, t):
     return nodes[0] + np.vstack([np.zeros_like(nodes[:1]), np.cumsum(steps, axis=0)])
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "late"), [(1e-3, 0.01), (1e-4, 0.05), (0.01, 0.003)]
-)
+@pytest.mark.parametrize("tolerance, late", [(1e-3, 0.01), (1e-4, 0.05), (0.01, 0.003)])
 def test_the_deviation_is_that_of_a_simulation(tolerance, late, seam, tmp_path):
     options = {"tolerance": tolerance, "time_tolerance": late}
     text, report = write(seam, "abb_egm_4ms", tmp_path, **options)

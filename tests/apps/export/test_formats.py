@@ -294,7 +294,7 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "parameters", "told"),
+    "name, parameters, told",
     [
         (
             "motion.txt",

@@ -58,7 +58,7 @@ def test_a_plan_that_was_not_found_is_said_and_a_missing_row_is_a_gap():
 
 
 @pytest.mark.parametrize(
-    ("rows", "message", "where"),
+    "rows, message, where",
     [
         ([], "the list of rows is empty", "rows"),
         ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "the row is not valid", "rows[1]"),

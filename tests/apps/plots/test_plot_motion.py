@@ -71,7 +71,7 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
 
 
 @pytest.mark.parametrize(
-    ("kind", "name", "panel"), [("position", "q", 0), ("velocity", "qdot", 1)]
+    "kind, name, panel", [("position", "q", 0), ("velocity", "qdot", 1)]
 )
 def test_limits_that_differ_by_direction_have_two_lines(
     line_trajectory, with_limits, kind, name, panel

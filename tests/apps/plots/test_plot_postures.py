@@ -69,7 +69,7 @@ KINDS = {"turn": "revolute", "slide": "prismatic"}
 
 
 @pytest.mark.parametrize(
-    ("joints", "axes", "plane"),
+    "joints, axes, plane",
     [
         ("turn z, turn z", (0, 1), (0, 1)),
         ("turn z, turn z", (1, 0), (0, 1)),

@@ -24,7 +24,7 @@ def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
 
 
 @pytest.mark.parametrize(
-    ("header", "units", "factors"),
+    "header, units, factors",
     [
         ("time,q_j1,q_j2,q_j3", {}, (1.0, 1.0)),
         ("Time [ms],J1_pos [deg],J2_pos [deg],J3_pos [deg]", {}, (1e3, 180.0 / np.pi)),
@@ -90,7 +90,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
 
 
 @pytest.mark.parametrize(
-    ("header", "change", "told"),
+    "header, change, told",
     [
         (
             "t,j1,j2,j4",

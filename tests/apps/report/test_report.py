@@ -287,7 +287,7 @@ def test_angles_may_be_in_degrees_and_lengths_stay(rail):
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")]
+    "module, name", [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")]
 )
 def test_the_error_names_the_package_to_install(module, name, planar, monkeypatch):
     _plotly.cache_clear()

@@ -59,7 +59,7 @@ def test_robots_that_come_along(name, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "slides"), [("tx90l_rail", 1), ("ur10_rail", 1), ("gen3_rails", 2)]
+    "name, slides", [("tx90l_rail", 1), ("ur10_rail", 1), ("gen3_rails", 2)]
 )
 def test_an_arm_on_a_rail_begins_away_from_its_own_singularities(name, slides):
     robot, space = bind(getattr(brachis.robots, name), "pose")
@@ -146,7 +146,7 @@ def test_a_warning_names_masses_in_g_without_a_motion(urdf):
 
 
 @pytest.mark.parametrize(
-    ("name", "frame"), [("iiwa14", "link_1"), ("iiwa14", "link_2"), ("scara3", "link1")]
+    "name, frame", [("iiwa14", "link_1"), ("iiwa14", "link_2"), ("scara3", "link1")]
 )
 def test_a_frame_that_only_turns_on_the_spot_is_an_error(name, frame):
     with pytest.raises(InputError, match=r"only rotates on the spot.*Choose another"):

@@ -113,7 +113,7 @@ def test_plans_that_wait_are_cancelled_with_the_sweep():
 
 
 @pytest.mark.parametrize(
-    ("jobs", "executor", "expected"),
+    "jobs, executor, expected",
     [
         (0, None, "jobs: out of range; found 0; allowed: a whole number >= 1"),
         (2, ThreadPoolExecutor(1), "jobs or executor"),

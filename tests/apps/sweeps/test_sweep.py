@@ -176,7 +176,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
 
 @pytest.mark.usefixtures("nothing_runs")
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "change, message",
     [
         (
             "grid: {path.0.line.lenght: [1, 2]}",

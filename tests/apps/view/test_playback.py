@@ -4,7 +4,7 @@ from brachis.apps.view.panel import RATES, Playback, first_rate
 
 
 @pytest.mark.parametrize(
-    ("t_end", "rate"),
+    "t_end, rate",
     [(10.0, 1.0), (3.0, 1.0), (2.0, 0.5), (0.4, 0.1), (0.001, RATES[0])],
 )
 def test_a_short_motion_is_slow_at_first(t_end, rate):

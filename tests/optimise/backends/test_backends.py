@@ -48,7 +48,7 @@ def solve(name, problem, x, options=OPTIONS, progress=None):
 
 
 @pytest.mark.parametrize(
-    ("make", "start", "optimum", "multipliers"),
+    "make, start, optimum, multipliers",
     [
         (disc, [4.0, 0.5], [1.0, 1.0], [-0.25]),
         (corner, [0.0, 0.0], [3.0, 1.0], [1.0 / 3.0, 2.0 / 3.0]),
@@ -200,7 +200,7 @@ def test_solvers_print_nothing(name, make, capfd):
 
 
 @pytest.mark.parametrize(
-    ("is_installed", "interior"), [(True, "ipopt"), (False, "uno_interior")]
+    "is_installed, interior", [(True, "ipopt"), (False, "uno_interior")]
 )
 def test_registry(is_installed, interior, monkeypatch):
     module = ModuleType("ipyopt")
@@ -222,7 +222,7 @@ def test_registry(is_installed, interior, monkeypatch):
 
 # Python's max passes over NaN.
 @pytest.mark.parametrize(
-    ("problem", "x", "expected"),
+    "problem, x, expected",
     [
         (disc(), [3.0, 1.0], 0.0),
         (disc(), [0.0, 1.0], 5.0),
@@ -257,7 +257,7 @@ def rows_of(bad):
 
 
 @pytest.mark.parametrize(
-    ("changes", "x"),
+    "changes, x",
     [
         ({}, np.nan),
         ({}, np.inf),
@@ -304,7 +304,7 @@ def test_an_answer_does_not_depend_on_what_the_process_solved_before():
 
 
 @pytest.mark.parametrize(
-    ("left", "is_lost"), [(0.995, True), (0.9, False)], ids=["creeps", "gains"]
+    "left, is_lost", [(0.995, True), (0.9, False)], ids=["creeps", "gains"]
 )
 def test_a_restoration_that_creeps_far_beyond_a_limit_is_given_up(left, is_lost):
     """Uno's callback: multiplier of the objective 0 in a restoration, violation, stationarity."""

@@ -37,7 +37,7 @@ def test_the_error_names_the_row_of_a_spike(scatter):
         spikes(position)
 
 
-@pytest.mark.parametrize(("count", "scatter"), [(300, 0.0), (10_000, 0.05 * MM)])
+@pytest.mark.parametrize("count, scatter", [(300, 0.0), (10_000, 0.05 * MM)])
 def test_corners_are_no_spikes_and_spikes_beside_them_are(count, scatter):
     position = bent(count, scatter)[0]
     spikes(position)

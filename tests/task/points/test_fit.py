@@ -27,7 +27,7 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("count", "scatter", "allowed"), CASES)
+@pytest.mark.parametrize("count, scatter, allowed", CASES)
 def test_all_points_are_within_the_tolerance(count, scatter, allowed):
     position = wave(count, scatter * MM)
     (curve,), report = fit_curves(points(position), tolerance(allowed * MM))
@@ -77,7 +77,7 @@ def test_orientations_are_fitted_too():
 
 
 @pytest.mark.parametrize(
-    ("count", "scatter", "allowed"),
+    "count, scatter, allowed",
     [(31, 0.0, 0.05), (300, 0.0, 0.05), (2_000, 0.005, 0.05), (10_000, 0.05, 0.3)],
 )
 def test_corners_are_found_where_they_are(count, scatter, allowed):

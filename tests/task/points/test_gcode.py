@@ -60,7 +60,7 @@ def test_units_planes_and_increments():
     )
 
 
-@pytest.mark.parametrize(("motion", "side"), [("G2", 1.0), ("G3", -1.0)])
+@pytest.mark.parametrize("motion, side", [("G2", 1.0), ("G3", -1.0)])
 def test_whole_circles_and_long_arcs(motion, side):
     """In the plane G17, clockwise as seen from above: G2 goes from the left over the top."""
     circle, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X0 Y0 I10 J0 F100\n")
@@ -144,7 +144,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("text", "message"), MISTAKES)
+@pytest.mark.parametrize("text, message", MISTAKES)
 def test_the_error_names_the_mistake(text, message):
     with pytest.raises(TaskError, match=message):
         points_of(text)

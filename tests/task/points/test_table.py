@@ -18,7 +18,7 @@ def read(text, rows="pose", units=None, orientation=None):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    "text, told",
     [
         ("x,y,z\n1.5,2,3\n4,5,6\n", ()),
         (
@@ -113,7 +113,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("text", "units", "message"), MISTAKES)
+@pytest.mark.parametrize("text, units, message", MISTAKES)
 def test_the_error_names_the_mistake(text, units, message):
     with pytest.raises(
         TaskError, match=f"a.csv: {message}" if message.startswith("line") else message
