@@ -153,3 +153,9 @@ def test_degrees_and_mm_are_named_in_the_header(turn, tmp_path):
     np.testing.assert_allclose(
         rows[:, 9], np.degrees(turn.velocity(rows[:, 0])[:, 1]), atol=1e-9
     )
+
+
+def test_ros_2_refuses_degrees(turn, tmp_path):
+    with pytest.raises(InputError, match="takes rad and m; found m, deg"):
+        brachis.export.write(turn, tmp_path / "run.yaml", degrees=True)
+    assert not (tmp_path / "run.yaml").exists()

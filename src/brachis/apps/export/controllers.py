@@ -23,6 +23,12 @@ def message_of(rows: JointRows) -> dict[str, Any]:
     ``effort`` stays empty: `joint_trajectory_controller` refuses trajectories that have it where no joint is driven by
     effort. Times are whole nanoseconds.
     """
+    if not {"rad", "m"}.issuperset(rows.units):
+        raise InputError(
+            "JointTrajectory takes rad and m",
+            where="units",
+            found=", ".join(dict.fromkeys(rows.units)),
+        )
     points = []
     samples = rows.samples
     for k, t in enumerate(samples.t.tolist()):
