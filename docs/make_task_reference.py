@@ -1,4 +1,4 @@
-"""Generate docs/task_files.md from the task models: ``python docs/make_task_reference.py``."""
+"""Generate docs/task_files.md and docs/profiles.md from the models: ``python docs/make_task_reference.py``."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from brachis.apps.controller import Language, Profile
+from brachis.apps.controller.profile import Axis, AxisGroup
 from brachis.task import (
     FrictionSettings,
     LimitSpec,
@@ -50,6 +52,7 @@ from brachis.task.settings import (
 )
 
 PAGE = Path(__file__).parent / "task_files.md"
+PROFILES = Path(__file__).parent / "profiles.md"
 
 LIMITS = dataclass(LimitSpec)
 
@@ -324,6 +327,38 @@ For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments, incl
 positions, 4x4 matrices, SE3 objects, or positions with SciPy rotations.
 """
 
+PROFILE_INTRODUCTION = """# A profile of your own
+
+<!-- Made by docs/make_task_reference.py. -->
+
+A YAML file for `--profile`. With `extends` it states only what differs from an included profile:
+
+```yaml
+extends: fanuc_stream_8ms
+axes:
+  - {joint: joint_1}
+  - {joint: joint_2, zero: 0.1}       # J2 is 0 where joint_2 is 0.1
+  - {joint: joint_3, sign: -1}        # J3 turns against joint_3
+  - {joint: joint_4}
+  - {joint: joint_5}
+  - {joint: joint_6}
+  - {joint: rail, external: true, name: E2}
+coupled: {J3: {J2: 0}}
+limits: {velocity: [3, 3, 3, 6, 6, 9]}   # rad/s
+```
+
+An axis is sign * (joint - zero) in its unit, plus coupled multiples. The profile is in rad and m. Every joint that
+moves needs an axis. Lists replace the included ones; mappings are merged. Check signs and zeros: at the start posture,
+the controller must display the first row of the file.
+
+## Keys
+"""
+PROFILE_PARTS: dict[str, type[BaseModel]] = {
+    "axes[i]": Axis,
+    "arm, external": AxisGroup,
+    "program": Language,
+}
+
 
 def rows(*models: type, above: set[str] | None = None) -> Iterator[str]:
     """Yield one line per key: name, default, description.
@@ -402,5 +437,14 @@ def page() -> str:
     return "\n".join(parts) + "\n"
 
 
+def profile_page() -> str:
+    """Return the page of the keys of profiles."""
+    parts = [PROFILE_INTRODUCTION, *rows(Profile)]
+    for key, model in PROFILE_PARTS.items():
+        parts += [f"\n### `{key}`\n", *rows(model)]
+    return "\n".join(parts) + "\n"
+
+
 if __name__ == "__main__":
     PAGE.write_text(page())
+    PROFILES.write_text(profile_page())

@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 import brachis
+from brachis.apps.controller import bind_axes, robot_with_profile
 from brachis.task import check_robot_settings
 from support.command_line import code_of, interrupts_kept
 from support.scripts import load_script
@@ -87,7 +88,8 @@ def test_commands_run(page, clone, monkeypatch, capfd):
         with interrupts_kept():
             code = code_of(*words)
         assert code == 0, f"{line}: {capfd.readouterr().err}"
-    assert (clone / "out/motion.csv").stat().st_size > 1000
+    (motion,) = re.findall(r"out/motion\.\w+", fenced)
+    assert (clone / motion).stat().st_size > 1000
 
 
 def look(command):
@@ -320,9 +322,23 @@ def test_published_figure_lies_between_16_and_17_intervals():
 
 def test_task_reference_is_up_to_date():
     reference = load_script("docs/make_task_reference.py")
-    assert reference.PAGE.read_text() == reference.page(), (
-        "run python docs/make_task_reference.py"
-    )
+    pages = {reference.PAGE: reference.page, reference.PROFILES: reference.profile_page}
+    for path, page in pages.items():
+        assert path.read_text() == page(), "run python docs/make_task_reference.py"
+
+
+def test_the_profile_of_the_docs_fits_a_robot(tmp_path):
+    (text,) = blocks(DOCS / "profiles.md", "yaml")
+    path = tmp_path / "cell.yaml"
+    path.write_text(text)
+    profile = brachis.load_profile(path)
+    axes = bind_axes(profile, brachis.robots.tx90l_rail)
+    assert axes.names == ("J1", "J2", "J3", "J4", "J5", "J6", "E2")
+    q = np.array([[0.5, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0]])
+    expected = [[0.0, 0.0, -np.degrees(1.0), 0.0, 0.0, 0.0, 500.0]]
+    np.testing.assert_allclose(axes.encode(q), expected, atol=1e-12)
+    robot = robot_with_profile(brachis.robots.tx90l_rail, profile, axes)
+    assert list(robot.limits.velocity[1:]) <= [3, 3, 3, 6, 6, 9]
 
 
 def test_robots_say_where_their_figures_come_from():

@@ -23,6 +23,7 @@ ARM = {"kuka_rsi_4ms": "A", "abb_egm_4ms": "J", "fanuc_stream_8ms": "J"}
 RAIL = {"kuka_rsi_4ms": "E1", "abb_egm_4ms": "eax_a", "fanuc_stream_8ms": "E1"}
 
 
+@pytest.mark.filterwarnings("ignore:FANUC.*torque ratio")  # by rounding
 @pytest.mark.parametrize("profile", ARM)
 def test_a_rail_by_250_mm_and_a_joint_by_90_degrees_are_right(profile, turn, tmp_path):
     path = tmp_path / "run.csv"
@@ -33,8 +34,8 @@ def test_a_rail_by_250_mm_and_a_joint_by_90_degrees_are_right(profile, turn, tmp
     first = DEGREES.copy()
     change = np.array([90.0, 30.0, 0.0, 0.0, 0.0, 0.0])
     if profile == "fanuc_stream_8ms":  # J3 is measured from the horizontal
-        first[2] += first[1]
-        change[2] += 30.0
+        first[2] -= first[1]
+        change[2] -= 30.0
     digits = 1e-5 if profile == "fanuc_stream_8ms" else 1e-8
     np.testing.assert_allclose(rows[0, 1:], [*first, 0.0], atol=digits)
     np.testing.assert_allclose(
@@ -92,6 +93,28 @@ def test_signs_zeros_and_order_of_a_profile_of_ones_own_hold(turn, tmp_path):
     np.testing.assert_allclose(
         axes.decode(axes.encode(turn.q)), turn.q[:, axes.index], atol=1e-14
     )
+
+
+def test_the_forearm_of_a_fanuc_keeps_its_j3_while_it_stays_level(tmp_path):
+    """J2 leans forward, J3 raises the forearm: as much of both leaves it level."""
+    path = tmp_path / "cell.yaml"
+    joints = ", ".join(f"{{joint: joint_{n}}}" for n in (1, 2))
+    path.write_text(
+        f"extends: fanuc_stream_8ms\naxes: [{joints}, {{joint: joint_3, sign: -1}}]\n"
+    )
+    robot = brachis.robots.tx90l_rail
+    q = np.zeros((2, 7))
+    q[1, 2:4] = [0.4, -0.4]  # both turn about y: the forearm stays level
+    values = bind_axes(brachis.load_profile(path), robot).encode(q)
+    change = [0, np.degrees(0.4), 0]
+    np.testing.assert_allclose(values[1] - values[0], change, atol=1e-12)
+
+
+def test_a_model_without_a_coupling_says_so(tmp_path):
+    path = tmp_path / "cell.yaml"
+    path.write_text("extends: fanuc_stream_8ms\ncoupled: {J3: {J2: 0}}\n")
+    matrix = bind_axes(brachis.load_profile(path), brachis.robots.tx90l_rail).matrix
+    np.testing.assert_array_equal(matrix, np.diag(np.diag(matrix)))
 
 
 SWAPPED = "axes: [{joint: joint_2}, {joint: joint_1}, {joint: rail, external: true}]"

@@ -115,7 +115,7 @@ def axes_of(motion, profile, q):
     arm = [i for i, name in enumerate(names) if name != "rail"]
     values = q[:, arm] if profile == "ur_servoj_500hz" else np.degrees(q[:, arm])
     if profile == "fanuc_stream_8ms":
-        values[:, 2] += values[:, 1]
+        values[:, 2] -= values[:, 1]
     rail = [1e3 * q[:, i : i + 1] for i, name in enumerate(names) if name == "rail"]
     return np.hstack([values, *rail])
 
@@ -202,6 +202,16 @@ def test_a_wider_tolerance_needs_fewer_positions(seam, tmp_path):
 def test_lines_of_the_tool_keep_a_straight_path(seam, tmp_path):
     _, report = write(seam, "kuka_rsi_4ms", tmp_path, moves="linear")
     assert report.place < 1e-9
+
+
+@pytest.mark.parametrize("moves", ["joint", "linear"])
+def test_the_rail_of_a_kuka_is_as_fast_as_the_arm(moves, seam, tmp_path):
+    """Its velocity has a variable of its own, which stays at that of the first move."""
+    text, report = write(seam, "kuka_rsi_4ms", tmp_path, moves=moves)
+    rail = re.findall(r"^ *\$VEL_EXTAX\[1\] = (\d+)$", text, re.MULTILINE)
+    arm = re.findall(r"^ *\$VEL_AXIS\[I\] = (\d+)$", text, re.MULTILINE)
+    assert rail == (["100"] if moves == "linear" else arm)
+    assert len(arm) == (0 if moves == "linear" else report.positions - 1)
 
 
 EVENTS = {

@@ -43,24 +43,24 @@ class Axis(Model):
     joint: Name
     """Joint of the URDF."""
     name: Name | None = None
-    """Name of the axis. Default: the next name of its group."""
+    """Name. Default: the next one of arm or external."""
     sign: Literal[-1, 1] = 1
     """-1: the axis turns against the joint."""
     zero: Number = 0.0
-    """Position of the joint where the axis is at 0, rad (m)."""
+    """Position of the joint where the axis is 0, rad (m)."""
     external: Flag = False
-    """Whether it is an external axis, such as a rail, and not one of the arm's."""
+    """Whether the axis is external, such as a rail."""
 
 
 class AxisGroup(Model):
     """Names and units of the arm's axes, or of the external ones."""
 
     names: tuple[Name, ...] = ()
-    """Names of the axes, in order. Default: those of the joints."""
+    """Names, in order. Default: those of the joints."""
     angle: AngleUnit = "rad"
-    """Unit of turning axes."""
+    """Unit of turning axes, rad or deg."""
     length: LengthUnit = "m"
-    """Unit of sliding axes."""
+    """Unit of sliding axes, m or mm."""
 
 
 class Language(Model):
@@ -71,10 +71,9 @@ class Language(Model):
     external_axes: Flag = True
     """Whether a position may have external axes."""
     template: Name
-    """Jinja template of a program. It may use: name, of the motion; robot and title, of the robot and the controller;
-    report.positions, report.place (m, rad) and report.time (s); t_end (s); is_linear; axes.names, axes.units and
-    axes.external; steps, a list of positions with values (in the units of the axes), duration (s) and speed (m/s) from
-    the position before, percent of the largest joint velocities, zone (m; 0: the arm stops) and event."""
+    """Jinja template with the variables name (of the motion), robot, title, t_end (s), is_linear, report.positions,
+    report.place (m, rad), report.time (s), axes.names, axes.units, axes.external and steps. A step has values (in the
+    axes' units), duration (s), speed (m/s), percent (of velocity limits), zone (m; 0: stop) and event."""
 
 
 class Profile(CheckedModel):
@@ -93,42 +92,39 @@ class Profile(CheckedModel):
     title: Name
     """Name of the controller and its interface."""
     sources: NonEmpty[Name]
-    """Where the figures come from."""
+    """Sources of the figures."""
     unknown: tuple[Name, ...] = ()
     """What is not documented in public."""
     period: Positive
     """Time between samples, s."""
     fixed_period: Flag = True
-    """Whether the controller takes no other period."""
+    """Whether the controller accepts only this period."""
     interpolation: Literal["hold", "linear", "cubic", "quintic"]
-    """Motion between samples: the last position is held; straight lines of the joints; polynomials through positions
-    and velocities (cubic), and accelerations (quintic)."""
+    """Motion between samples: hold, linear (straight joint lines), cubic, or quintic (with accelerations)."""
     formats: NonEmpty[Name] = ("csv",)
-    """Names of export formats that the controller takes."""
+    """Export formats that the controller takes."""
     columns: NonEmpty[Literal["q", "qd", "qdd", "tau"]] = ("q",)
-    """Quantities in tables: positions, velocities, accelerations, torques."""
+    """Columns of tables: q, qd, qdd, tau."""
     arm: AxisGroup = AxisGroup()
-    """Axes of the arm."""
+    """Names and units of these axes."""
     external: AxisGroup = AxisGroup()
-    """External axes."""
+    """Names and units of these axes."""
     axes: tuple[Axis, ...] = ()
-    """All axes, in the controller's order. Default: the arm's joints in chain order, then external axes: the sliding
-    joints before the first turning one."""
+    """Axes, in the controller's order. Default: the arm's joints, then, as external axes, sliding ones before them."""
     coupled: dict[Name, dict[Name, Number]] = Field(default_factory=dict)
-    """Values of other axes that are added to an axis, times a factor: J3: {J2: 1} where J3 is measured from the
-    horizontal."""
+    """Multiples of axes that are added to others: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
     program: Language | None = None
     """Language of programs of positions."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
-    """Limits that the controller checks, as in robot.limits. A list is in the order of the arm's axes."""
+    """Limits that the controller checks, as in robot.limits; lists in the order of the arm's axes."""
     rest: Literal["velocity", "full"] = "velocity"
-    """What must be zero at both ends: the velocity alone, or the acceleration too."""
+    """What must be zero at both ends: velocity, or full (the acceleration too)."""
     decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
-    """Decimals of positions in the file. Default: all digits."""
+    """Decimals of positions in tables. Null: all digits."""
     path_tolerance: Positive = 1e-4
     """Largest deviation of the tool from the path, m and rad."""
     events: dict[Name, Name] = Field(default_factory=dict)
-    """Instructions at the beginning and end of sections with a process speed: {process_on: ..., process_off: ...}."""
+    """Instructions where a process speed begins and ends: {process_on: ..., process_off: ...}."""
 
     @property
     def is_sampled(self) -> bool:
