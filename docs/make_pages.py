@@ -270,6 +270,7 @@ SHOWN = {
         "without a solution after 20,000 iterations.",
     ),
     "joint_paths": Shown("Joint paths: toppra"),
+    "controllers": Shown("Motions as controllers run them"),
     "jerk_paths": Shown(
         "Joint paths with limited jerk: copp-py",
         about="Random paths of the KUKA iiwa 14, with limits on jerk, velocity, acceleration and torque.",

@@ -182,7 +182,7 @@ REFUSED = [
     ),
     (
         {"knots": "free", "intervals": 10},
-        "spline.knots: free knots need a motion that begins and ends at rest",
+        "spline.knots: free knots need a motion that starts and ends at rest",
     ),
     ({"start_speed": -0.1}, "boundary.start_speed"),
     (

@@ -331,7 +331,6 @@ ANSWERS = {
     "result.torque": (AttributeError, "'trajectory.torque'"),
     "result.positions": (AttributeError, "'trajectory.q'"),
     "result.t": (AttributeError, "'trajectory.times'"),
-    "result.export": (AttributeError, "'brachis.export.write'"),
     "result.trajectory.duration": (AttributeError, "'t_end'"),
     "result.trajectory.qd": (AttributeError, "'qdot'"),
     "result.sample(0.1).time": (AttributeError, "'t'"),

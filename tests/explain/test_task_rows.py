@@ -112,8 +112,8 @@ def test_another_start_posture_saves_about_what_its_row_says():
     saving = row_of(result, "start posture")
     problem = result.candidate.problem
     words = saving.change.split()
-    joint = problem.robot.joint_names.index(words[3])
-    turn = float(words[4]) * (1.0 if "higher" in words else -1.0)
+    joint = problem.robot.joint_names.index(words[4])
+    turn = float(words[5]) * (1.0 if "higher" in words else -1.0)
     newton = Newton(problem.task_map)
     null = newton.self_motions(problem.start[None])[0][:, 0]
     moved = problem.start + turn / null[joint] * null

@@ -33,6 +33,7 @@ from brachis.trajectory import (
 )
 from brachis.verify import Check, Verification, VerifyOptions
 from brachis.verify.limits import check_limits
+from brachis.verify.limits.tool import largest_speeds
 from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.verify import path_errors
@@ -227,13 +228,22 @@ class _Run:
         differences: list[Check] = []
         kind = CheckedMotion
         if self.profile.is_sampled:
-            differences = list(_check_differences(robot, run, allowed))
+            differences = [
+                *_check_differences(robot, run, allowed),
+                *_check_tool_speed(robot, run, allowed),
+            ]
             kind = _SampledMotion
             free = np.full(robot.n, np.inf)
             limits = robot.limits.with_magnitudes(**dict.fromkeys(_DERIVATIVES, free))
             robot = replace(robot, limits=limits)
         checked = kind(run, robot, task_map, path, options)
-        ratios = [*check_limits(checked, self.own_limits), *differences]
+        names = {check.name.replace("by differences", "ratio") for check in differences}
+        ratios = [
+            check
+            for check in check_limits(checked, self.own_limits)
+            if check.name not in names
+        ]
+        ratios += differences
         path_check = _check_path(checked, self.profile)
         checks = (path_check, *ratios, *_check_rest(self.motion, self.profile))
         worst = max((check.value for check in ratios), default=0.0)
@@ -374,6 +384,23 @@ def _check_differences(
         subject = robot.joint_names[joint]
         ratio = ratios[row, joint]
         yield Check(name, ratio, allowed, "-", subject, time, of_limit=True)
+
+
+def _check_tool_speed(
+    robot: Robot, run: Trajectory, allowed: float
+) -> Iterator[Check]:
+    """Check the distances between the tool's places at successive samples, divided by the period."""
+    s = run.path_coordinate(run.times)
+    largest = largest_speeds(run.task, s, np.maximum)
+    if np.isinf(largest).all():
+        return
+    places, _ = robot.tool_placements(robot.of_real_joints(run.q))
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / run.times[1]
+    ratios = speeds / np.maximum(largest[1:], largest[:-1])
+    row = int(np.argmax(ratios))
+    name = "tool speed by differences"
+    time = run.times[row]
+    yield Check(name, ratios[row], allowed, "-", "tool", time, of_limit=True)
 
 
 def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:

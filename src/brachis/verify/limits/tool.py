@@ -8,12 +8,14 @@ of the path, and z its third column, which is the tool's axis. Then
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from brachis.common.arrays import apply_each
 from brachis.robot import Robot
+from brachis.task import Task
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between, worst_size
 from brachis.verify.mechanics import (
     joint_placements,
@@ -45,28 +47,33 @@ def _worst_motion(quantity: str, motion: CheckedMotion) -> Worst | None:
     )
 
 
+def largest_speeds(
+    task: Task, s: np.ndarray, side: Callable[..., np.ndarray] = np.minimum
+) -> np.ndarray:
+    """Return the tool's largest speeds, m/s, (K,), at path coordinates; at a step, `side` chooses one of both."""
+    limits = task.tool_limits
+    constant = limits.speed if isinstance(limits.speed, float) else np.inf
+    largest = np.full(len(s), constant)
+    for table in list_speed_tables(task):
+        sides = [
+            np.interp(s + step, table.s, table.speed) for step in (-_SAME_S, _SAME_S)
+        ]
+        # A table of feed rates does not apply beyond its ends.
+        within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
+        holds = within | (table is limits.speed)
+        largest = np.minimum(largest, np.where(holds, side(*sides), np.inf))
+    return largest
+
+
 def _worst_speed(motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of the tool's speed, at the states and between them."""
-    limits = motion.task.tool_limits
-    tables = list_speed_tables(motion.task)
-    if not tables:
+    if not list_speed_tables(motion.task):
         return _worst_motion("speed", motion)
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the speeds divided by the lowest limit at each s, (K,)."""
-        s = states.s
-        constant = limits.speed if isinstance(limits.speed, float) else np.inf
-        limit = np.full(len(s), constant)
-        for table in tables:
-            # At a step, the lower side is used. A table of feed rates does not apply beyond its ends.
-            sides = [
-                np.interp(s + step, table.s, table.speed)
-                for step in (-_SAME_S, _SAME_S)
-            ]
-            within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
-            holds = within | (table is limits.speed)
-            limit = np.minimum(limit, np.where(holds, np.minimum(*sides), np.inf))
-        return tool_sizes(motion.robot, states, "speed") / limit
+        speeds = tool_sizes(motion.robot, states, "speed")
+        return speeds / largest_speeds(motion.task, states.s)
 
     return worst_size(motion, 1.0, ratios)
 
