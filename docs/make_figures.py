@@ -27,7 +27,6 @@ from brachis.apps.plots import (
     plot_comparison,
     plot_fit,
     plot_limits,
-    plot_motion,
     plot_overview,
     plot_postures,
     plot_timeline,
@@ -115,9 +114,9 @@ def ur10_weld() -> Planned:
 
 
 def panda_circle() -> Planned:
-    """Draw one of four motions of a seven-joint arm."""
+    """Animate one of four motions of a seven-joint arm."""
     results = load("examples/05_panda_circle.py").main()
-    save(plot_postures(results["panda_joint7"].trajectory), "panda_circle")
+    animate(results["panda_joint7"], "panda_circle", slower=5.0)
     return results
 
 
@@ -172,33 +171,33 @@ def today() -> Planned:
 
 
 def weld_seams() -> Planned:
-    """Draw two seams with a spot between them."""
+    """Animate two seams with a spot between them."""
     result = planned("13_weld_seams")
-    save(plot_overview(result.trajectory), "weld_seams")
+    animate(result, "weld_seams", slower=3.0)
     return {"rail": result}
 
 
 def round_the_post() -> Planned:
-    """Draw a motion that goes round a post, with the smallest distance over time."""
+    """Animate a motion that goes round a post, with the smallest distance over time."""
     result = planned("14_round_the_post")
-    save(plot_motion(result.trajectory), "round_the_post")
+    animate(result, "round_the_post", slower=5.0)
     task = brachis.load_task(ROOT / "examples/14_round_the_post.yaml")
     return {"round the post": result, "without a scene": brachis.plan(task, scene=())}
 
 
 def tilted_torch() -> Planned:
-    """Draw a motion whose tool may tilt."""
+    """Animate a motion whose tool may tilt."""
     result = planned("15_tilted_torch")
-    save(plot_overview(result.trajectory), "tilted_torch")
+    animate(result, "tilted_torch", slower=20.0)
     task = brachis.load_task(ROOT / "examples/15_tilted_torch.yaml")
     fixed = brachis.plan(task, tolerances=Tolerances())
     return {"tilt up to 15 degrees": result, "no tilt": fixed}
 
 
 def into_the_car_body() -> Planned:
-    """Draw a motion through a window, with the smallest distance over time."""
+    """Animate a motion through a window, with the smallest distance over time."""
     result = planned("16_into_the_car_body")
-    save(plot_motion(result.trajectory), "into_the_car_body")
+    animate(result, "into_the_car_body", slower=5.0)
     return {"through the window": result}
 
 
