@@ -150,6 +150,12 @@ class Verification(Summary):
         """Whether every check passed."""
         return all(check.passed for check in self.checks)
 
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What failed, in words."""
+        failed = (check for check in self.checks if not check.passed)
+        return tuple(f"{check.name}: {check.in_words()}" for check in failed)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
         return {"passed": self.passed, **asdict(self)}

@@ -20,7 +20,7 @@ def test_from_a_plan_for_a_controller_to_the_run_that_came_back(
 
     export = f"export {out} --profile kuka_rsi_4ms --out"
     assert "verification: passed" in run(f"{export} {tmp_path / 'run.csv'}").out
-    data = run(f"{export} {tmp_path / 'seam.src'} --moves linear --json").data
+    data = run(f"{export} {tmp_path / 'seam.src'} --json").data
     assert data["place"] <= 1e-3
     assert (tmp_path / "seam.src").read_text().startswith("DEF BRACHIS()")
     message = error_of(f"{export} {tmp_path / 'a.csv'} --degrees")

@@ -49,6 +49,7 @@ def test_a_run_like_the_plan_has_no_error(planned, tmp_path):
     path = record(planned, tmp_path / "run.csv")
     tracking = brachis.compare_run(path, planned, "kuka_rsi_4ms")
     assert tracking.tool < 1e-6
+    assert tracking.delay == pytest.approx(0.5, abs=0.02)
     assert max(axis.largest for axis in tracking.axes) < 1e-6
     assert tracking.t_end == pytest.approx(planned.t_end, abs=0.02)
     assert [axis.torque for axis in tracking.axes] == [None] * 7
@@ -65,7 +66,8 @@ def test_the_error_of_one_joint_is_found_in_its_place(planned, tmp_path):
     tracking = brachis.compare_run(path, planned, "kuka_rsi_4ms")
     by_joint = {axis.joint: axis for axis in tracking.axes}
     worst = by_joint["joint_2"]
-    assert worst.largest == pytest.approx(0.02, rel=0.1)
+    assert worst.largest == pytest.approx(np.degrees(0.02), rel=0.1)
+    assert worst.unit == "deg"
     assert worst.time == pytest.approx(0.5 * planned.t_end, abs=0.02)
     assert by_joint["joint_1"].largest < 0.1 * worst.largest
     assert tracking.tool > 5e-3

@@ -125,7 +125,9 @@ REFUSED = {
     "axes: [{joint: rail, external: true}, {joint: rail}]": "joint 'rail' has two axes",
     "arm: {names: [A1, A2]}": "too few names for axes of the arm; found 6 joints",
     "coupled: {A3: {A9: 1}}": "no axis named 'A9'",
-    "period: 0": "period: out of range",
+    "period: 4": "period: out of range; found 4; allowed: <= 0.1",
+    "formats: [krl]": "no format named 'krl'",
+    "axes: [{joint: joint_1, zero: 90}]": "zero of an axis is more than a turn away; found 90 rad",
     "events: {start: x}": "no event of this name",
     "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6",
 }
@@ -144,6 +146,7 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
     "options, message",
     [
         ({"dt": 0.001}, "no other period; found 0.001 s; allowed: 0.004 s"),
+        ({"moves": "linear"}, "samples have no moves"),
         ({"form": "json"}, "no such format; found json; allowed: csv, program"),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
         ({"form": "program", "time_tolerance": 1e-15}, "no program of positions keeps"),

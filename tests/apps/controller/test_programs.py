@@ -210,7 +210,8 @@ def test_the_rail_of_a_kuka_is_as_fast_as_the_arm(moves, seam, tmp_path):
     text, report = write(seam, "kuka_rsi_4ms", tmp_path, moves=moves)
     rail = re.findall(r"^ *\$VEL_EXTAX\[1\] = (\d+)$", text, re.MULTILINE)
     arm = re.findall(r"^ *\$VEL_AXIS\[I\] = (\d+)$", text, re.MULTILINE)
-    assert rail == (["100"] if moves == "linear" else arm)
+    assert rail == arm
+    assert rail[:2] == ["10", "100"] or moves == "joint"
     assert len(arm) == (0 if moves == "linear" else report.positions - 1)
 
 
@@ -243,6 +244,70 @@ def test_a_process_is_switched_where_its_speed_begins_and_ends(
     positions, _ = READERS[profile][1](text)
     values = axes_of(motion, profile, motion.position([process.begin]))
     np.testing.assert_allclose(positions[count - 1], values[0], atol=1e-4)
+
+
+def test_speeds_are_percents_of_the_machines_and_of_the_right_external_axis(
+    seam, tmp_path
+):
+    """Limits of a profile make the plan slower, not the machine."""
+    profile = tmp_path / "cell.yaml"
+    arm = "".join(f"  - {{joint: joint_{n}}}\n" for n in range(1, 7))
+    rail = "  - {joint: rail, external: true, name: E2}\n"
+    limits = "limits: {velocity: 100}\n"
+    profile.write_text(f"extends: kuka_rsi_4ms\naxes:\n{arm}{rail}{limits}")
+    path = tmp_path / "seam.src"
+    brachis.export.write_for_controller(seam, path, profile)
+    text = path.read_text()
+    assert "$VEL_EXTAX[2] =" in text
+    assert "$VEL_EXTAX[1]" not in text
+    positions = read_krl(text.replace("E2 ", "E1 "))[0]
+    percents = [int(row) for row in re.findall(r"VEL_AXIS\[I\] = (\d+)", text)][1:]
+    largest = [limit.velocity for limit in seam.robot.urdf_limits]
+    _, durations = read_rapid(write(seam, "abb_egm_4ms", tmp_path)[0])
+    steps = np.abs(np.diff(positions, axis=0))
+    way = np.column_stack([1e-3 * steps[:, 6], np.radians(steps[:, :6])])
+    slowest = 100.0 * np.max(way / durations[1:, None] / largest, axis=1)
+    middle = slice(1, -1)  # lines between corners that are passed
+    np.testing.assert_allclose(percents[middle], slowest[middle].clip(1.0), atol=0.6)
+
+
+def test_a_plan_that_breaks_a_profiles_limits_is_said_with_its_program(seam, tmp_path):
+    profile = tmp_path / "slow.yaml"
+    profile.write_text("extends: kuka_rsi_4ms\nlimits: {velocity: 0.1}\n")
+    with pytest.warns(brachis.export.RunWarning, match="velocity ratio"):
+        report = brachis.export.write_for_controller(
+            seam, tmp_path / "seam.src", profile
+        )
+    assert not report.passed
+
+
+def test_lines_of_the_tool_that_end_in_another_posture_are_refused(tmp_path):
+    """The arm passes its elbow's singular posture by the rail's help, which a line of the rail does not give."""
+    motion = brachis.plan(
+        "tx90l_rail",
+        path=[
+            {"line": {"by": [0.0, 0.4, 0.0]}, "stop": True},
+            {"line": {"by": [0.0, 0.4, 0.0]}, "speed": 0.5},
+        ],
+        start=RAIL_START,
+        task_space="pose",
+    ).trajectory
+    elbow = motion.position(np.linspace(0.0, motion.t_end, 500))[:, 3]
+    assert elbow.min() < 0.0 < elbow.max()
+    with pytest.raises(brachis.InputError, match="another posture than the plan's"):
+        write(motion, "kuka_rsi_4ms", tmp_path, moves="linear")
+
+
+def test_lines_of_the_tool_need_a_path_of_poses(seven, tmp_path):
+    with pytest.raises(brachis.InputError, match="need a path of poses"):
+        brachis.export.write_for_controller(
+            seven, tmp_path / "a.script", FREE, form="program", moves="linear"
+        )
+
+
+FREE = brachis.load_profile("ur_servoj_500hz").model_copy(
+    update={"arm": brachis.load_profile("franka_1khz").arm}
+)
 
 
 def test_heads_name_the_robot_the_positions_and_the_deviation(seam, tmp_path):

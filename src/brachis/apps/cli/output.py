@@ -138,6 +138,7 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
     """Print what a controller makes of a motion; return the exit code."""
     from brachis.apps.controller import RunReport
 
+    remedies: tuple[str, ...] = ()
     if json:
         print_json(report.to_dict())
     elif isinstance(report, RunReport):
@@ -145,12 +146,13 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
             f"as {report.controller} runs it, every {1e3 * report.period:g} ms:"
         )
         print_verification(report.verification, degrees=False)
+        remedies = report.remedies
     else:
-        print_lines(str(report))
-    if not isinstance(report, RunReport) or report.passed:
+        print_table("program", ("", ""), report.summary().items())
+    if report.passed:
         return 0
     reasons = ("the motion breaks limits as it is run", *report.failures)
-    print_error("\n".join([*reasons, *report.remedies]))
+    print_error("\n".join([*reasons, *remedies]))
     return 1
 
 

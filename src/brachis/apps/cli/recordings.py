@@ -9,7 +9,13 @@ import typer
 from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json, motion_file, task_space_of
+from brachis.apps.cli.app import (
+    Degrees,
+    Json,
+    motion_file,
+    refuse_options,
+    task_space_of,
+)
 from brachis.apps.cli.folder import Drawing, finish, output_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
@@ -125,6 +131,7 @@ def compare(
     brachis compare out/run.csv --plan out/result.npz --profile kuka_rsi_4ms
     """
     if plan is not None and profile is not None:
+        refuse_options({"--out": out}, "--plan", "--robot")
         units = {"angle": angle, "length": length, "time": time}
         tracking = brachis.compare_run(csv, motion_file(plan), profile, units=units)
         if json:

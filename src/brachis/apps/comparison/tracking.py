@@ -25,11 +25,11 @@ class AxisTracking:
     joint, axis : str
         Names in the URDF and in the controller.
     largest, rms : float
-        Largest and root-mean-square error, rad or m.
+        Largest and root-mean-square error of the joint, in `unit`.
     time : float
         Of the largest error, s of the plan.
     unit : str
-        ``rad`` or ``m``.
+        Of the axis: ``rad``, ``deg``, ``m`` or ``mm``.
     torque : float or None
         Largest difference of the torque, Nm or N; None if it was not recorded.
     """
@@ -51,7 +51,7 @@ class Tracking(Summary):
     ----------
     axes : tuple of AxisTracking
     delay : float
-        By which the run follows the plan best, s; the errors are those that remain.
+        Time from the file's first row to the start of the plan, s, at which the errors are smallest.
     t_end, t_end_planned : float
         Durations of the motion in the recording and in the plan, s.
     tool : float
@@ -152,9 +152,9 @@ def compare_run(
         return np.clip(t - delay, 0.0, motion.t_end)
 
     def miss(delay: float) -> float:
-        """Return the mean square of the joints' errors."""
+        """Return the mean of the joints' errors; one that is large for a while does not shift the others."""
         errors = q - motion.position(plan_at(delay))[:, axes.index]
-        return float(np.mean(errors**2))
+        return float(np.mean(np.abs(errors)))
 
     longest = 0.5 * max(t[-1], motion.t_end)
     coarse = np.linspace(-longest, longest, 401)
@@ -189,14 +189,15 @@ def compare_run(
         AxisTracking(
             joint,
             axes.names[i],
-            float(errors[:, i].max()),
-            float(np.sqrt(np.mean(errors[:, i] ** 2))),
+            float(factors[i] * errors[:, i].max()),
+            float(factors[i] * np.sqrt(np.mean(errors[:, i] ** 2))),
             float(plan_times[np.argmax(errors[:, i])]),
-            axes.position_units[i],
+            axes.units[i],
             None if torques is None else float(torques[i]),
         )
         for i, joint in enumerate(axes.joints)
     )
     worst = int(np.argmax(away))
     tool = (float(away[worst]), float(plan_times[worst]))
+    delay += recording.begin
     return Tracking(rows, float(delay), float(t[-1]), motion.t_end, *tool)

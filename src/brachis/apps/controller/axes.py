@@ -91,6 +91,14 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
                 where="profile.axes",
                 allowed="one axis for each joint",
             )
+    for number, axis in enumerate(axes):
+        if units[axis.joint] == "rad" and abs(axis.zero) > 2.0 * np.pi:
+            raise InputError(
+                "the zero of an axis is more than a turn away",
+                where=f"profile.axes[{number}].zero",
+                found=f"{axis.zero:g} rad",
+                allowed="rad; or a number of degrees with !degrees",
+            )
     arm = [axis.joint for axis in axes if not axis.external]
     in_order = [name for name in names if name in arm]
     if arm != in_order:
@@ -156,7 +164,7 @@ def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
                 where="profile",
                 found=f"{found} joints",
                 allowed=", ".join(group.names),
-                hint="Name the axes in a profile of your own: extends, and axes",
+                hint="Name the axes in a profile of your own; a rail has external: true",
             )
         names.append(axis.name or (group.names[number] if group.names else axis.joint))
     return names

@@ -71,9 +71,10 @@ class Language(Model):
     external_axes: Flag = True
     """Whether a position may have external axes."""
     template: Name
-    """Jinja template with the variables name (of the motion), robot, title, t_end (s), is_linear, report.positions,
-    report.place (m, rad), report.time (s), axes.names, axes.units, axes.external and steps. A step has values (in the
-    axes' units), duration (s), speed (m/s), percent (of velocity limits), zone (m; 0: stop) and event."""
+    """Jinja template with the variables name (of the motion), robot, title, date, t_end (s), is_linear,
+    report.positions, report.place (m, rad), report.time (s), axes.names, axes.units, axes.external, velocities (largest
+    of the axes, by the URDF) and steps. A step has values (in the axes' units), duration (s), speed (m/s), percent (of
+    velocities), zone (m; 0: stop) and event."""
 
 
 class Profile(CheckedModel):
@@ -95,7 +96,7 @@ class Profile(CheckedModel):
     """Sources of the figures."""
     unknown: tuple[Name, ...] = ()
     """What is not documented in public."""
-    period: Positive
+    period: Annotated[Positive, Field(le=0.1)]
     """Time between samples, s."""
     fixed_period: Flag = True
     """Whether the controller accepts only this period."""

@@ -118,7 +118,8 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
             where="joints",
             found=", ".join(f"{name} ({unit})" for name, unit in named),
             allowed="six revolute joints, from the base on",
-            hint="List only the arm's six joints in joints, and write the others, such as a rail, in another format",
+            hint="List only the arm's six joints in joints, and write a rail in another format. With a profile, hold "
+            "the rail (robot.locked_joints)",
         )
     first, *postures = (
         f"[{', '.join(map(repr, row))}]" for row in rows.samples.q.tolist()

@@ -17,15 +17,18 @@ from brachis.apps.controller import (
     axes_for,
     check_period,
     load_profile,
+    robot_with_profile,
     verify_run,
+    without_scale,
 )
 from brachis.apps.export.formats import FORMATS, format_of
 from brachis.apps.export.programs import ProgramReport, write_program
 from brachis.apps.export.rows import JointRows
 from brachis.common.files import atomic_write, file_name
-from brachis.errors import BrachisWarning, InputError
+from brachis.errors import BrachisWarning, InputError, check_names
 from brachis.robot.custom_limits import LimitModel
 from brachis.trajectory import MotionSource, Trajectory, motion_of
+from brachis.verify import verify_trajectory
 
 PROGRAM = "program"
 """Name of the format of programs of positions, in the language of the profile."""
@@ -96,6 +99,7 @@ def write_for_controller(
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
     file = file_name(path, "path")
+    check_names("format", profile.formats, FORMATS, "profile.formats")
     language = profile.program
     is_program = form == PROGRAM
     if language is not None and form is None:
@@ -116,7 +120,18 @@ def write_for_controller(
         first_line = text.partition("\n")[0]
         with atomic_write(path, re.escape(first_line).encode()) as stream:
             stream.write(text.encode())
+        robot = robot_with_profile(without_scale(motion.robot), profile, axes)
+        verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
+        deviation = replace(deviation, failures=verification.failures)
+        _warn(profile, deviation.failures)
         return deviation
+    if moves != "joint":
+        raise InputError(
+            "samples have no moves",
+            where="moves",
+            found=moves,
+            allowed="this option with programs of positions",
+        )
     chosen = None if is_program else format_of(path, form)
     allowed = [*profile.formats, *([PROGRAM] if language else [])]
     name = next((name for name, known in FORMATS.items() if known is chosen), form)
@@ -132,10 +147,15 @@ def write_for_controller(
     rows = _rows_of(motion, period, profile, axes)
     with atomic_write(path, chosen.beginning) as stream:
         chosen.writer(rows, stream)
-    if not report.passed:
-        reasons = "; ".join([*report.failures, *report.remedies])
-        warnings.warn(f"{profile.title}: {reasons}", RunWarning, stacklevel=2)
+    _warn(profile, (*report.failures, *report.remedies))
     return report
+
+
+def _warn(profile: Profile, reasons: Sequence[str]) -> None:
+    """Warn of limits that a run breaks."""
+    if reasons:
+        text = "; ".join(reasons)
+        warnings.warn(f"{profile.title}: {text}", RunWarning, stacklevel=3)
 
 
 def _rows_of(

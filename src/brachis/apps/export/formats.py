@@ -120,7 +120,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
             where=str(path),
             found=f"suffix {suffix}" if suffix else "no suffix",
             allowed=", ".join(form.suffix for form in FORMATS.values()),
-            hint=f"Or name the format: {', '.join(FORMATS)}",
+            hint=f"Or name the format: {', '.join(FORMATS)}; programs of controllers need a profile",
         )
     return formats[0]
 

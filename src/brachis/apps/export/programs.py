@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Any
 
@@ -21,7 +22,7 @@ from brachis.apps.export.rows import require_library
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.path import path_of
-from brachis.robot import bind
+from brachis.robot import Robot, bind
 from brachis.trajectory import Trajectory
 
 BLEND = 0.25
@@ -35,6 +36,11 @@ _FARTHER = 8
 """Length of the longest line that is tried, over that of the line before."""
 _MOST = 500
 """Largest number of positions of a program."""
+_LINE_STEPS = 20
+"""Number of steps in which an arm follows a line of the tool."""
+_NEWTON_STEPS = 4
+_SAME_POSTURE = 1e-3
+"""Largest difference of joints in the same posture, rad."""
 _REST = 1e-6
 """Joint velocity at rest, rad/s or m/s."""
 _SLOW = 1e-3
@@ -53,11 +59,19 @@ class ProgramReport(Summary):
         Largest distance of the tool from the path, m, or angle, rad.
     time : float
         Largest difference of the times at which places of the path are passed, s.
+    failures : tuple of str
+        Limits of the task or the profile that the plan exceeds, in words.
     """
 
     positions: int
     place: float
     time: float
+    failures: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether the plan keeps the limits of the task and of the profile."""
+        return not self.failures
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
@@ -69,6 +83,7 @@ class ProgramReport(Summary):
             "positions": self.positions,
             "deviation in place": f"{self.place:.3g} m, rad",
             "deviation in time": f"{self.time:.3g} s",
+            "limits of the plan": "; ".join(self.failures) or "met",
         }
 
 
@@ -116,6 +131,8 @@ def write_program(
     jinja = require_library("jinja2", "a program", library="Jinja2", extra="report")
     events = dict(_events(motion, profile))
     follower = _Follower(motion, is_linear=moves == "linear")
+    if follower.is_linear:
+        follower.check_arm(axes)
     share = 1.0
     for _ in range(_ROUNDS):
         nodes = follower.choose(share * tolerance, share * time_tolerance)
@@ -131,14 +148,18 @@ def write_program(
             found=f"more than {tolerance:g} m, rad or {time_tolerance:g} s with {len(nodes) - 1} positions",
             allowed=f"up to {_MOST} positions",
         )
+    if follower.is_linear:
+        follower.check_postures(nodes, axes)
     report = ProgramReport(len(nodes), place, time)
-    columns = follower.describe(nodes, axes)
+    largest = _largest_velocities(motion.robot)
+    columns = follower.describe(nodes, axes, largest)
     steps = [
         {name: column[row].tolist() for name, column in columns.items()}
         | {"event": events.get(time, "")}
         for row, time in enumerate(follower.t[nodes].tolist())
     ]
     text = jinja.Template(language.template, keep_trailing_newline=True).render(
+        date=datetime.now(tz=UTC).date().isoformat(),
         name=name,
         robot=motion.robot.name,
         title=profile.title,
@@ -146,9 +167,19 @@ def write_program(
         t_end=motion.t_end,
         is_linear=follower.is_linear,
         axes=axes,
+        velocities=axes.encode_rates(largest[None])[0].tolist(),
         steps=steps,
     )
     return text, report
+
+
+def _largest_velocities(robot: Robot) -> np.ndarray:
+    """Return the machine's largest velocities, (n,): those of the URDF, or else of the task; infinite where unknown."""
+    largest = robot.limits.velocity.copy()
+    for number, limit in enumerate(robot.urdf_limits):
+        if limit.velocity:
+            largest[number] = limit.velocity
+    return largest
 
 
 class _Follower:
@@ -221,7 +252,50 @@ class _Follower:
         along = sample.xi
         return np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
 
-    def describe(self, nodes: np.ndarray, axes: ControllerAxes) -> dict[str, Any]:
+    def check_arm(self, axes: ControllerAxes) -> None:
+        """Refuse lines of the tool where the controller's inverse kinematics would not be that of six joints."""
+        count = axes.external.count(False)
+        if not self.motion.task.of_poses or count != 6:
+            raise InputError(
+                "linear moves need a path of poses, and an arm of six joints",
+                where="moves",
+                found=f"task_space: {self.motion.task.task_space}, {count} joints",
+                allowed="joint",
+            )
+
+    def check_postures(self, nodes: np.ndarray, axes: ControllerAxes) -> None:
+        """Refuse lines of the tool along which an arm would come to other postures than those of the plan.
+
+        The external axes move on straight lines, and the arm's joints follow the tool by Newton's method.
+        """
+        arm = axes.index[~np.array(axes.external)]
+        for first, last in pairwise(nodes.tolist()):
+            before = self.q[first]
+            after = self.q[last]
+            q = before.copy()
+            for u in np.linspace(0.0, 1.0, _LINE_STEPS + 1)[1:]:
+                target = (1.0 - u) * self.followed[first] + u * self.followed[last]
+                line = (1.0 - u) * before + u * after
+                line[arm] = q[arm]
+                q = line
+                for _ in range(_NEWTON_STEPS):
+                    values = self.task_map.values(q[None])
+                    miss = self.task_map.difference(target[None], values)[0]
+                    slopes = self.task_map.jacobian(self.task_map.twists(q[None]))[0]
+                    q[arm] += np.linalg.lstsq(slopes[:, arm], miss, rcond=None)[0]
+            off = np.abs(q - after)
+            if off.max() > _SAME_POSTURE:
+                joint = self.motion.joint_names[int(np.argmax(off))]
+                raise InputError(
+                    "on a line of the tool the arm would come to another posture than the plan's",
+                    where="moves",
+                    found=f"{joint} off by {off.max():.3g} rad after {self.t[last]:.4g} s",
+                    allowed="joint, or a plan whose arm does not pass a singular posture",
+                )
+
+    def describe(
+        self, nodes: np.ndarray, axes: ControllerAxes, largest: np.ndarray
+    ) -> dict[str, Any]:
         """Return what a template may say of each position; see `Language`."""
         robot = self.motion.robot
         q = self.q[nodes]
@@ -231,12 +305,12 @@ class _Follower:
         tool, _ = robot.tool_placements(robot.of_real_joints(q))
         way = np.linalg.norm(np.diff(tool, axis=0), axis=1)
         rates = np.abs(np.diff(q, axis=0))[:, axes.index] / constant[:, None]
-        largest = robot.limits.velocity[axes.index]
+        largest = largest[axes.index]
         largest = np.where(np.isfinite(largest), largest, rates.max(axis=0))
         percent = 100.0 * np.max(rates / np.maximum(largest, _REST), axis=1)
         zone = BLEND * np.minimum(np.append(0.0, way), np.append(way, 0.0)) * ~rests
         return {
-            "values": axes.encode(q),
+            "values": np.round(axes.encode(q), 9) + 0.0,
             "duration": np.append(0.0, h),
             "speed": np.append(0.0, way / constant),
             "percent": np.append(1.0, percent.clip(1e-3, 100.0)),

@@ -227,6 +227,8 @@ class Recording:
         Notes on how the file was read.
     tau : (K, n) ndarray or None
         Torques if the file has them, Nm or N.
+    begin : float
+        Time of the first row that is kept, after the file's first row, s.
     """
 
     t: np.ndarray
@@ -238,6 +240,7 @@ class Recording:
     source: str
     notes: tuple[str, ...]
     tau: np.ndarray | None = None
+    begin: float = 0.0
 
 
 def read_recording(
@@ -303,6 +306,7 @@ def read_recording(
         str(source),
         (*notes, *left_out),
         moved.get("tau"),
+        float(t[moving.start] - t[0]),
     )
 
 
