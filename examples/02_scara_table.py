@@ -1,4 +1,4 @@
-"""The paper's eight lines with each of the three redundant joints, as a table and a figure.
+"""The paper's eight lines, planned with each of the three redundant joints, as a table and a figure.
 
 Usage: python examples/02_scara_table.py [FIGURE.png]
 """

@@ -1,4 +1,4 @@
-"""The paper's eight lines: with each redundant joint from one guess, with all joints left open, and with a free start.
+"""The paper's eight lines: with each redundant joint from one guess, with all joints searched, and with a free start.
 
 Usage: python examples/07_find_the_fastest.py [FIGURE.png]
 """

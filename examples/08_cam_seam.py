@@ -1,4 +1,4 @@
-"""A seam from CAM: 20,000 noisy points in mm, with a corner, fitted, planned and verified.
+"""20,000 noisy points of a CAM seam with a corner: fitted, planned and verified.
 
 Usage: python examples/08_cam_seam.py [FIGURE.png]
 

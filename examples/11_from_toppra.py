@@ -1,4 +1,4 @@
-"""A joint path under the same limits, timed by brachis and, if installed, by toppra.
+"""A joint path, timed under the same limits by brachis and, if installed, by toppra.
 
 Usage: python examples/11_from_toppra.py
 """
