@@ -40,8 +40,8 @@ GALLERY_HEAD = """\
 
 # Gallery
 
-All examples of the repository, with their files and end times. All motions are verified. Run `brachis plan
-examples/NAME.yaml` or `python examples/NAME.py`.
+All examples, with their files and end times. All motions are verified. Run `brachis plan examples/NAME.yaml` or
+`python examples/NAME.py`.
 """
 CARD = """\
 :::{{grid-item-card}} {name}: {title}

@@ -1,4 +1,4 @@
-"""The paper's eight lines with each of the three redundant joints, as a table and a figure.
+"""The paper's eight lines, planned with each of the three redundant joints, as a table and a figure.
 
 Usage: python examples/02_scara_table.py [FIGURE.png]
 """
@@ -39,7 +39,7 @@ def robot_and_task(
 
 
 def plan_all(intervals: int = 20) -> dict[tuple[int, str], brachis.Result]:
-    """Plan the 24 motions; keys are angle in degrees and redundant joint."""
+    """Plan the 24 motions; keys are the angle in degrees and the redundant joint."""
     cases = [(angle, joint) for angle in ANGLES_DEG for joint in JOINTS]
     return {case: brachis.plan(*robot_and_task(*case, intervals)) for case in cases}
 

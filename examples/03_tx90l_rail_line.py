@@ -1,4 +1,4 @@
-"""The TX90L on its rail, with each redundant joint that has a closed form and 10 to 40 intervals, as a table."""
+"""A table of end times of the TX90L on its rail, for redundant joints with closed forms and 10 to 40 intervals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's eight lines: with each redundant joint from one guess, with all joints left open, and with a free start.
+"""The paper's eight lines, planned with each redundant joint, with the default search, and with a free start posture.
 
 Usage: python examples/07_find_the_fastest.py [FIGURE.png]
 """
@@ -31,7 +31,7 @@ def variants(angle_deg: int) -> dict[str, dict[str, object]]:
 
 
 def plan_all() -> dict[tuple[int, str], brachis.Result]:
-    """Plan all lines in all ways; keys are angle in degrees and name."""
+    """Plan all variants of all lines; keys are the angle in degrees and the name of the variant."""
     return {
         (angle, name): brachis.plan(task)
         for angle in ANGLES_DEG
@@ -40,7 +40,7 @@ def plan_all() -> dict[tuple[int, str], brachis.Result]:
 
 
 def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
-    """End times in seconds, one line an angle."""
+    """Return a table of end times in seconds, with a line for each angle."""
     lines = [
         "| angle | q_r = j1, one guess | j2, one guess | j3, one guess | auto | start free as well |",
         "|---|---|---|---|---|---|",

@@ -1,4 +1,4 @@
-"""A seam from CAM: 20,000 noisy points in mm, with a corner, fitted, planned and verified.
+"""20,000 noisy points of a CAM seam with a corner: fitted, planned and verified.
 
 Usage: python examples/08_cam_seam.py [FIGURE.png]
 
@@ -23,7 +23,7 @@ CORNER = np.deg2rad(20.0)
 
 
 def seam() -> np.ndarray:
-    """Return the rows of the seam, (POINTS, 7): two waves along the rail, a corner of 40 degrees between them."""
+    """Return the rows of the seam, (POINTS, 7): two waves along the rail, with a corner of 40 degrees between them."""
     rng = np.random.default_rng(8)
     along = np.linspace(-1.0, 1.0, POINTS)
     x = (
@@ -43,7 +43,7 @@ def seam() -> np.ndarray:
 
 
 def write(path: Path) -> None:
-    """Write the seam as some controllers do."""
+    """Write the seam in the format of some controllers."""
     lines = [
         ";".join(f"{value:.4f}" for value in row).replace(".", ",") for row in seam()
     ]
@@ -51,7 +51,7 @@ def write(path: Path) -> None:
 
 
 def main(figure: str | None = None) -> brachis.Result:
-    """Write the seam, plan along it and say how near the path is to the points."""
+    """Write the seam, plan a motion along it, and print how close the path is to the points."""
     write(TASK.with_suffix(".csv"))
     result = brachis.plan(TASK)
     print(

@@ -1,4 +1,4 @@
-"""A joint path under the same limits, timed by brachis and, if installed, by toppra.
+"""A joint path, timed under the same limits by brachis and, if installed, by toppra.
 
 Usage: python examples/11_from_toppra.py
 """
@@ -24,7 +24,7 @@ POINTS = 401
 def joint_points(
     robot: brachis.Robot, task: brachis.Task
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return dense points of a task's path of joints: s (POINTS,) and q (POINTS, n), rad."""
+    """Return dense points of a task's joint path: s (POINTS,) and q (POINTS, n), rad."""
     s = np.linspace(0.0, 1.0, POINTS)
     robot, task_map = bind(robot, task.task_space)
     return s, path_of(task_map, task).sample(s).target
@@ -38,7 +38,7 @@ def by_toppra(
     intervals: int = 2000,
     speeds: tuple[float, float] = (0, 0),
 ) -> float:
-    """Time a path of joints with toppra; return the end time, s.
+    """Time a joint path with toppra; return the end time, s.
 
     Parameters
     ----------

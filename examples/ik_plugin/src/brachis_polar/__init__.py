@@ -1,12 +1,12 @@
 """A family of closed forms for the tool position of arms that turn, tilt and reach.
 
-The tilting axis n is at a right angle to the turning axis a, and S is a point on it at the distance e in front of a.
-The boom slides along d, away from S; it may lean to one side, g = d . n. For a target at the height h above S and at
-the distance rho from a, the boom's length L and the tool's distance x in front of S follow from
+The tilting axis n is perpendicular to the turning axis a. S is a point on n at a distance e in front of a. The boom
+slides along d, away from S, and may lean to one side: g = d . n. For a target at the height h above S and at the
+distance rho from a, the boom's length L and the tool's distance x in front of S follow from
 
     (e + x)^2 + (g L)^2 = rho^2   and   x^2 + h^2 = (1 - g^2) L^2,
 
-a quadratic equation for x with two answers: the branches. Redundant joints, a rail for example, come before the arm.
+a quadratic equation for x. Its two solutions are the branches. Redundant joints, such as a rail, come before the arm.
 """
 
 from __future__ import annotations

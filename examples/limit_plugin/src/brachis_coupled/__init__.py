@@ -1,7 +1,7 @@
 """Coupled joint ranges: lower <= q_a + q_b <= upper.
 
-Arms whose third joint is driven through a parallelogram limit the sum of two angles, besides the range of each joint. A
-URDF cannot express that.
+If an arm's third joint is driven through a parallelogram, the sum of two angles is limited in addition to the range of
+each joint. A URDF cannot express that.
 """
 
 from __future__ import annotations
