@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Unpack
 
 import numpy as np
@@ -12,13 +13,16 @@ from brachis.apps.controller import (
     bind_axes,
     load_profile,
     robot_with_profile,
+    scale_of,
     verify_run,
     without_scale,
 )
 from brachis.common.progress import Listener, ignore
+from brachis.errors import BrachisError, InputError
 from brachis.planner import RobotOrTask, plan, read_arguments
 from brachis.result import Result
 from brachis.robot import Robot
+from brachis.robot.custom_limits import LimitModel
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import Source, TaskKeywords
 
@@ -36,6 +40,7 @@ def plan_for_controller(
     /,
     task: Source | None = None,
     *,
+    own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
     **keywords: Unpack[TaskKeywords],
 ) -> tuple[Result, RunReport]:
@@ -49,6 +54,8 @@ def plan_for_controller(
     profile : Profile, str or path
         Name of an included profile, or the file of one.
     robot_or_task, task
+        As for `brachis.plan`.
+    own_limits : sequence of LimitModel, optional
         As for `brachis.plan`.
     listener : callable, optional
         Called with a line of text about each step.
@@ -79,28 +86,47 @@ def plan_for_controller(
     report = listener or ignore
     profile = load_profile(profile)
     robot, loaded = read_arguments(robot_or_task, task, keywords)
+    boundary = loaded.boundary
+    if boundary.start_speed or boundary.end_speed or boundary.periodic:
+        raise InputError(
+            "a motion for a controller starts and ends at rest",
+            where="boundary",
+            allowed="neither start_speed nor end_speed, and not periodic",
+        )
     robot = robot_with_profile(robot, profile, bind_axes(profile, robot))
     if profile.rest == "full" and loaded.spline.vanishing < _FULL_REST:
         spline = loaded.spline.model_copy(update={"rest": "full"})
         loaded = loaded.model_copy(update={"spline": spline})
     unscaled = without_scale(robot)
-    factors = robot.settings.limits.scale.model_dump(exclude_defaults=True)
-    known = None
+    factors = scale_of(robot)
+    known: Result | None = None
     for number in range(_ROUNDS):
         asked = loaded.model_copy(update={"robot": robot.settings})
-        result = plan(robot, asked, start_from=known, listener=listener)
-        run = verify_run(result, profile)
-        smaller = _find_factors(run, robot)
-        if run.passed or not smaller or number == _ROUNDS - 1:
+        try:
+            result = plan(
+                robot,
+                asked,
+                start_from=known,
+                own_limits=own_limits,
+                listener=listener,
+            )
+        except BrachisError:
+            if known is None:
+                raise
+            result = known
+            break
+        known = result
+        run = verify_run(result, profile, own_limits=own_limits)
+        smaller = _find_factors(run, robot, is_first=number == 0)
+        if run.passed or not smaller:
             break
         report(f"run by {profile.title}: {'; '.join(run.failures)}; planning again")
         factors |= {kind: factors.get(kind, 1.0) * smaller[kind] for kind in smaller}
         robot = unscaled.with_limits(scale=factors)
-        known = result
     return result, run
 
 
-def _find_factors(run: RunReport, robot: Robot) -> dict[str, float]:
+def _find_factors(run: RunReport, robot: Robot, *, is_first: bool) -> dict[str, float]:
     """Return factors on limits of the robot that would make up for what a run exceeds."""
     factors: dict[str, float] = {}
     for check in run.verification.checks:
@@ -109,7 +135,7 @@ def _find_factors(run: RunReport, robot: Robot) -> dict[str, float]:
         kind = check.name.removesuffix(" ratio").removesuffix(" by differences")
         kind = kind.replace(" ", "_")
         excess = check.value / check.allowed
-        if kind == "path_error":
+        if kind == "path_error" and is_first:
             # The sagitta of a straight line grows as the square of the speed.
             kind = "velocity"
             excess = excess**0.5

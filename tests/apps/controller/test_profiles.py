@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.apps.controller import bind_axes
+from brachis.apps.controller import bind_axes, robot_with_profile
 from brachis.errors import InputError
 from support.controllers import RAIL_START
 
@@ -123,10 +123,13 @@ REFUSED = {
     SWAPPED: "not in the order of the chain; found joint_2, joint_1; allowed: joint_1, joint_2",
     "axes: [{joint: joint_7}]": "no joint named 'joint_7'",
     "axes: [{joint: rail, external: true}, {joint: rail}]": "joint 'rail' has two axes",
-    "arm: {names: [A1, A2]}": "too few names for axes of the arm; found 6 joints",
+    "arm: {names: [A1, A2]}": "too few names for axes of the arm; found joint_1",
     "coupled: {A3: {A9: 1}}": "no axis named 'A9'",
+    "arm: {names: [A1, A1, A3, A4, A5, A6]}": "two axes have one name; found A1",
+    "coupled: {A3: {A3: -1}}": "the axes do not determine the joints",
+    "limits: {total_power: 5}": "a profile cannot contain this limit",
     "period: 4": "period: out of range; found 4; allowed: <= 0.1",
-    "formats: [krl]": "no format named 'krl'",
+    "formats: [krl]": "no format of samples named 'krl'",
     "axes: [{joint: joint_1, zero: 90}]": "zero of an axis is more than a turn away; found 90 rad",
     "events: {start: x}": "no event of this name",
     "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6",
@@ -185,3 +188,46 @@ def test_ros_2_refuses_degrees(turn, tmp_path):
     with pytest.raises(InputError, match="takes rad and m; found m, deg"):
         brachis.export.write(turn, tmp_path / "run.yaml", degrees=True)
     assert not (tmp_path / "run.yaml").exists()
+
+
+def test_torques_of_axes_do_the_work_of_those_of_the_joints(turn, tmp_path):
+    arm = "".join(f"  - {{joint: joint_{n}, sign: -1}}\n" for n in range(1, 7))
+    rail = "  - {joint: rail, external: true}\n"
+    path = own_profile(tmp_path, f"axes:\n{arm}{rail}coupled: {{A3: {{A2: 0.5}}}}\n")
+    axes = bind_axes(brachis.load_profile(path), turn.robot)
+    states = turn.at(np.linspace(0.1, 0.4, 5))
+    rates = axes.encode_rates(states.qdot) / [*[180.0 / np.pi] * 6, 1e3]
+    power = np.sum(axes.encode_torques(states.tau) * rates, axis=1)
+    np.testing.assert_allclose(
+        power, np.sum(states.tau * states.qdot, axis=1), rtol=1e-12
+    )
+
+
+def test_limits_of_a_profile_keep_the_margins_of_the_task(turn, tmp_path):
+    path = own_profile(tmp_path, "limits: {velocity: 1.0}")
+    robot = turn.robot.with_limits(scale={"velocity": 0.5})
+    profile = brachis.load_profile(path)
+    stricter = robot_with_profile(robot, profile, bind_axes(profile, robot))
+    assert stricter.limits.velocity[1:].tolist() == [0.5] * 6
+    assert stricter.limits.velocity[0] == robot.limits.velocity[0]
+
+
+def test_a_motion_that_goes_on_at_its_end_is_refused(tmp_path):
+    result = brachis.plan(
+        brachis.examples.scara_line, end_speed=0.3, effort="single", intervals=8
+    )
+    for file in ("run.csv", "run.src"):
+        with pytest.raises(InputError, match="starts and ends at rest"):
+            result.export(tmp_path / file, profile="kuka_rsi_4ms")
+    with pytest.raises(InputError, match="starts and ends at rest"):
+        brachis.plan_for_controller("kuka_rsi_4ms", result.task)
+
+
+@pytest.mark.parametrize(
+    "template, message",
+    [("{% if %}", "Expected an expression"), ("{{nme}}", "'nme' is undefined")],
+)
+def test_a_wrong_template_is_an_error(template, message, turn, tmp_path):
+    path = own_profile(tmp_path, f"program: {{template: '{template}'}}")
+    with pytest.raises(InputError, match=message):
+        brachis.export.write_for_controller(turn, tmp_path / "run.src", path)

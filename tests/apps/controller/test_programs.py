@@ -310,6 +310,29 @@ FREE = brachis.load_profile("ur_servoj_500hz").model_copy(
 )
 
 
+WAITS = {
+    "kuka_rsi_4ms": "WAIT SEC 0.2",
+    "abb_egm_4ms": "WaitTime 0.2",
+    "fanuc_stream_8ms": "WAIT 0.20(sec)",
+}
+
+
+def test_the_arm_waits_where_the_motion_dwells(tmp_path):
+    motion = brachis.plan(
+        "tx90l_rail",
+        path=[
+            {"line": {"by": [0.0, 0.1, 0.0]}, "stop": True, "dwell": 0.2},
+            {"line": {"by": [0.1, 0.0, 0.0]}},
+        ],
+        start=RAIL_START,
+        task_space="pose",
+        search=QUICK,
+    ).trajectory
+    for profile, wait in WAITS.items():
+        text, _ = write(motion, profile, tmp_path)
+        assert text.count(wait) == 1
+
+
 def test_heads_name_the_robot_the_positions_and_the_deviation(seam, tmp_path):
     for profile in ("kuka_rsi_4ms", "abb_egm_4ms", "fanuc_stream_8ms"):
         text, report = write(seam, profile, tmp_path)

@@ -162,3 +162,14 @@ def test_the_last_period_waits_at_the_end(turn):
         turn, profile_with(period=0.05, fixed_period=False, path_tolerance=1.0)
     )
     assert value_of(report, "velocity by differences") < 1.0001
+
+
+def test_heat_is_that_of_all_samples(turn):
+    limits = {"rms_torque": 0.3 * turn.robot.limits.torque}
+    warm = dataclasses.replace(turn, robot=turn.robot.with_limits(**limits))
+    ratio = value_of(
+        brachis.verify_run(warm, "kuka_rsi_4ms"), "rms torque by differences"
+    )
+    times = np.linspace(0.0, turn.t_end, 4001)
+    mean = np.sqrt(np.mean(turn.torque(times) ** 2, axis=0))
+    assert ratio == pytest.approx((mean / limits["rms_torque"]).max(), rel=0.02)

@@ -141,6 +141,7 @@ def export(
     if profile is not None:
         stated: dict[str, object] = {"--joints": joints, "--last": last}
         stated |= {"--degrees": degrees or None, "--mm": mm or None}
+        stated["--slower"] = slower if slower != 1.0 else None
         refuse_options(stated, "a profile", "files without one")
         write_run = partial(
             formats.write_for_controller,

@@ -111,8 +111,10 @@ def plan(
         show=lambda: _print_plan(result, data, degrees=degrees),
         result=result,
     )
-    if run is not None and not json:
-        code = max(code, print_run(run, json=False))
+    if run is not None:
+        code = max(code, 0 if run.passed else 1)
+        if not json:
+            print_run(run, json=False)
     if view:
         shown = data["candidates"]
         show(Viewer(trajectory, shown, verified=result.verified, degrees=degrees))

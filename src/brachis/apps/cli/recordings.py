@@ -131,7 +131,9 @@ def compare(
     brachis compare out/run.csv --plan out/result.npz --profile kuka_rsi_4ms
     """
     if plan is not None and profile is not None:
-        refuse_options({"--out": out}, "--plan", "--robot")
+        refuse_options(
+            {"--out": out, "--keep-end": keep_end or None}, "--plan", "--robot"
+        )
         units = {"angle": angle, "length": length, "time": time}
         tracking = brachis.compare_run(csv, motion_file(plan), profile, units=units)
         if json:

@@ -141,8 +141,7 @@ def compare_run(
     motion = motion_of(planned, "planned")
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    stated = {"angle": profile.arm.angle, "length": profile.arm.length}
-    recording = read_recording(recorded, axes, stated | check_units(units or {}))
+    recording = read_recording(recorded, axes, check_units(units or {}))
     factors = np.array([FACTORS[unit] for unit in axes.units])
     q = axes.decode(recording.q * factors)
     t = recording.t
@@ -177,7 +176,7 @@ def compare_run(
         )
     torques = None
     if recording.tau is not None and motion.robot.has_masses:
-        planned_tau = motion.torque(plan_times)[:, axes.index]
+        planned_tau = axes.encode_torques(motion.torque(plan_times))
         torques = np.abs(recording.tau - planned_tau).max(axis=0)
     robot = motion.robot
     places = [

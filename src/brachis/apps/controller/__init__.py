@@ -8,7 +8,7 @@ Examples
 """
 
 from brachis.apps.controller.axes import FACTORS, ControllerAxes, bind_axes
-from brachis.apps.controller.limits import robot_with_profile, without_scale
+from brachis.apps.controller.limits import robot_with_profile, scale_of, without_scale
 from brachis.apps.controller.profile import (
     Language,
     Profile,
@@ -29,6 +29,7 @@ __all__ = [
     "load_profile",
     "profile_names",
     "robot_with_profile",
+    "scale_of",
     "verify_run",
     "without_scale",
 ]

@@ -16,6 +16,10 @@ FACTORS = {"rad": 1.0, "deg": 180.0 / np.pi, "m": 1.0, "mm": 1e3}
 """Units of axes, and their factors on rad or m."""
 
 
+_SINGULAR = 1e-9
+"""Determinant of couplings from which joints cannot be found."""
+
+
 @dataclass(frozen=True, eq=False)
 class ControllerAxes:
     """The m axes of a controller and the joints that they move.
@@ -58,15 +62,21 @@ class ControllerAxes:
         """Return the positions of the axes' joints, (K, m), rad or m, from values of the axes, (K, m)."""
         return np.linalg.solve(self.matrix, values.T).T + self.zero
 
+    def encode_torques(self, tau: np.ndarray) -> np.ndarray:
+        """Return the torques of the axes, (K, m), Nm or N, that do the work of torques of the joints, (K, n)."""
+        factors = np.array([FACTORS[unit] for unit in self.units])
+        slopes = self.matrix / factors[:, None]
+        return np.linalg.solve(slopes.T, tau[:, self.index].T).T
+
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the axes, as those of a recording's columns."""
+        """Names of the axes, as in a recording's columns."""
         return self.names
 
     @property
     def position_units(self) -> tuple[str, ...]:
-        """SI units of the axes."""
-        return tuple("m" if unit in ("m", "mm") else "rad" for unit in self.units)
+        """Units of the axes, which those of a recording's columns are unless their header states others."""
+        return self.units
 
 
 def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
@@ -118,6 +128,12 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
         check_names("axis", [name, *others], axis_names, "profile.coupled")
         for other, factor in others.items():
             coupling[axis_names.index(name), axis_names.index(other)] += factor
+    if abs(np.linalg.det(coupling)) < _SINGULAR:
+        raise InputError(
+            "the axes do not determine the joints",
+            where="profile.coupled",
+            found=profile.coupled,
+        )
     scales = [
         axis.sign * FACTORS[unit] for axis, unit in zip(axes, axis_units, strict=True)
     ]
@@ -150,21 +166,21 @@ def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, 
 def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
     """Return the axes' names: their own, else the next ones of their groups, else the joints'."""
     groups = {False: profile.arm, True: profile.external}
-    counts = {False: 0, True: 0}
+    unused = {kind: iter(group.names) for kind, group in groups.items()}
     names = []
     for axis in axes:
         group = groups[axis.external]
-        number = counts[axis.external]
-        counts[axis.external] += 1
-        if group.names and number >= len(group.names):
+        default = axis.joint if not group.names else None
+        name = axis.name or default or next(unused[axis.external], None)
+        if name is None or name in names:
             kind = "external axes" if axis.external else "axes of the arm"
-            found = sum(other.external == axis.external for other in axes)
+            problem = f"the profile has too few names for {kind}"
             raise InputError(
-                f"the profile has too few names for {kind}",
+                problem if name is None else "two axes have one name",
                 where="profile",
-                found=f"{found} joints",
-                allowed=", ".join(group.names),
+                found=name or ", ".join(other.joint for other in axes),
+                allowed=", ".join(group.names) if name is None else "one name each",
                 hint="Name the axes in a profile of your own; a rail has external: true",
             )
-        names.append(axis.name or (group.names[number] if group.names else axis.joint))
+        names.append(name)
     return names

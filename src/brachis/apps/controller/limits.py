@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,11 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
     value: Any
     for kind in MAGNITUDES:
         stated = getattr(profile.limits, kind)
-        by_joint = map_by_joint(f"profile.limits.{kind}", stated, arm, None)
-        ends = robot.limits.both_ways(kind)
+        if LIMIT_KINDS[kind].needs_masses and not robot.has_masses:
+            continue
+        names = axes.joints if isinstance(stated, Mapping) else arm
+        by_joint = map_by_joint(f"profile.limits.{kind}", stated, names, None)
+        ends = without_scale(robot).limits.both_ways(kind)
         for joint, value in by_joint.items():
             if value == FROM_URDF:
                 continue
@@ -41,11 +45,19 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
             pair = (max(lower, own[0]), min(upper, own[1]))
             is_pair = LIMIT_KINDS[kind].form == "pair"
             changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
-    return robot.with_limits(**changes) if changes else robot
+    if not changes:
+        return robot
+    factors = scale_of(robot)
+    stricter = without_scale(robot).with_limits(**changes)
+    return stricter.with_limits(scale=factors) if factors else stricter
+
+
+def scale_of(robot: Robot) -> dict[str, float]:
+    """Return the factors in ``robot.limits.scale`` that are not 1."""
+    return robot.settings.limits.scale.model_dump(exclude_defaults=True)
 
 
 def without_scale(robot: Robot) -> Robot:
     """Return a robot without the factors in ``robot.limits.scale``."""
-    factors = robot.settings.limits.scale.model_dump(exclude_defaults=True)
-    inverse = {kind: 1.0 / factor for kind, factor in factors.items()}
+    inverse = {kind: 1.0 / factor for kind, factor in scale_of(robot).items()}
     return robot.with_limits(scale=inverse) if inverse else robot

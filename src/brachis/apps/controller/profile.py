@@ -26,6 +26,7 @@ from brachis.task.fields import (
     merge,
 )
 from brachis.task.limit_kinds import LimitScale
+from brachis.task.limit_models import FROM_URDF
 from brachis.task.messages import validate
 from brachis.task.yaml_reader import read_yaml
 
@@ -144,6 +145,10 @@ class Profile(CheckedModel):
                 "a profile cannot contain factors on limits",
                 "robot.limits.scale in the task",
             )
+        for kind in ("position", "total_power", "torque_speed"):
+            if getattr(self.limits, kind) not in (None, FROM_URDF):
+                problem = "a profile cannot contain this limit"
+                yield f"limits.{kind}", problem, "robot.limits in the task"
         for name in self.events:
             if name not in EVENTS:
                 yield "events", "there is no event of this name", ", ".join(EVENTS)

@@ -38,14 +38,14 @@ from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.verify import path_errors
 
+_MOVING = 1e-6
+"""Joint velocity above which a motion does not rest, rad/s or m/s."""
 _STILL = 1e-9
 """A joint that moves less than this stands still, rad or m."""
 _REST = 1e-6
 """Largest acceleration at rest, as a fraction of the largest of the motion."""
 _CHORD_STEPS = 4
 """Steps on a straight joint line between two samples."""
-_DERIVATIVES = ("velocity", "acceleration", "jerk", "torque_rate")
-"""Kinds of limits that differences of samples are compared with."""
 _SLOWER = (1.001, 1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2)
 """Factors on the duration that are tried when a run fails."""
 _SHORTER = (2, 4, 8)
@@ -182,6 +182,14 @@ def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
     InputError
         The profile does not fit the robot, or a joint that moves has no axis.
     """
+    ends = np.abs(trajectory.qdot[[0, -1]]).max()
+    if ends > _MOVING:
+        raise InputError(
+            "a motion for a controller starts and ends at rest",
+            where="boundary",
+            found=f"{ends:.3g} rad/s or m/s at an end",
+            allowed="neither start_speed nor end_speed, and not periodic",
+        )
     axes = bind_axes(profile, trajectory.robot)
     names = trajectory.robot.urdf_joints
     travel = np.ptp(trajectory.q[:, : len(names)], axis=0)
@@ -231,17 +239,10 @@ class _Run:
                 *_check_tool_speed(robot, run, allowed),
             ]
             kind = _SampledMotion
-            free = np.full(robot.n, np.inf)
-            limits = robot.limits.with_magnitudes(**dict.fromkeys(_DERIVATIVES, free))
-            robot = replace(robot, limits=limits)
         checked = kind(run, robot, task_map, path, options)
-        names = {check.name.replace("by differences", "ratio") for check in differences}
-        ratios = [
-            check
-            for check in check_limits(checked, self.own_limits)
-            if check.name not in names
-        ]
-        ratios += differences
+        own = {check.name.replace("by differences", "ratio") for check in differences}
+        limits = check_limits(checked, self.own_limits)
+        ratios = [check for check in limits if check.name not in own] + differences
         path_check = _check_path(checked, self.profile)
         checks = (path_check, *ratios, *_check_rest(self.motion, self.profile))
         worst = max((check.value for check in ratios), default=0.0)
@@ -382,6 +383,13 @@ def _check_differences(
         subject = robot.joint_names[joint]
         ratio = ratios[row, joint]
         yield Check(name, ratio, allowed, "-", subject, time, of_limit=True)
+    limit = robot.limits.rms_torque
+    if np.isfinite(limit).any():
+        ratios = np.sqrt(np.mean(torques**2, axis=0)) / limit
+        joint = int(np.argmax(ratios))
+        subject = robot.joint_names[joint]
+        name = "rms torque by differences"
+        yield Check(name, ratios[joint], allowed, "-", subject, of_limit=True)
 
 
 def _check_tool_speed(robot: Robot, run: Trajectory, allowed: float) -> Iterator[Check]:
@@ -426,7 +434,8 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
     for divisor in () if profile.fixed_period else _SHORTER:
         text = f"a period of {1e3 * period / divisor:g} ms"
         trials[1].append((text, run, period / divisor))
-    for factor in _SLOWER:
+    has_speeds = run.motion.task.tool_limits.process_speed
+    for factor in () if has_speeds else _SLOWER:
         slower = replace(run, motion=slow_down(run.motion, factor))
         trials[2].append((f"{100.0 / factor:.4g} % of the speed", slower, period))
     for group in trials:

@@ -29,14 +29,15 @@ def message_of(rows: JointRows) -> dict[str, Any]:
             where="units",
             found=", ".join(dict.fromkeys(rows.units)),
         )
+    shown = rows.quantities
     points = []
     samples = rows.samples
     for k, t in enumerate(samples.t.tolist()):
         seconds, nanoseconds = divmod(round(t * 1e9), 10**9)
         point = {
             "positions": samples.q[k].tolist(),
-            "velocities": samples.qdot[k].tolist(),
-            "accelerations": samples.qddot[k].tolist(),
+            "velocities": samples.qdot[k].tolist() if "qd" in shown else [],
+            "accelerations": samples.qddot[k].tolist() if "qdd" in shown else [],
             "effort": [],
             "time_from_start": {"sec": seconds, "nanosec": nanoseconds},
         }

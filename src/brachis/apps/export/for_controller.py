@@ -99,7 +99,8 @@ def write_for_controller(
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
     file = file_name(path, "path")
-    check_names("format", profile.formats, FORMATS, "profile.formats")
+    tables = [name for name, known in FORMATS.items() if known.step is None]
+    check_names("format of samples", profile.formats, tables, "profile.formats")
     language = profile.program
     is_program = form == PROGRAM
     if language is not None and form is None:
@@ -117,8 +118,8 @@ def write_for_controller(
             tolerance=tolerance,
             time_tolerance=time_tolerance,
         )
-        first_line = text.partition("\n")[0]
-        with atomic_write(path, re.escape(first_line).encode()) as stream:
+        beginning = rb"(?s)" + re.escape(text.partition("\n")[0]).encode()
+        with atomic_write(path, beginning + rb".{0,900}planned by brachis") as stream:
             stream.write(text.encode())
         robot = robot_with_profile(without_scale(motion.robot), profile, axes)
         verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
@@ -171,7 +172,7 @@ def _rows_of(
         q=q,
         qdot=axes.encode_rates(samples.qdot),
         qddot=axes.encode_rates(samples.qddot),
-        tau=None if samples.tau is None else samples.tau[:, axes.index],
+        tau=None if samples.tau is None else axes.encode_torques(samples.tau),
     )
     end = motion.t_end
     return JointRows(axes.names, axes.units, (), end, period, changed, profile.columns)

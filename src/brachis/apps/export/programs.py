@@ -129,6 +129,7 @@ def write_program(
             allowed="joints of the arm alone",
         )
     jinja = require_library("jinja2", "a program", library="Jinja2", extra="report")
+    sandbox = require_library("jinja2.sandbox", "a program", extra="report")
     events = dict(_events(motion, profile))
     follower = _Follower(motion, is_linear=moves == "linear")
     if follower.is_linear:
@@ -158,19 +159,45 @@ def write_program(
         | {"event": events.get(time, "")}
         for row, time in enumerate(follower.t[nodes].tolist())
     ]
-    text = jinja.Template(language.template, keep_trailing_newline=True).render(
-        date=datetime.now(tz=UTC).date().isoformat(),
-        name=name,
-        robot=motion.robot.name,
-        title=profile.title,
-        report=report,
-        t_end=motion.t_end,
-        is_linear=follower.is_linear,
-        axes=axes,
-        velocities=axes.encode_rates(largest[None])[0].tolist(),
-        steps=steps,
+    if "percent" in language.template and not follower.is_linear:
+        _check_velocities(largest, axes)
+    environment = sandbox.SandboxedEnvironment(
+        undefined=jinja.StrictUndefined, keep_trailing_newline=True
     )
+    fields = {
+        "date": datetime.now(tz=UTC).date().isoformat(),
+        "name": name,
+        "robot": motion.robot.name,
+        "title": profile.title,
+        "report": report,
+        "t_end": motion.t_end,
+        "is_linear": follower.is_linear,
+        "axes": axes,
+        "velocities": np.abs(axes.encode_rates(largest[None])[0]).tolist(),
+        "steps": steps,
+    }
+    try:
+        text = environment.from_string(language.template).render(fields)
+    except jinja.TemplateError as error:
+        raise InputError(
+            "the template is wrong", where="profile.program.template", found=str(error)
+        ) from error
     return text, report
+
+
+def _check_velocities(largest: np.ndarray, axes: ControllerAxes) -> None:
+    """Refuse speeds in percent of velocities that are not known."""
+    unknown = [
+        joint
+        for joint, number in zip(axes.joints, axes.index, strict=True)
+        if np.isinf(largest[number])
+    ]
+    if unknown:
+        raise InputError(
+            "speeds in percent need the machine's largest velocities",
+            where="robot.limits.velocity",
+            found=f"none for {', '.join(unknown)}",
+        )
 
 
 def _largest_velocities(robot: Robot) -> np.ndarray:
@@ -305,9 +332,8 @@ class _Follower:
         tool, _ = robot.tool_placements(robot.of_real_joints(q))
         way = np.linalg.norm(np.diff(tool, axis=0), axis=1)
         rates = np.abs(np.diff(q, axis=0))[:, axes.index] / constant[:, None]
-        largest = largest[axes.index]
-        largest = np.where(np.isfinite(largest), largest, rates.max(axis=0))
-        percent = 100.0 * np.max(rates / np.maximum(largest, _REST), axis=1)
+        percent = 100.0 * np.max(rates / largest[axes.index], axis=1)
+        waits = np.append(False, np.abs(np.diff(q, axis=0)).max(axis=1) < _REST)
         zone = BLEND * np.minimum(np.append(0.0, way), np.append(way, 0.0)) * ~rests
         return {
             "values": np.round(axes.encode(q), 9) + 0.0,
@@ -315,6 +341,8 @@ class _Follower:
             "speed": np.append(0.0, way / constant),
             "percent": np.append(1.0, percent.clip(1e-3, 100.0)),
             "zone": zone,
+            "passes": ~rests,
+            "wait": np.where(waits, np.append(0.0, h), 0.0),
         }
 
 

@@ -23,7 +23,9 @@ _UNITS: Final = {
     "s": ("time", TIMES),
     "rad": ("angle", ANGLES),
     "m": ("length", LENGTHS),
-    "Nm": ("torque", {"Nm": 1.0, "N": 1.0}),
+    "deg": ("angle", ANGLES),
+    "mm": ("length", LENGTHS),
+    "nm": ("torque", {"nm": 1.0, "n": 1.0}),
 }
 """The quantity of each SI unit, and the units that a file may use for it, with their factors."""
 _TIME_COLUMNS = ("t", "time", "timestamp")
@@ -112,7 +114,8 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
         key = meanings.get(name)
         if key in columns:
             problems.append(f"{_describe(*key)} occurs twice")
-        if key is not None:
+        is_other = key and key[0] == "tau" and unit not in (None, "nm", "n")
+        if key is not None and not is_other:
             columns[key] = (i, unit)
     with_torques = {joint for kind, joint in columns if kind == "tau"}
     if with_torques != set(joints):  # torques of some joints are left out
@@ -272,7 +275,7 @@ def read_recording(
     bases = {"": "s", **dict(zip(joints, robot.position_units, strict=True))}
     read = {
         (kind, joint): _read_column(
-            table, column, kind, "Nm" if kind == "tau" else bases[joint], units
+            table, column, kind, "nm" if kind == "tau" else bases[joint], units
         )
         for (kind, joint), column in columns.items()
     }
