@@ -236,7 +236,7 @@ def main() -> None:
         "verified as run",
         "violations not reported",
         "false reports",
-        "largest error, in half last digits",
+        "largest error, in half units of the last digit",
     ]
     kinds = ("written", "refused", "passed", "breaks, not said", "keeps, said to break")
     rows = [
@@ -245,7 +245,7 @@ def main() -> None:
     ]
     for row in (columns, *rows):
         print(" | ".join(row))
-    about = f"{plans} seeded plans of joint or tool lines, exported with every profile and read back."
+    about = f"{plans} random plans along joint or tool lines are exported with every profile and read back."
     save("Motions as controllers run them", columns, rows, about)
 
 

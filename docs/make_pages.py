@@ -66,7 +66,6 @@ otherwise. The virtual machine was fast at that time; when it is slow, plans tak
 
 | what | planar arm (j1, j2, j3) | TX90L on its rail |
 |---|---|---|
-| one plan, neither refined nor verified | 22, 23, 41 ms | 54 ms |
 | one plan, `effort: single` | 108, 122, 130 ms | 162 ms |
 | one plan, `effort: fast`, four guesses | 199, 179, 354 ms | 309 ms |
 | `redundant_joints: auto`, `effort: fast` | 390 ms | 420 ms |
@@ -207,7 +206,7 @@ def _by_robot(result: dict[str, Any]) -> Table:
     columns = [
         "robot or path",
         "verified",
-        "end time compared with the least, by hand",
+        "end time compared with the least time, computed by hand",
         "largest deviation from the speed",
         "longest processor time",
     ]
@@ -249,7 +248,7 @@ def _by_range(result: dict[str, Any]) -> Table:
         [kind, str(len(gains)), f"{median(gains):.1f} %", f"{max(gains):.1f} %"]
         for kind, gains in kinds.items()
     ]
-    return ["range", "tasks", "gain, median", "largest"], rows
+    return ["range", "tasks", "median gain", "largest gain"], rows
 
 
 class Shown(NamedTuple):
@@ -265,7 +264,7 @@ SHOWN = {
     "work": Shown(
         "Kinds of tasks",
         _lines_of_work,
-        "Every plan runs in its own process. Processor times are medians over the tasks of a line, and include child "
+        "Every plan runs in its own process. Processor times are medians over the tasks of a row, and include child "
         "processes. End times are geometric means.",
     ),
     "growth_plans": Shown(
@@ -282,19 +281,19 @@ SHOWN = {
     ),
     "joint_paths": Shown(
         "Joint paths: toppra",
-        about="15 paths of the KUKA iiwa 14 through three to seven random waypoints. The plans of brachis are refined "
-        "and verified; toppra meets limits at its grid points.",
+        about="15 paths of the KUKA iiwa 14 go through three to seven random waypoints. The plans of brachis are "
+        "refined and verified; toppra meets limits at its grid points. Rows name the number of intervals.",
     ),
     "controllers": Shown("Motions as controllers run them"),
     "jerk_paths": Shown(
         "Joint paths with limited jerk: copp-py",
-        about="Random paths of the KUKA iiwa 14, with limits on jerk, velocity, acceleration and torque.",
+        about="Random joint paths of the KUKA iiwa 14 have limits on jerk, velocity, acceleration and torque.",
     ),
     "slides": Shown("Slides whose least time is known", _worst_slides),
     "strong_drives": Shown(
         "Strong drives and slow joints",
         _by_arm,
-        "Largest timing gap of the lines of each arm: as reported, and by an independent phase plane with 8,000 steps.",
+        "Largest timing gap for each arm: as reported, and as computed by an independent phase plane with 8,000 steps.",
     ),
     "laws": Shown(
         "An easier task is not slower",
@@ -303,13 +302,13 @@ SHOWN = {
     "phases": Shown(
         "Stops and process speeds",
         _by_robot,
-        "Process speeds of 0.02 to 1 m/s on part of the path, and stops at the corners of a square. Central "
-        "differences of the tool's positions along the saved motion check the speed.",
+        "The tasks have process speeds of 0.02 to 1 m/s on part of the path, or stops at the corners of a square. The "
+        "speed is checked by central differences of the tool's positions along the saved motion.",
     ),
     "tolerances": Shown(
         "What tolerances gain",
         _by_range,
-        "The same random tasks, planned without and with a range for the tool.",
+        "The same random tasks are planned without and with a tolerance range for the tool.",
     ),
     "sensitivities": Shown(
         "What limits cost, and solving again",
