@@ -232,11 +232,11 @@ def main() -> None:
     columns = [
         "profile",
         "written",
-        "refused",
-        "pass as run",
-        "limits broken and not said",
-        "said wrongly",
-        "off, in half last digits",
+        "rejected",
+        "verified as run",
+        "violations not reported",
+        "false reports",
+        "largest error, in half units of the last digit",
     ]
     kinds = ("written", "refused", "passed", "breaks, not said", "keeps, said to break")
     rows = [
@@ -245,7 +245,7 @@ def main() -> None:
     ]
     for row in (columns, *rows):
         print(" | ".join(row))
-    about = f"{plans} seeded plans, lines of the joints or of the tool, exported with every profile and read back."
+    about = f"{plans} random plans along joint or tool lines are exported with every profile and read back."
     save("Motions as controllers run them", columns, rows, about)
 
 

@@ -168,11 +168,11 @@ def summarise(rows: np.ndarray) -> None:
     cells = [
         ("failed", f"{int(np.isinf(gaps).sum())}", "0"),
         (
-            "beyond a limit by more than 0.2 % between stations",
+            "limit exceeded by more than 0.2 % between stations",
             "0, verified",
             f"{int((worst_ratios > WITHIN).sum())}",
         ),
-        ("end time beside copp-py's, where both hold", span, ""),
+        ("end time compared with copp-py's, if both meet the limits", span, ""),
         (
             "processor time, median",
             f"{np.median(ours_all):.2f} s",

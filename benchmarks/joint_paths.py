@@ -146,7 +146,7 @@ def summarise(names: tuple[str, ...], cases: np.ndarray, active: Counter[str]) -
     columns = (
         "",
         "planned",
-        "end time beside toppra's on 2000 intervals",
+        "end time compared with toppra's on 2000 intervals",
         "processor time, median",
     )
     for row in (columns, *rows):
@@ -157,7 +157,7 @@ def summarise(names: tuple[str, ...], cases: np.ndarray, active: Counter[str]) -
     )
     about = (
         f"{len(cases)} paths of the KUKA iiwa 14 through three to seven random waypoints; {limits}. The plans of "
-        "brachis are refined and verified; toppra's limits hold at its grid points."
+        "brachis are refined and verified; toppra meets limits at its grid points."
     )
     print(about)
     save("Paths of joints, beside toppra", columns, rows, about)

@@ -438,9 +438,9 @@ def main() -> None:
         print(" | ".join(row))
     violations = np.array([pair.violation for pair in everything])
     about = (
-        f"{len(everything)} pairs: {np.sum(violations > SMALL)} beyond {100.0 * SMALL:g} %, "
-        f"{np.sum(violations > LARGE)} beyond {100.0 * LARGE:g} %. "
-        "A violation says by how much the plan of the easier task is slower."
+        f"{len(everything)} pairs of an easier and a harder task. A violation says by how much the plan of the easier "
+        f"one is slower; {np.sum(violations > SMALL)} exceed {100.0 * SMALL:g} %, "
+        f"{np.sum(violations > LARGE)} exceed {100.0 * LARGE:g} %."
     )
     print(about)
     save("Laws of pairs of plans", COLUMNS, rows, about)

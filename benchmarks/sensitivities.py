@@ -677,9 +677,9 @@ def compare_parts(parts: Iterable[Any]) -> None:
     columns = (
         "limit",
         "within 5 % of central differences",
-        "worst",
-        "worst at +0.1 %",
-        "worst at +1 %",
+        "largest difference",
+        "from solving again, +0.1 %",
+        "from solving again, +1 %",
     )
     print("\n" + "\n".join(" | ".join(row) for row in (columns, *rows)))
     print(

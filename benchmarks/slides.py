@@ -45,7 +45,7 @@ COLUMNS = (
     "degree",
     "rest",
     "verified",
-    "largest excess, and at which force",
+    "largest excess, and the force",
     "not shorter than at the force before",
     "but longer by",
 )
@@ -109,7 +109,7 @@ def main() -> None:
     above = sum(excess > ALLOWED for excess in excesses)
     longer = sum(rise >= 0.0 for rise in rises)
     about = (
-        f"{len(excesses)} slides of {MASS:g} kg over {DISTANCE:g} m. {len(excesses) - above} end within "
+        f"{len(excesses)} motions of a {MASS:g} kg slide over {DISTANCE:g} m. {len(excesses) - above} end within "
         f"{100.0 * ALLOWED:g} % of the least time, the worst {100.0 * max(excesses):.3f} % above it. In {longer} of "
         f"{len(rises)} steps to a larger force, the motion is not shorter, but up to {100.0 * max(rises):.4f} % longer."
     )

@@ -61,28 +61,25 @@ Each table comes from a file in `benchmarks/results`, which the script named abo
 
 ## How long a plan takes
 
-`python3 tasks.py bench` prints these times. Plans have 20 intervals, and are refined and verified unless the row says
-otherwise. The virtual machine was fast at that hour; when it is slow, plans take three times as long.
+`python3 tasks.py bench` measures these times. Plans have 20 intervals, and are refined and verified unless the row says
+otherwise. The virtual machine was fast at that time; when it is slow, plans take three times as long.
 
 | what | planar arm (j1, j2, j3) | TX90L on its rail |
 |---|---|---|
-| one plan, neither refined nor verified | 22, 23, 41 ms | 54 ms |
 | one plan, `effort: single` | 108, 122, 130 ms | 162 ms |
 | one plan, `effort: fast`, four guesses | 199, 179, 354 ms | 309 ms |
 | `redundant_joints: auto`, `effort: fast` | 390 ms | 420 ms |
-| rows at 61 collocation points | 0.14 ms | 0.21 ms |
-| their whole Jacobian | 0.15 ms | 0.20 ms |
 | closed form, all 8 branches, per pose of a batch of 2000 | | 0.8 to 1.3 us |
-| the same by EAIK | | 17 us |
+| the same with EAIK | | 17 us |
 
-Times grow with the degree of redundancy r. With default settings, the line of [this page](my_urdf.md#a-first-motion)
-took 0.9 s for a pose (r = 1), 2.9 s with a free roll (r = 2), and 5.3 s for a position (r = 4).
+Times grow with the degree of redundancy r. With default settings, planning [this line](my_urdf.md#a-first-motion) took
+0.9 s for a pose (r = 1), 2.9 s with a free roll (r = 2), and 5.3 s for a position (r = 4).
 """
 BENCHMARKS_REST = """\
 ## All other results
 
-| file in `benchmarks/results` | what it measures | script |
-|---|---|---|
+| file in `benchmarks/results` | what it measures |
+|---|---|
 """
 
 
@@ -144,8 +141,9 @@ def _all_rows(result: dict[str, Any]) -> Table:
 
 
 def _lines_of_work(result: dict[str, Any]) -> Table:
-    """Return the lines that summarise all tasks of one kind."""
+    """Return the lines that summarise all tasks of one kind, without the names of the longest tasks."""
     lines = [row for row in result["rows"] if ": " not in row[0]]
+    lines = [[re.sub(r" \(.*\)$", "", cell) for cell in row] for row in lines]
     return _without_column(4, result["columns"], lines)  # the first verified motion
 
 
@@ -208,8 +206,8 @@ def _by_robot(result: dict[str, Any]) -> Table:
     columns = [
         "robot or path",
         "verified",
-        "end time beside the least, by hand",
-        "most off the speed",
+        "end time compared with the least time, computed by hand",
+        "largest deviation from the speed",
         "longest processor time",
     ]
     return columns, rows
@@ -217,7 +215,7 @@ def _by_robot(result: dict[str, Any]) -> Table:
 
 NAMES_OF_GROUPS = {
     "TX90L": "TX90L, rail locked",
-    "refused": "speed refused, planned at the speed that the error names",
+    "refused": "speed rejected; planned at the speed that the error suggests",
 }
 
 
@@ -227,9 +225,15 @@ def _worst_laws(result: dict[str, Any]) -> Table:
     return ["change with a violation above 0.1 %", *result["columns"][1:3]], rows
 
 
+def _without_growth(result: dict[str, Any]) -> Table:
+    """Return all columns but the exponent of the growth."""
+    return _without_column(4, result["columns"], result["rows"])
+
+
 def _without_small_steps(result: dict[str, Any]) -> Table:
-    """Return all columns but the one for limits that are 0.1 % wider."""
-    return _without_column(3, result["columns"], result["rows"])
+    """Return all columns but the one for limits that are 0.1 % wider, and the kinds with at least ten limits."""
+    rows = [row for row in result["rows"] if _number(row[1]) >= 10]
+    return _without_column(3, result["columns"], rows)
 
 
 def _by_range(result: dict[str, Any]) -> Table:
@@ -244,7 +248,7 @@ def _by_range(result: dict[str, Any]) -> Table:
         [kind, str(len(gains)), f"{median(gains):.1f} %", f"{max(gains):.1f} %"]
         for kind, gains in kinds.items()
     ]
-    return ["range", "tasks", "gain, median", "largest"], rows
+    return ["range", "tasks", "median gain", "largest gain"], rows
 
 
 class Shown(NamedTuple):
@@ -257,26 +261,40 @@ class Shown(NamedTuple):
 
 
 SHOWN = {
-    "work": Shown("Kinds of tasks", _lines_of_work),
+    "work": Shown(
+        "Kinds of tasks",
+        _lines_of_work,
+        "Every plan runs in its own process. Processor times are medians over the tasks of a row, and include child "
+        "processes. End times are geometric means.",
+    ),
     "growth_plans": Shown(
         "More intervals",
-        about="Plans for the TX90L on its rail with N intervals, `effort: single`, refined and verified.",
+        _without_growth,
+        "Plans for the TX90L on its rail with N intervals and `effort: single`, refined and verified.",
     ),
     "peers": Shown(
         "Other solvers",
         about="All solvers start from the joint path of the pseudo-inverse, or search for a better one. The same "
-        "checker examines every solution at 5,001 times. Limits hold everywhere in the solutions of brachis, at 61 "
-        "places in those of CasADi and Drake, and at 401 in those of toppra. On the second line, Drake's SNOPT ends "
-        "without a solution after 20,000 iterations.",
+        "checker examines every solution at 5,001 instants. Limits are imposed everywhere in brachis, at 61 points in "
+        "CasADi and Drake, and at 401 points in toppra. On the second line, SNOPT in Drake stops after 20,000 "
+        "iterations without a solution.",
     ),
-    "joint_paths": Shown("Joint paths: toppra"),
+    "joint_paths": Shown(
+        "Joint paths: toppra",
+        about="15 paths of the KUKA iiwa 14 go through three to seven random waypoints. The plans of brachis are "
+        "refined and verified; toppra meets limits at its grid points. Rows name the number of intervals.",
+    ),
     "controllers": Shown("Motions as controllers run them"),
     "jerk_paths": Shown(
         "Joint paths with limited jerk: copp-py",
-        about="Random paths of the KUKA iiwa 14, with limits on jerk, velocity, acceleration and torque.",
+        about="Random joint paths of the KUKA iiwa 14 have limits on jerk, velocity, acceleration and torque.",
     ),
     "slides": Shown("Slides whose least time is known", _worst_slides),
-    "strong_drives": Shown("Strong drives and slow joints", _by_arm),
+    "strong_drives": Shown(
+        "Strong drives and slow joints",
+        _by_arm,
+        "Largest timing gap for each arm: as reported, and as computed by an independent phase plane with 8,000 steps.",
+    ),
     "laws": Shown(
         "An easier task is not slower",
         _worst_laws,
@@ -284,20 +302,20 @@ SHOWN = {
     "phases": Shown(
         "Stops and process speeds",
         _by_robot,
-        "Process speeds of 0.02 to 1 m/s on part of the path, and stops at the corners of a square. The speed is "
-        "checked by central differences of the tool's positions along the saved motion.",
+        "The tasks have process speeds of 0.02 to 1 m/s on part of the path, or stops at the corners of a square. The "
+        "speed is checked by central differences of the tool's positions along the saved motion.",
     ),
     "tolerances": Shown(
         "What tolerances gain",
         _by_range,
-        "The same random tasks, planned without and with a range for the tool.",
+        "The same random tasks are planned without and with a tolerance range for the tool.",
     ),
     "sensitivities": Shown(
         "What limits cost, and solving again",
         _without_small_steps,
-        about="Limits for which the end time changes by more than 0.1 ms if they are 1 % wider. The derivative from "
-        "the multipliers is compared with central differences (0.03 % either way), and with solving again. The last "
-        "column compares it with the linearised problem.",
+        about="These limits change the end time by more than 0.1 ms if they are 1 % wider; kinds with fewer than ten "
+        "limits are only counted in the last row. The derivative from the multipliers is compared with central "
+        "differences (0.03 % either way), with solving again, and with the linearised problem.",
     ),
 }
 """The results that the page shows, in its order."""
@@ -335,7 +353,7 @@ def _line(name: str, result: dict[str, Any]) -> str:
     """Return the line of a file, with those sentences of its description that count verified plans."""
     found = re.findall(r"(?:^|(?<=\. ))\d+ of \d+ .*?\.(?= |$)", result["about"])
     about = ". ".join([result["title"], *found])
-    return f"| `{name}` | {about} | `{result['command'].removeprefix('python ')}` |\n"
+    return f"| `{name}` | {about} |\n"
 
 
 def write_gallery() -> None:

@@ -42,7 +42,7 @@ COLUMNS = (
     "solve",
     "end time",
     "limits used",
-    "off the line",
+    "distance from the line",
 )
 
 
