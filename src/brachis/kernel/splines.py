@@ -1,8 +1,8 @@
 """Splines without SciPy, because importing SciPy takes longer than an ordinary plan.
 
-A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots after
-its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are computed by de Boor's recursion
-(Cohen, Lyche and Riesenfeld, 1980).
+A control point belongs to several polynomial pieces. It is the blossom (polar form) b of any of them, evaluated at the
+d knots after its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are computed by de Boor's
+recursion (Cohen, Lyche and Riesenfeld, 1980).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Spline:
         Raises
         ------
         ValueError
-            There are too few places, they do not ascend, or the number of values differs.
+            There are too few places, the places do not ascend, or there are more or fewer values than places.
         """
         if len(places) <= degree:
             degree = 1
@@ -81,7 +81,7 @@ class Spline:
         return cls(knots, points, degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
-        """Evaluate the spline, or its derivative of order `nu`, at x, of any shape; at a knot, just after it."""
+        """Evaluate the spline, or its derivative of order `nu`, at x of any shape; at a knot, just after the knot."""
         if nu > 0:
             return self.derivative(x, nu - 1)
         x = np.asarray(x, dtype=float)
@@ -94,7 +94,7 @@ class Spline:
     def derivatives(
         self, x: np.ndarray, order: int, rounding: float = 0.0
     ) -> np.ndarray:
-        """Return value and derivatives up to `order`, (order + 1, K, ...), at x, (K,); at a knot, those just after it.
+        """Return value and derivatives up to `order`, (order + 1, K, ...), at x, (K,), or just after x if x is a knot.
 
         An x at most `rounding` before a knot is treated as at this knot.
         """
@@ -127,7 +127,7 @@ class Spline:
 def collocation(
     knots: np.ndarray, degree: int, places: np.ndarray, nu: int = 0
 ) -> np.ndarray:
-    """Return a matrix, (P, L), so that ``matrix @ control_points`` is the spline, or a derivative, at places, (P,)."""
+    """Return a matrix, (P, L). ``matrix @ control_points`` is the spline, or a derivative, at places, (P,)."""
     return Spline(knots, np.eye(len(knots) - degree - 1), degree)(places, nu)
 
 
@@ -137,7 +137,7 @@ def blossom(
     spans: np.ndarray,
     arguments: Sequence[np.ndarray],
 ) -> np.ndarray:
-    """Evaluate the blossoms of a spline's polynomials; see the module.
+    """Evaluate the blossoms of a spline's polynomials; see the docstring of the module.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def bernstein(coefficients: np.ndarray, spans: np.ndarray, u: np.ndarray) -> np.
 
 
 def _find_spans(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
-    """Find the knot at which the span of each x, (K,), begins; x outside the knots belongs to the outer span."""
+    """Find the knot at which the span of each x, (K,), begins. An x outside the knots belongs to the outer span."""
     spans = np.searchsorted(knots, x, side="right") - 1
     return np.clip(spans, degree, len(knots) - degree - 2)
 
@@ -200,7 +200,7 @@ class _Basis(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class Basis(Structured):
-    """Basis functions of splines and their derivatives, at K places, without those that are zero there.
+    """Basis functions of splines and their derivatives at K places. Functions that are zero there are left out.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Basis(Structured):
     first: np.ndarray
 
     def __post_init__(self) -> None:
-        """Refuse indices of control points that do not exist."""
+        """Raise an error if indices of control points are impossible."""
         if self.first.shape != (self.values.shape[1],):
             raise ValueError("first needs one number for each place")
         if self.first.min(initial=0) < 0:
@@ -237,7 +237,7 @@ class Basis(Structured):
         curves, point_count = control_points.shape
         if count and point_count < self._needed:
             raise ValueError(f"a control point does not exist; there are {point_count}")
-        # The shapes are known here, so `call_checked` is not needed; this function is called most often.
+        # The shapes are known, so the slower `call_checked` is not needed. No function is called more often.
         values = np.empty((orders, count, curves))
         points = as_contiguous(control_points, (curves, point_count))
         call("brachis_curves", self.address, curves, point_count, points, values)
