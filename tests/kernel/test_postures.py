@@ -120,7 +120,7 @@ def test_what_does_not_fit_is_an_error():
     with pytest.raises(ValueError, match="no solutions to choose from"):
         _ = branch_of(REDUNDANT, OTHERS, 0).address
     formula = Formula.of(lambda a, b: np.stack([a[:, 0], b[:, 0]], axis=1), 2, 1)
-    with pytest.raises(ValueError, match=r"the answers have the shape \(2,\)"):
+    with pytest.raises(ValueError, match=r"the solutions have the shape \(2,\)"):
         _ = branch_of(REDUNDANT, OTHERS, 1, formula).address
 
 

@@ -37,7 +37,7 @@ _SHAPES = {
 
 
 class _Chain(ctypes.Structure):
-    """`chain` of chain.h."""
+    """The structure `chain` of chain.h."""
 
     _fields_ = declare_fields(f"l joints; p {' '.join(_SHAPES)}")
 

@@ -1,4 +1,4 @@
-"""Slopes of values with respect to curves, computed from slopes with respect to joints; entries of a Jacobian.
+"""Slopes of values with respect to curves, from slopes with respect to joints, and the entries of a Jacobian.
 
 See `brachis.optimise.evaluator`.
 """
@@ -34,7 +34,7 @@ class MotionSlopes:
 
 
 class _Variables(ctypes.Structure):
-    """`variables` of chain_rule.c."""
+    """The structure `variables` of chain_rule.c."""
 
     _fields_ = declare_fields(
         "l orders shared_count; p shared; l entries; p points curves basis"
@@ -137,7 +137,7 @@ def differentiate(
         q, qdot and qddot.
     partials : sequence of (sequence of ndarray or None, ndarray or None)
         Partials of the groups in ``groups.with_partials``. The partials with respect to q, qdot, qddot and qdddot have
-        the shape (K, size, n), or (size, n) if all points share them; that with respect to the first curve, (K, size).
+        the shape (K, size, n), or (size, n) if all points share them. The partial by the first curve is (K, size).
     variables : VariableSlopes, optional
 
     Returns
@@ -145,7 +145,7 @@ def differentiate(
     slopes : (3 or 4, K, sum of sizes, c) ndarray
         Slopes with respect to y, ydot and yddot, and also to ydddot if `qdddot_y` is given.
     entries : (b K + z, sum of sizes) ndarray
-        See `VariableSlopes.find_entries`; (0, sum of sizes) without variables.
+        Entries of the Jacobian, see `VariableSlopes.find_entries`; (0, sum of sizes) if no variables are given.
     """
     count, n, width = motion.gradient.shape
     groups.check_joints(n)

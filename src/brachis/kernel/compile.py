@@ -3,7 +3,7 @@
     python src/brachis/kernel/compile.py
 
 Installing the package does the same. The script uses the machine's C compiler (`CC`, or `cc`). If there is none, it
-uses the compiler of the package ziglang. It needs only the standard library.
+uses the compiler of the package ziglang. The script needs only the standard library.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SCRIPT = Path(__file__).resolve()
 FOLDER = SCRIPT.parent
 VARIANTS = {"baseline": (), "avx2": ("-mavx2",)}
 """Names of the library variants, and the compiler flags for the processor features that they may use."""
-# Without contraction, all variants give the same digits.
+# Without contraction of operations, all variants give the same digits.
 _FLAGS = ("-O3", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno")
 _QUIET = ("-Wno-psabi",)
 
@@ -39,7 +39,7 @@ def describe_file(library: Path) -> str:
 
 
 def source_digest() -> str:
-    """Return a digest of the C source, which shows whether a library was compiled from it."""
+    """Return a digest of the C source code. It shows whether a library was compiled from this code."""
     digest = hashlib.sha256()
     for file in sorted([*FOLDER.glob("*.h"), *FOLDER.glob("*.c")]):
         digest.update(file.read_bytes())
@@ -97,8 +97,8 @@ def compile_kernel() -> list[Path]:
         if flags and platform.machine().lower() not in ("x86_64", "amd64"):
             continue
         library = library_path(variant)
-        # Compile under another name and then move the file: a process that loads it meanwhile gets the old or the new
-        # library.
+        # Compile under another name and then move the file, so that a process that loads the library meanwhile gets
+        # either the old or the new one.
         aside = library.with_suffix(f".{os.getpid()}.tmp")
         command = [
             *compiler,

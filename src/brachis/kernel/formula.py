@@ -1,10 +1,10 @@
 """Formulas written with NumPy. They are recorded once, and the library evaluates them at many points.
 
-To record a function, it is called once with arrays of `Number` in place of values. For square roots and angles the
-function uses the functions of this module; for plain values they are NumPy's. The operations are recorded as a sequence
-of steps. The derivatives are recorded too, by the chain rule from the last step to the first (reverse accumulation;
-A. Griewank, A. Walther, Evaluating Derivatives, 2008). Steps that are not needed are left out, and equal steps are
-stored once.
+To record a function, it is called once with arrays of `Number` in place of values. For square roots and angles, the
+function must use the functions of this module. With plain values, these are NumPy's functions. The operations are
+recorded as a sequence of steps. The derivatives are recorded too, by the chain rule from the last step to the first
+(reverse accumulation; A. Griewank, A. Walther, Evaluating Derivatives, 2008). Steps that are not needed are left out,
+and equal steps are stored once.
 
 A function must perform the same operations for all values, so it may use neither comparisons nor `numpy.linalg`. Terms
 with a factor of zero count as zero, even if the other factor is infinite.
@@ -229,7 +229,7 @@ ceil: Callable[..., Any] = _make_recordable(np.ceil)
 
 
 class _Formula(ctypes.Structure):
-    """`formula` of motion.h."""
+    """The structure `formula` of motion.h."""
 
     _fields_ = declare_fields(
         "l first_count second_count constant_count; p constants; l step_count; p steps; "
@@ -249,7 +249,7 @@ class Formula(Structured):
         Shape of the results at a point.
     constants : (c,) ndarray
     steps : (s, 3) int32 ndarray
-        Operation and operands. The operands are indices over inputs, constants and steps.
+        Operation and operands of each step. The operands are indices over inputs, constants and steps.
     outputs : (o,) int32 ndarray
         Indices of the results, over the same inputs, constants and steps.
     discards_incomplete : bool
@@ -344,7 +344,7 @@ class Formula(Structured):
         )
 
     def __call__(self, *points: np.ndarray) -> np.ndarray:
-        """Evaluate the formula at K points. Each argument is (K, count), the result (K, ...)."""
+        """Evaluate the formula at K points. Each argument has the shape (K, count), the result (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
         arrays = [as_contiguous(values, (count, size)) for values, size in pairs]

@@ -35,7 +35,7 @@ def halve_intervals(
         Size of the jump of the accelerations between two times, and the cost per unit of length of a ramp that replaces
         the jump.
     least_times : int
-        Minimum number of times within an interval needed to tell whether the accelerations are smooth in it.
+        Minimum number of times in an interval that are needed to tell whether the accelerations are smooth there.
     begin_count : int
         Number of equal intervals before halving.
     tolerance : float

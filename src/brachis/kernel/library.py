@@ -135,11 +135,11 @@ def _open(path: Path) -> ctypes.CDLL:
             problem = f"{path.name} is damaged: it has {size} instead of {built_size}"
             raise NotBuiltError(problem, SCRIPT)
         library = ctypes.CDLL(str(path))
-    except OSError as error:  # missing, or of another kind of machine
+    except OSError as error:  # the file is missing, or for another kind of machine
         raise NotBuiltError(str(error), SCRIPT) from error
     library.brachis_source.restype = ctypes.c_char_p
     if library.brachis_source().decode() != source_digest():
-        raise NotBuiltError(f"{path.name} was compiled from other source", SCRIPT)
+        raise NotBuiltError(f"{path.name} was compiled from other source code", SCRIPT)
     for name, declaration in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype = _KINDS[declaration[0]]
@@ -158,7 +158,7 @@ def address(values: np.ndarray) -> int:
     """Return the address of a contiguous array."""
     try:
         return _find_address(_find_buffer(values))
-    except (TypeError, ValueError):  # read-only, or empty
+    except (TypeError, ValueError):  # the array is read-only or empty
         place, _ = values.__array_interface__["data"]
         return int(place)
 
@@ -267,7 +267,7 @@ class Structured:
     __dataclass_fields__: dict[str, Any]
 
     def _make_structure(self) -> ctypes.Structure:
-        """Build the structure. The arrays to which it points are stored in it as attributes."""
+        """Build the structure. Arrays to which the structure points are stored as attributes of the structure."""
         raise NotImplementedError
 
     @property

@@ -1,4 +1,4 @@
-"""Newton's method for postures; see `brachis.ik.newton`."""
+"""Newton's method for finding postures; see `brachis.ik.newton`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from brachis.kernel.library import (
 
 
 class _Prescribed(ctypes.Structure):
-    """`prescribed` of tool.h."""
+    """The structure `prescribed` of tool.h."""
 
     _fields_ = declare_fields(
         "l in_tool_axes rows first_axis second_axis third_axis turns tool_axis first second; d sign"
@@ -39,7 +39,7 @@ class Prescribed(Structured):
     heading : tuple of int
         If an angle is prescribed: the tool's axis, and the two world axes of the plane in which the angle is measured.
     sign : float
-        Sign with which the second world axis counts.
+        Sign of the component along the second world axis.
     """
 
     axes: tuple[int, ...]

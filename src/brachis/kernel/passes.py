@@ -73,7 +73,7 @@ def go_forwards(
     within: tuple[np.ndarray, np.ndarray],
     first: float,
 ) -> np.ndarray:
-    """Find the largest x, (P,), at one station after the other, within intervals, (P,) each; see `go_backwards`."""
+    """Find the largest x at each station, (P,), in order, within given intervals, (P,); see `go_backwards`."""
     x: np.ndarray = call_checked(
         "brachis_go_forwards", factor, upper, *within, first, P=len(factor) + 1
     )

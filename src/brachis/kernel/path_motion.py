@@ -70,7 +70,7 @@ class Fault(IntEnum):
 
 
 class _PathMotion(ctypes.Structure):
-    """`path_motion` of motion.h."""
+    """The structure `path_motion` of motion.h."""
 
     _fields_ = declare_fields(
         f"p arm task branch; l count rows_step; d side;p {' '.join((*_INPUTS, *_OUTPUTS))}"
@@ -97,14 +97,14 @@ class PathMotion(Structured):
     """Motion at K points along a path.
 
     Call `prepare` first. If the closed form has no formula, then write its solutions to `answers`. If postures are
-    known, write them to `q`; they must be known if there is neither a `branch` nor ``inputs["reference"]``.
+    known, write them to `q`. Postures must be known if there is neither a `branch` nor ``inputs["reference"]``.
 
     Attributes
     ----------
     chain : Chain
     prescribed : Prescribed
     branch : Branch or None
-        Branch by which postures are found; None in a chart.
+        Branch on which postures are found; None in a chart.
     side : float
         Required sign of det J_aug; 0 allows both signs.
     inputs : dict of str to ndarray

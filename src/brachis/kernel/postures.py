@@ -12,7 +12,7 @@ from brachis.kernel.library import Structured, address, as_contiguous, declare_f
 
 
 class _Branch(ctypes.Structure):
-    """`branch` of motion.h."""
+    """The structure `branch` of motion.h."""
 
     _fields_ = declare_fields(
         "p answers_of; l alternatives; p redundant nonredundant turns ranged start"
@@ -69,7 +69,7 @@ class Branch(Structured):
         redundant = len(self.redundant)
         if (joints, redundant) != (n, r):
             raise ValueError(
-                f"the branch has {joints} joints, {redundant} redundant; needed: {n}, {r}"
+                f"the branch has {joints} joints, {redundant} redundant; needed: {n} and {r}"
             )
         if self.answers_of is None or self.answers_of.counts == (coordinates, r):
             return
@@ -82,7 +82,7 @@ class Branch(Structured):
         joints = np.concatenate([self.redundant, self.nonredundant])
         if not np.array_equal(np.sort(joints), np.arange(n)):
             raise ValueError(
-                "the redundant and the other joints must be all joints, each once"
+                "the redundant and the other joints must be all joints of the robot, each once"
             )
         if self.alternatives < 1:
             raise ValueError("the branch has no solutions to choose from")
@@ -92,7 +92,7 @@ class Branch(Structured):
             needed = (self.alternatives, len(self.nonredundant))
             if self.answers_of.shape != needed:
                 raise ValueError(
-                    f"the answers have the shape {self.answers_of.shape}; needed: {needed}"
+                    f"the solutions have the shape {self.answers_of.shape}; needed: {needed}"
                 )
         indices = [self.redundant.astype("l"), self.nonredundant.astype("l")]
         tables = [

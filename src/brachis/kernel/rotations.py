@@ -22,7 +22,7 @@ def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
 
 
 def body_twists(poses: np.ndarray) -> np.ndarray:
-    """Differentiate poses.
+    """Compute body twists and their derivatives from poses.
 
     Parameters
     ----------

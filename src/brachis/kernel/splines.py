@@ -47,7 +47,7 @@ class Spline:
     def through(cls, places: np.ndarray, values: np.ndarray, degree: int = 3) -> Spline:
         """Interpolate values, (P, ...), at ascending places, (P,), with an odd degree d.
 
-        The first (d + 1) / 2 intervals are one polynomial, and so are the last ("not a knot"). With d places or fewer,
+        The first (d + 1) / 2 intervals share one polynomial, and so do the last ("not a knot"). With d places or fewer,
         the spline consists of straight lines.
 
         Raises
@@ -155,7 +155,9 @@ def blossom(
     count = len(spans)
     points = len(knots) - degree - 1
     if count and not degree <= spans.min() <= spans.max() < points:
-        raise ValueError(f"a piece does not exist; they are {degree} to {points - 1}")
+        raise ValueError(
+            f"a piece does not exist; the pieces are {degree} to {points - 1}"
+        )
     places = np.reshape(arguments, (degree, count))
     values: np.ndarray = call_checked(
         "brachis_blossoms", knots, control_points, spans, places, g=degree, L=points
@@ -180,7 +182,7 @@ def bernstein(coefficients: np.ndarray, spans: np.ndarray, u: np.ndarray) -> np.
     """
     width, count, *shape = coefficients.shape
     if len(spans) and not 0 <= spans.min() <= spans.max() < count:
-        raise ValueError(f"a piece does not exist; they are 0 to {count - 1}")
+        raise ValueError(f"a piece does not exist; the pieces are 0 to {count - 1}")
     columns = coefficients.reshape(width, count, math.prod(shape))
     values = call_checked("brachis_bernstein", columns, spans, u)
     return np.reshape(values, (len(u), *shape))
@@ -193,7 +195,7 @@ def _find_spans(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
 
 
 class _Basis(ctypes.Structure):
-    """`basis` of splines.c."""
+    """The structure `basis` of splines.c."""
 
     _fields_ = declare_fields("l orders count width; p values first")
 
@@ -215,9 +217,9 @@ class Basis(Structured):
     def __post_init__(self) -> None:
         """Raise an error if indices of control points are impossible."""
         if self.first.shape != (self.values.shape[1],):
-            raise ValueError("first needs one number for each place")
+            raise ValueError("`first` must have one index for each place")
         if self.first.min(initial=0) < 0:
-            raise ValueError("numbers of control points are negative")
+            raise ValueError("indices of control points are negative")
 
     @cached_property
     def _needed(self) -> int:

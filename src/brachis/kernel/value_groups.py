@@ -1,4 +1,4 @@
-"""Values of limits in groups: joint quantities and formulas, which the kernel computes, and all other values."""
+"""Values of limits in groups. The kernel itself computes joint quantities and formulas, but not other values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from brachis.kernel.formula import Formula
 from brachis.kernel.library import address, as_contiguous, as_doubles_at_points, call
 
 QUANTITIES = ("q", "qdot", "qddot", "qdddot", "torque")
-"""Quantities in the order of motion.h."""
+"""Quantities of a joint, in the order of motion.h."""
 _TORQUE = len(QUANTITIES) - 1
 _FORMULA = len(QUANTITIES)
 _PARTIAL = ("q", "qdot", "qddot", "qdddot")
@@ -28,7 +28,7 @@ _GROUP = np.dtype(
         ("s", np.intp),
     ]
 )
-"""`value_group` of motion.h."""
+"""The structure `value_group` of motion.h."""
 
 Partial = np.ndarray | None
 
@@ -165,7 +165,7 @@ class ValueGroups:
         self.has_jerk |= scaled.quantity == "qdddot"
         if quantity == _TORQUE:
             if self.chain not in (None, scaled.chain):
-                raise ValueError("torques are of more than one chain")
+                raise ValueError("torques belong to more than one chain")
             self.chain = scaled.chain
 
     def _set_joints(self, n: int) -> None:

@@ -130,10 +130,10 @@ class ChartMap(PathMap):
     Parameters
     ----------
     task_map : TaskMap
-        Of the robot.
+        Task map of the robot.
     path : Path
     rows : ChartRows
-        C and p.
+        Rows C and offsets p.
     s : (S,) ndarray
         Path coordinates of the reference, from 0 to 1.
     reference : (S, n) ndarray
@@ -197,7 +197,7 @@ class ChartMap(PathMap):
         return np.column_stack([s, self.rows.values(s, q)])
 
     def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
-        """Return the targets, the rows, and the reference, where Newton's method starts."""
+        """Return the targets, the rows and the reference, from which Newton's method starts."""
         s = y[:, 0]
         inputs = {"targets": sample.target, "reference": self._reference_at(s)}
         return inputs | self.rows.kernel_inputs(s)
@@ -275,7 +275,7 @@ def chart_around(
 
 
 def _growing(s: np.ndarray) -> np.ndarray:
-    """Return the first index, the last, and those at which path coordinates, (S,), have grown."""
+    """Return indices of path coordinates, (S,): the first, the last, and those at which they have grown."""
     furthest = np.maximum.accumulate(s)
     apart = 1e-7
     grown = np.append(True, np.diff(furthest) > apart) & (s < s[-1] - apart)

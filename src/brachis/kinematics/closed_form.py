@@ -35,7 +35,7 @@ class ClosedFormMap(PathMap):
     Parameters
     ----------
     task_map : TaskMap
-        Of the robot.
+        Task map of the robot.
     path : Path
     solver : IKSolver
     redundant : tuple of int
@@ -50,7 +50,7 @@ class ClosedFormMap(PathMap):
     faults: ClassVar = {
         Fault.NO_POSTURE: "the target is out of the branch's reach",
         Fault.SINGULAR: "the Jacobian of the non-redundant joints is singular",
-        Fault.TURNS_TOO_FAR: "a joint turns too far between collocation points to count its turns",
+        Fault.TURNS_TOO_FAR: "a joint turns so far between collocation points that its turns cannot be counted",
     }
 
     def __init__(
@@ -102,7 +102,7 @@ class ClosedFormMap(PathMap):
         return self.branch_margins(self.start[None])[0]
 
     def margins(self, state: JointState) -> np.ndarray:
-        """Return the margins of the branch."""
+        """Return the margins of the branch, (K, b), for a state."""
         return self.branch_margins(state.q)
 
     def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:

@@ -246,7 +246,7 @@ class JointSpaceMap(JointMap):
         self.start = path.sample(np.zeros(1)).target[0]
 
     def coordinates(self, s: float, _q: np.ndarray) -> np.ndarray:
-        """Return s, the only curve."""
+        """Return y = (s), because s is the only curve."""
         return np.array([s])
 
     def postures(self, y: np.ndarray) -> np.ndarray:

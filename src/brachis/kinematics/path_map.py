@@ -71,7 +71,7 @@ class PathMap(JointMap):
     Parameters
     ----------
     task_map : TaskMap
-        Of the robot.
+        Task map of the robot.
     path : Path
     start : (n,) ndarray
         Posture at, or close to, the beginning.

@@ -68,7 +68,7 @@ class FreeMatrix:
 
     @classmethod
     def of(cls, matrix: np.ndarray) -> FreeMatrix:
-        """Store the nonzero entries of a matrix, (N + d, free)."""
+        """Store the nonzero entries of a dense matrix, (N + d, free)."""
         point, variable = np.nonzero(matrix)
         return cls(point, variable, matrix[point, variable], matrix.shape)
 
@@ -282,7 +282,7 @@ class Boundary:
     Attributes
     ----------
     start, end : (c,) tuple of EndCondition
-        Conditions on every curve.
+        Conditions on each curve at the start and at the end.
     periodic : bool
         Whether the motion continues smoothly from its end to its start. If so, no derivatives are given. If values are
         given at both ends, their difference is the distance by which the end is ahead of the start.
@@ -314,7 +314,7 @@ class Boundary:
 
     @property
     def law_curves(self) -> int:
-        """Number of curves that are given by a time law and have no spline: 1 or 0."""
+        """Number of curves that are given by a time law and therefore have no spline: 1 or 0."""
         return int(self.time_law is not None)
 
     @property
@@ -360,7 +360,7 @@ class LocalBasis:
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
         """Evaluate the basis at normalised times `t_norm`, (K,); at a knot, just after the knot."""
-        # Rounding must not decide the side of a knot, because the highest derivative jumps there.
+        # Rounding must not decide on which side of a knot a time lies, because the highest derivative jumps there.
         breaks = np.unique(knots)
         place = np.searchsorted(breaks, t_norm - 1e-13).clip(max=len(breaks) - 1)
         near = breaks[place]
@@ -391,7 +391,7 @@ class SparsityPattern:
     matrix : FreeMatrix
         Stacked matrix of splines over the same knots.
     curves : int
-        Number of these splines.
+        Number of the splines in `matrix`.
 
     Attributes
     ----------

@@ -38,9 +38,9 @@ def local_basis(
     Returns
     -------
     first : (K,) int ndarray
-        Index of the interval of each time, which is also the index of the first control point with an effect there.
+        Index of the interval of each time. It is also the index of the first control point with an effect there.
     values : (4, K, d + 1) ndarray
-        Values and derivatives, per unit of the knots' time.
+        Values, and derivatives per unit of the time of the knots.
     """
     breaks = knots[degree : len(knots) - degree]
     first, fraction = locate(breaks, np.clip(t_norm, breaks[0], breaks[-1]))

@@ -80,7 +80,7 @@ class Evaluation:
     Attributes
     ----------
     limits : tuple of Limit
-        The limits; together they have c values.
+        The limits, with c values together.
     motion : JointState
         Joint motion: q, qdot, qddot and qdddot, (K, n), and the gradient dq/dy.
     groups : ValueGroups
@@ -93,7 +93,7 @@ class Evaluation:
 
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
-        """Values of each limit, (K, number of its values)."""
+        """Values of each limit, (K, number of values) for each limit."""
         motion = self.motion
         values = motion.values_of(self.groups)
         for number in self.groups.with_partials:

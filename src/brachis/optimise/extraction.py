@@ -107,7 +107,7 @@ class _Section:
 
 
 def _join(program: Program, x: np.ndarray) -> list[Motion]:
-    """Return the motions of all phases. They are linked exactly; a solver links them only within its tolerance."""
+    """Return the motions of all phases, linked exactly. A solver links phases only to within its tolerance."""
     motions = program.motions(x)
     for link in program.links:
         before = motions[link.before]

@@ -32,7 +32,7 @@ _FIRST_LOSS = 5.0
 """Time that the first intervals together may cost, divided by the time that splines may cost. Where accelerations are
 smooth, the estimated cost of intervals is too high by about this factor."""
 _SHARE = 0.5
-"""Fraction of the tolerance that splines may use up. Joint paths use up a larger fraction."""
+"""Fraction of the tolerance that splines may use up. Imperfect joint paths use up more."""
 _AIM = 0.7
 """Fraction of `_SHARE` at which the next mesh aims."""
 _FINER = (0.02, 0.5)
@@ -49,7 +49,7 @@ _MESHES = 6
 _MOST_INTERVALS = 200_000
 """Maximum number of intervals of a phase. The verification checks 8 instants in each, 2,000,000 at most."""
 _LOOKS = (4, 10)
-"""Number of instants in each interval at which limits are checked: at first, and once they are met there."""
+"""Number of instants per interval at which limits are checked in the first rounds, and after they are met there."""
 _ROUNDS = 40
 """Maximum number of times that splines are laid over the same mesh."""
 _PATIENCE = 8
@@ -58,8 +58,8 @@ _ENOUGH = 5e-5
 """Largest permitted violation of a limit, as a fraction of the limit."""
 _UNCHANGED = 1e-5
 """If a rate or an acceleration changes by no more than this fraction of its limit, it is not checked again. Limits are
-not narrowed for smaller violations either. It is a fifth of `_ENOUGH`. A motion through 500 waypoints took 4e-5 longer
-when everything was checked again and narrowed in every round."""
+not narrowed for smaller violations either. The value is a fifth of `_ENOUGH`. A motion through 500 waypoints took 4e-5
+longer when everything was checked again and narrowed in every round."""
 _AT_ONCE = 8192
 """Number of instants that are checked together, so that their states stay in the processor's cache."""
 _SMALL = 0.01
@@ -67,10 +67,10 @@ _SMALL = 0.01
 _MORE = 1.5
 """Factor on violations below `_SMALL`, because splines respond by less than limits are narrowed."""
 _MOST_MORE = 8.0
-"""Largest such factor if few intervals exceed a limit. It makes up for what the last narrowing lacked. With 1.5, a path
-through 500 waypoints took 18 rounds; with 8, it takes 11."""
+"""Largest factor on small violations if few intervals exceed a limit. It makes up for insufficient narrowing in the
+last round. With 1.5, a path through 500 waypoints took 18 rounds; with 8, it takes 11."""
 _RARE = 0.01
-"""Fraction of the intervals that counts as few. With a larger fraction, that path was 3e-5 slower."""
+"""Fraction of intervals that counts as few. With a larger fraction, a path of 500 waypoints was 3e-5 slower."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class SplineFit:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """Sort key, smaller for better splines. Limits on postures come first if violated, then the time."""
+        """Sort key, smaller for better splines. Violations of limits on postures come first, then the time."""
         return max(self.outside, _ENOUGH), self.needed_time
 
     @property
@@ -263,8 +263,8 @@ def _lay_splines(
 ) -> LaidSplines:
     """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`.
 
-    For the acceleration and each of its derivatives that vanish at an end, one interval as long as its neighbour is
-    added there. The start of the timing is delayed by the duration of the added intervals.
+    For the acceleration, and for each of its derivatives, that vanishes at an end, an interval as long as its neighbour
+    is added there. The start of the timing is delayed by the duration of the added intervals.
     """
     first, last = _vanishing(phase)
     ahead = breaks[1] * np.arange(first)
@@ -316,7 +316,7 @@ class _Violations:
     ----------
     phase : Phase
     phase_timing : PhaseTiming
-        Phase timing that has a timing.
+        Phase timing whose `timing` is not None.
     breaks : (N + 1,) ndarray
         Knots in the normalised time of this timing.
 
@@ -401,7 +401,7 @@ class _Violations:
         is_changed = (np.abs(now - self._known) > _UNCHANGED).any(axis=1)
         self._known = np.where(is_changed[:, None], now, self._known)
         (step,) = np.nonzero(is_changed)
-        # A knot affects all intervals that share control points with its own.
+        # The effect of a knot extends as far as splines share control points.
         beside = self._phase.degree + 1
         count = len(self.worst)
         first = (self._interval[step] - beside).clip(min=0)

@@ -112,7 +112,7 @@ class FixedGrid:
         return np.empty(0)
 
     def basis(self, _h: np.ndarray) -> LocalBasis:
-        """Return the basis functions at the collocation points, as the same object while they do not change."""
+        """Return the basis functions at the collocation points. Unless they change, it is always the same object."""
         return self._basis
 
     @cached_property
@@ -120,7 +120,7 @@ class FixedGrid:
         return LocalBasis.of(self.knots, self.degree, self.t_norm)
 
     def slopes(self, _h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-        """Return slopes, (4, z, c), by h of the value and three derivatives of splines, (c, N + d)."""
+        """Return the slopes by h, (4, z, c), of the value and three derivatives of splines, (c, N + d)."""
         return np.empty((ORDERS, 0, len(control_points)))
 
     def fix(self, _h: np.ndarray) -> FixedGrid:
@@ -200,7 +200,7 @@ class FreeGrid(FixedGrid):
         return np.append(h, 0.0)[self._around]
 
     def basis(self, h: np.ndarray) -> LocalBasis:
-        """Return the basis functions at the collocation points; they are cached until `h` changes."""
+        """Return the basis functions at the collocation points. The functions are cached until `h` changes."""
         return self._basis_at(h)
 
     def _find_basis(self, h: np.ndarray) -> LocalBasis:

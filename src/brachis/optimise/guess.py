@@ -24,7 +24,7 @@ def starting_point(
     joint_paths: Sequence[np.ndarray],
     durations: Sequence[float | None],
 ) -> np.ndarray | None:
-    """Fit splines to a joint path of every phase, and scale each phase's time until the limits are met.
+    """Fit splines to a joint path for each phase, and scale the time of each phase until the limits are met.
 
     Points of the joint path are used as control points, which smooths the path. If the smoothed path leaves the branch,
     a least-squares fit is used, which follows the joint path more closely.
@@ -35,8 +35,8 @@ def starting_point(
     joint_paths : sequence of (S, c) ndarray
         For each phase, successive values of its curves. Along a path, these are s and the redundant joints.
     durations : sequence of float or None
-        For each phase, the duration, s, of the motion from which its values come; they are at evenly spaced times. With
-        None, the phase gets a smooth motion from end to end.
+        For each phase, the duration, s, of a motion whose values at evenly spaced times form the joint path. With None,
+        the phase gets a smooth motion from end to end.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def starting_point(
 
 
 def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    """Return the variables if points of the joint path are used as control points."""
+    """Return variables with points of the joint path as control points."""
     t_norm = greville(phase.knots, phase.degree)
     t_end, points = _motion_along(phase, joint_path, duration, t_norm)
     values = points[:, phase.boundary.law_curves :]
@@ -66,7 +66,7 @@ def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.
 
 
 def _follow(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    """Return the variables of curves that are fitted to the joint path by least squares."""
+    """Return the variables of curves fitted to the joint path by least squares."""
     t_norm = spread(phase.breaks, 4)
     t_end, targets = _motion_along(phase, joint_path, duration, t_norm)
     return fit_curves(phase, t_end, t_norm, targets)
@@ -137,7 +137,7 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     """Scale the time of every phase until velocity, acceleration and torque limits are just met.
 
     If the limits cannot be met, the time is chosen with which they are exceeded least. With a time far above the least
-    time no limit is active, and a solver that has seen no curvature creeps towards the solution. If the arm passes
+    time no limit is active, and a solver that has found no curvature creeps towards the solution. If the arm passes
     postures in which it cannot stay at rest, a long time does not meet the limits either. If a phase begins or ends in
     motion, a longer time slows only its middle. A given duration is not changed.
 

@@ -61,12 +61,12 @@ class SolvedProgram(Summary):
 
     @property
     def report(self) -> SolverReport:
-        """Report of the program's own solve."""
+        """Report of the solve of `program` itself."""
         return self.reports[-1]
 
     @property
     def usable(self) -> bool:
-        """Whether the program's own solve ended with a motion."""
+        """Whether the solve of `program` itself ended with a motion."""
         return bool(self.reports) and self.report.status.usable
 
     @property
@@ -88,7 +88,7 @@ class SolvedProgram(Summary):
 Solve = Callable[[Program, np.ndarray], SolverReport]
 """Function that solves a program from a point x, (v,)."""
 Attempt = Callable[[Program, np.ndarray], SolvedProgram]
-"""Function that solves a changed program from a point x, (v,). It may change it in further steps."""
+"""Function that solves a changed program from a point x, (v,), possibly with further changes."""
 Change = Callable[[SolvedProgram], tuple[Program, np.ndarray] | str | None]
 """Function that turns the solved program kept so far into a new program and the point from which to solve it.
 
@@ -114,7 +114,7 @@ def improve(
     first : SolvedProgram
         The solved program to start with. Until a solve gives a motion, each attempt replaces the one before.
     changes : iterable of callable
-        Functions that each get the solved program kept so far.
+        Functions, each called with the solved program kept so far.
     attempt : callable
         Function that solves the program that a change proposes; see `attempt_once`.
     least_gain : float, optional
@@ -126,7 +126,7 @@ def improve(
         Function that rates a solved program. A smaller number is better, and infinity means no motion. The default is
         the objective of a successful solve.
     deadline : Deadline, optional
-        No change is tried after this deadline.
+        Deadline after which no change is tried.
     if_lost : str, optional
         Text that says what was not done, used if the last change gave no motion.
 
@@ -262,8 +262,8 @@ _NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
 """`SolverOptions` for solves from a motion that is nearly as fast as possible. At such a motion very many rows are
 close to their bounds. With these options a small subproblem takes half as long."""
 _PROGRESS = 1e-4
-"""Gain over five iterates, as a fraction of the free time, below which a solve ends if many motions are equally
-fast."""
+"""Gain over five iterates, as a fraction of the free time. If many motions are equally fast, a solve with less gain
+ends."""
 
 _NEARLY = 0.05
 """Permitted violation of a solution over the path, whose joint path is timed again. With 0.01, an active-set method
@@ -352,7 +352,7 @@ class SolverSession:
         learnt = None
         if self._last and np.array_equal(self._last[0].x, x):
             learnt = self._last[0].learnt
-        # Only the free time can get shorter.
+        # The gain is relative to the free time, because only the free time can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress
         until = self.deadline.within(self.options.time_limit)

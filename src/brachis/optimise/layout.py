@@ -109,7 +109,7 @@ def _differences(matrix: FreeMatrix) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 class VariableLayout:
-    """Positions of the variables in x, and the collocation points at which they have an effect; see the module.
+    """Positions of the variables in x, and the collocation points that they affect; see the docstring of the module.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class VariableLayout:
             self.progress = ProgressRows.of(splines[0])
             constant, *by_powers = splines[0].fixed_terms
             if not np.any(by_powers):
-                # Free control points have zeros there.
+                # The fixed terms of free control points are zero.
                 self.x_lower[self.slices[0]] = constant[0]
                 self.x_upper[self.slices[0]] = constant.max()
 
@@ -174,7 +174,7 @@ class VariableLayout:
 
     @cached_property
     def sparsity(self) -> SparsityPattern:
-        """Collocation points at which the variables of the curves have an effect. It is built on demand."""
+        """Pattern of the collocation points at which the variables of the curves have an effect. Built on demand."""
         grid = self._grid
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
         return SparsityPattern(columns, self.free_matrix, len(self.splines))
@@ -220,7 +220,7 @@ class VariableLayout:
 
 
 class RowLayout:
-    """Order of the rows and of the entries of the Jacobian; see the module.
+    """Order of the rows and of the entries of the Jacobian; see the docstring of the module.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class Means:
     def curvature(self, phase_points: PhasePoints, weights: np.ndarray) -> np.ndarray:
         """Compute the Gauss-Newton part, (v, v), of the Hessian of ``weights . values``, with weights (m,).
 
-        The pauses, and the effect of the durations on the shares of the phases, are left out.
+        It leaves out the pauses, and the effect that durations have on the shares of the phases.
         """
         ends = np.cumsum([0, *(len(x) for _, x in phase_points)])
         total = np.zeros((ends[-1], ends[-1]))
@@ -95,7 +95,7 @@ class Means:
         return float(max(violations, default=-np.inf))
 
     def _values_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Return the values while the arm waits at the end of the phase, (m,)."""
+        """Return the values, (m,), while the arm waits at the end of the phase."""
         still = Moments.at_rest(phase.state(x).q[-1:])
         return np.concatenate([limit.values(still)[0] for limit in self.limits])
 

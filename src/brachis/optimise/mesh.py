@@ -62,12 +62,12 @@ def solve_by_levels(
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     deadline : Deadline, optional
-        No level is started after this deadline.
+        Deadline after which no level is started.
 
     Returns
     -------
     SolvedProgram
-        The program over the target's knots, or over the knots of the finest level that could be solved.
+        The program over the knots of the target, or over those of the finest level that could be solved.
     """
 
     def change_to(level: Program, solved: SolvedProgram) -> tuple[Program, np.ndarray]:
@@ -143,7 +143,7 @@ def refine_mesh(
     Parameters
     ----------
     solved : SolvedProgram
-        The solved program, with one report.
+        The solved program. It must have one report.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
@@ -204,9 +204,9 @@ def _choose_intervals(
 
 
 def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Estimate the time that each interval costs, (N,), s, from the swing of as many most active limits as curves.
+    """Estimate the time that each interval costs, (N,), s, from the swing of the most active limits.
 
-    If the duration is given, no time can be lost.
+    As many limits are considered as there are curves. If the duration is given, no time can be lost.
     """
     if phase.time_law is not None:
         return np.zeros(phase.intervals)
@@ -251,7 +251,7 @@ def optimise_knots(
     shortest : float
         Minimum length of an interval, in mean intervals. Whatever this value, it is at least 5e-5 t_E.
     refinement : RefinementOptions
-        Options of `refine`. The knots are not freed again after the deadline in these options.
+        Options of `refine`. The knots are not freed again after the deadline of these options.
 
     Returns
     -------
@@ -319,7 +319,7 @@ def adapt_mesh(
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
     refinement : RefinementOptions
-        Options of `refine`. No further round is started after the deadline in these options.
+        Options of `refine`. No further round is started after the deadline of these options.
     target : Program, optional
         The program over all its knots, if `solved` is only its coarsest level (see `solve_by_levels`).
 

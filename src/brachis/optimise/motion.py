@@ -16,7 +16,7 @@ from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 
 _ROUNDING = 1e-13
-"""Error of a time due to rounding, as a fraction of the end time."""
+"""Rounding error of a time, as a fraction of the end time."""
 _S_MISS = 2e-13
 """Largest permitted deviation of the spline of s from the time law."""
 _LOOKS = 5
@@ -81,7 +81,7 @@ class Motion(PhaseSpline):
         t_norm = t / self.t_end
         within = t_norm.clip(self.knots[0], self.knots[-1])
         spline = Spline(self.knots, self.control_points.T, self.degree)
-        # Rounding must not decide the side of a knot, because the highest derivative jumps there.
+        # Rounding must not decide on which side of a knot a time lies, because the highest derivative jumps there.
         orders = spline.derivatives(within, ORDERS - 1, _ROUNDING)
         if self.time_law is not None:
             law_orders = sample_law(self.time_law, t_norm)

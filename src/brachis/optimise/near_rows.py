@@ -35,9 +35,9 @@ _ROWS_A_VARIABLE = 2.0
 """Minimum number of rows per variable that hold the motion back. With fewer, as in a slower motion, the end time would
 collapse."""
 _ROWS_IF_CURVED = 1.0
-"""The same number if part of the Hessian is known. It may be smaller, because curvature keeps steps short."""
+"""Minimum number of these rows if part of the Hessian is known. Fewer suffice, because curvature shortens steps."""
 _LEAST_KEPT = 0.2
-"""Fraction of the rows that is always kept, beginning with the nearest. With too few rows the end time collapses."""
+"""Fraction of rows, beginning with the nearest, that is always kept. With too few rows the end time collapses."""
 _MOST_KEPT = 0.6
 """Largest fraction of near rows with which it is worthwhile to leave out the other rows."""
 _FIRST_VIOLATION = 0.5

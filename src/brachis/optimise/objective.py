@@ -55,7 +55,7 @@ class EndTime:
     longest: float = np.inf
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Return the time of a phase and the pause after it, s. Add accelerations if the duration is given."""
+        """Return the time of a phase and the pause after it, s, plus weighted accelerations if the time is given."""
         duration = float(x[0]) + phase.pause
         if phase.time_law is None:
             return duration

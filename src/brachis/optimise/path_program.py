@@ -293,7 +293,7 @@ class PathPhase:
 
     @property
     def upper(self) -> np.ndarray:
-        """Upper bounds, (c,)."""
+        """Upper bounds of the values of all limits at all places, (c,)."""
         return self._bounds[1].ravel()
 
     @property

@@ -50,7 +50,7 @@ class Phase:
     limits : sequence of Limit
         Limits of robot, process and scene.
     grid : FixedGrid
-        Knots and collocation points; with a `FreeGrid` the knots are variables.
+        Knots and collocation points. In a `FreeGrid` the knots are variables.
     boundary : Boundary
     margin : float or None, optional
         Minimum branch margin, if the joint map has margins. It is added to the limits as a safeguard. With None, no
@@ -58,7 +58,7 @@ class Phase:
     pause : float, optional
         Time that the arm waits at rest after the phase, s.
     layout : VariableLayout, optional
-        Layout of another phase with the same grid and boundary; by default a new one is built.
+        Layout of another phase with the same grid and boundary. By default a new layout is built.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Phase:
         return [limit for limit in restricted if limit is not None]
 
     def restrict_to(self, curves: np.ndarray, *, is_followed: bool = False) -> Phase:
-        """Return the same phase with `limits_near` curves, (S, c).
+        """Return the same phase with those limits that `limits_near` returns for curves, (S, c).
 
         If splines will be laid along the motion and postures are free, limits on postures are narrowed by their inset.
         """
@@ -326,7 +326,7 @@ class Phase:
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
     def has(self, limit: Limit) -> bool:
-        """Tell whether a limit is one of the phase's limits, as the same object."""
+        """Tell whether a limit object is one of the phase's limits."""
         return any(candidate is limit for candidate in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:

@@ -54,7 +54,7 @@ class Link:
 
     @property
     def size(self) -> int:
-        """Number of rows."""
+        """Number of rows of the link."""
         return len(self.curves) * len(self.orders)
 
     def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
@@ -180,7 +180,7 @@ class Program(PhaseSequence[Phase], Summary):
     links : tuple of Link
     minimised : Objective
     means : Means
-        Means of the values that are limited as means over the motion.
+        Means, over the motion, of the values whose means are limited.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -389,7 +389,7 @@ class Program(PhaseSequence[Phase], Summary):
         return tuple(limits.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Return the indices of the rows of a limit, (K, c), at the collocation points of all phases that have it.
+        """Return the indices of the rows of a limit, (K, c), at the collocation points of all phases with this limit.
 
         For a limit on means, the result is a single row of indices, (1, c).
         """

@@ -91,7 +91,7 @@ def _root(c: np.ndarray) -> np.ndarray:
 _NEAR = 0.005
 """Distance from a limit, as a fraction of it, within which a violation may hide between grid points."""
 _SAME_TIME = 1e-9
-"""Difference of normalised times below which they belong to the same knot or grid point, on either side of it."""
+"""Difference of two normalised times below which both belong to the same knot or grid point, on either side."""
 _EVERYWHERE = slice(5, None, 10)
 """Slice of the dense grid that selects one time between every two neighbouring collocation points."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
@@ -154,7 +154,7 @@ def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.nd
 
 
 def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List normalised times between grid points that are always checked.
+    """List the normalised times, between grid points, that are always checked.
 
     If a path has several pieces, these are times spread over every piece, because a blend of a few millimetres may lie
     between grid points. The times at which a joint with Coulomb friction reverses or nearly reverses, and at which a
@@ -282,7 +282,7 @@ _LONGEST = 0.01
 _CLOSE = 1.01
 """Ratio of a sufficient time to an insufficient one below which no shorter time is searched for."""
 _LONGEST_IF_LATE = 1.0
-"""Maximum fraction once the time is up, because a slower motion within the limits is better than none."""
+"""The same fraction once the time is up, when a slower motion within the limits is better than none."""
 _RELIEF = 4.0
 """Approximate maximum of the decrease of a violation, divided by the fraction by which the motion gets slower."""
 _GOAL = 0.5
@@ -296,7 +296,7 @@ class RefinementOptions:
     Attributes
     ----------
     tolerance : float
-        Largest violation of a limit, as a fraction of it.
+        Largest permitted violation of a limit, as a fraction of the limit.
     density : int
         Number of grid points per collocation point of the first solve.
     max_rounds : int

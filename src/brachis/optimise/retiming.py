@@ -159,7 +159,7 @@ def begin_with_timing(
     points: int,
     x: np.ndarray | None = None,
 ) -> tuple[Program, np.ndarray] | None:
-    """Lay splines along the timings of all phases, over few knots, which are dense only where the timings need this.
+    """Lay splines along the timings of all phases over few knots. Knots are dense only where the timings need them.
 
     Phases with a given time keep their knots.
 
@@ -215,7 +215,7 @@ def is_timing_all(program: Program) -> bool:
 
 @dataclass(frozen=True)
 class BetterPaths:
-    """Result of the search for joint paths over the path.
+    """Result of the search for joint paths with the program over the path.
 
     Attributes
     ----------
@@ -387,7 +387,7 @@ def lay_splines(
     points : int
         Number of collocation points per interval.
     deadline : Deadline, optional
-        See `follow`.
+        After this deadline no further mesh is tried, and no limit is narrowed further.
 
     Returns
     -------

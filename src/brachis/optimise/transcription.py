@@ -1,7 +1,8 @@
 """The nonlinear program of a task on a robot, with a phase for each leg of the path, in coordinates of a joint map.
 
 Where the arm stops, the phases on both sides are at rest in the same posture, which is free. Where the tool's speed is
-given on one side, s and its derivatives are known. Links make the redundant joints continuous to as many derivatives.
+given on one side, s and its derivatives are known there. Links make the redundant joints continue with the same number
+of derivatives.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class TimedCourse:
         narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
         agreement: float = AGREEMENT,
     ) -> Timing | None:
-        """Find the fastest timing with given rates of the path's length at both ends, 1/s; see `PhasePlane`."""
+        """Find the fastest timing with given rates of the joint path's length at both ends, 1/s; see `PhasePlane`."""
         self._plane.narrow(narrower)
         return self._plane.solve(rates, agreement)
 

@@ -108,8 +108,8 @@ class TimingGap(Summary):
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
         message = (
-            f"the same joint path can be passed in {self.least_time:.4g} s, which is {saved:.1f} % faster; the motion "
-            f"loses this time {where}; for a faster motion, {self.advice}"
+            f"the same joint path can be travelled in {self.least_time:.4g} s, which is {saved:.1f} % faster; the "
+            f"motion loses this time {where}; for a faster motion, {self.advice}"
         )
         motion_text = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"

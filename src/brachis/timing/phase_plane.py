@@ -10,7 +10,7 @@ Every limit on velocities, accelerations and torques becomes a row in (u, x), mi
 
 where v_v and v_a are the partial derivatives of the limit's value with respect to qdot and qddot. The rows are exact
 for rigid-body torques and accelerations. Friction, torque that falls with speed, power and the tool's acceleration are
-linearised at the last timing, until rows and values agree. A limit without acceleration bounds only x.
+linearised at the last timing, until rows and values agree. A limit independent of acceleration bounds only x.
 
 Between two stations u is constant and x is linear in p, and the rows are met midway between them. A backward pass from
 the end finds, at each station, the interval of x from which the next station can be reached. A forward pass then uses
@@ -45,7 +45,7 @@ _STOPPED = 1e-6
 _ROUNDS = 20
 """Maximum number of linearisations."""
 _EXACT = 1e-9
-"""Largest difference between rows and values, as a fraction of the limit, that is due to rounding."""
+"""Difference between rows and values, as a fraction of the limit, that counts as rounding error."""
 _LOOKS_AT_END = 4
 """Maximum number of linearisations to find the largest rate at an end."""
 _CREDIBLE = 1e-2
@@ -74,7 +74,7 @@ class _Rows:
     by_x : (P, c) ndarray
         The coefficients b; if the limit does not depend on acceleration, the slope with respect to dp/dt.
     constant : (P, c) ndarray
-        The value at u = x = 0.
+        Value of the limit at u = x = 0.
     lower, upper : (P, c) ndarray
         Bounds of the rows; if the limit does not depend on acceleration, bounds on x.
     """
@@ -129,7 +129,7 @@ class _Rows:
         return float(np.abs(self._excess(motion)).max(initial=0.0))
 
     def _excess(self, motion: Passage) -> np.ndarray:
-        """Return by how much the rows exceed the limit's values along a motion, (P, c)."""
+        """Return the amounts, (P, c), by which the rows exceed the limit's values along a motion."""
         rate = motion.rate[:, None]
         if self.by_u is None:
             values = self.by_x * rate
@@ -486,7 +486,7 @@ def _not_too_slow(rate: np.ndarray) -> np.ndarray:
 
 
 def is_left_out(limit: Limit) -> bool:
-    """Tell whether the phase plane leaves out a limit: limits on jerks, torque rates and means."""
+    """Tell whether the phase plane leaves out a limit, such as limits on jerks, torque rates and means."""
     return limit.order > 2 or limit.guarantee.is_mean
 
 

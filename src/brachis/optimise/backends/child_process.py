@@ -71,8 +71,8 @@ class Solver:
     run : callable
         ``run(monitor, x)`` solves the monitor's program from x; see `SolveMonitor`.
     is_interior : bool, optional
-        Whether it is an interior-point method. Such a method moves away from the bounds at first, so a start close to
-        the optimum does not help.
+        Whether the backend uses an interior-point method. Such a method moves away from the bounds at first, so a start
+        close to the optimum does not help.
     """
 
     name: str
@@ -225,7 +225,7 @@ def _work(
     sent: np.ndarray | None = None
 
     def progress(iteration: int, objective: float) -> None:
-        """Send an iteration to the parent process, with the best feasible iterate if it is new."""
+        """Send an iteration to the parent process. If there is a new best feasible iterate, send it too."""
         nonlocal sent
         best = None if monitor.best is None else monitor.best[1]
         sender.send((iteration, objective, None if best is sent else best))

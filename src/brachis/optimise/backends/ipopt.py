@@ -1,4 +1,4 @@
-"""IPOPT through the ipyopt wheel: an interior-point method, used as a second opinion where Uno fails.
+"""IPOPT, an interior-point method, through the ipyopt wheel. It is used as a second opinion if Uno fails.
 
 The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
 """

@@ -27,7 +27,7 @@ the interpreter."""
 _SMALL_BARRIER = 1e-5
 """Largest barrier parameter at which iterates show whether the solve has settled."""
 _NEARLY_FEASIBLE = 1e-3
-"""Violation of rows up to which an iterate counts, unless ten times the tolerance is larger."""
+"""Violation of rows up to which an iterate counts. If ten times the tolerance is larger, it applies instead."""
 
 Function = Callable[[np.ndarray], float | np.ndarray]
 """A function of the variables of a program."""
@@ -37,7 +37,7 @@ class SolveMonitor:
     """A monitor that watches one solve.
 
     A backend written in another language may lose Python exceptions. This includes a KeyboardInterrupt, which Python
-    would raise at the first line of any callback. The backend must therefore see no error other than UnreachableError.
+    would raise at the first line of any callback. The backend must therefore get no error except UnreachableError.
     The monitor is a context manager around the call of the backend, and stores such errors. The backend then has to
     stop, and `report` raises the error.
 
@@ -76,7 +76,7 @@ class SolveMonitor:
         self._began = time.perf_counter()
 
     def __enter__(self) -> Self:
-        """Install a handler of SIGINT, if this thread is allowed to and the signal is not ignored."""
+        """Install a handler for SIGINT, if this thread is allowed to do so and the signal is not ignored."""
         ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         if threading.current_thread() is threading.main_thread():
             self._during = signal.SIG_IGN if ignored else self._keep_interrupt
@@ -87,7 +87,7 @@ class SolveMonitor:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Restore the handler of SIGINT."""
+        """Restore the previous handler for SIGINT."""
         if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
 
@@ -211,7 +211,7 @@ class SolveMonitor:
         multipliers: np.ndarray,
         message: str,
     ) -> SolverReport:
-        """Report the solution, with a status that is judged by its residuals.
+        """Report the solution, with a status that is based on its residuals.
 
         Raises
         ------
@@ -266,7 +266,7 @@ def residual(program: NonlinearProgram, x: np.ndarray) -> float:
 
 
 def row_slack(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
-    """Return the distance of each row from its nearer bound, (c,); negative if violated, -inf if x has no values."""
+    """Return the distance of each row from its nearer bound, (c,): negative if violated, -inf if x has no rows."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             rows = program.rows(x)

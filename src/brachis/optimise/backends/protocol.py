@@ -31,7 +31,7 @@ class SolveStatus(enum.Enum):
 
     @property
     def usable(self) -> bool:
-        """Whether the solution satisfies the rows."""
+        """Whether a solve with this status gave a solution that satisfies the rows."""
         return self in (
             SolveStatus.OPTIMAL,
             SolveStatus.STAGNATED,
@@ -58,18 +58,18 @@ class Curvature:
 
 
 class NonlinearProgram(Protocol):
-    """A sparse nonlinear program; `brachis.optimise.program.Program` is one."""
+    """Interface of a sparse nonlinear program, for example `brachis.optimise.program.Program`."""
 
     x_lower: np.ndarray
     x_upper: np.ndarray
 
     @property
     def jacobian_rows(self) -> np.ndarray:
-        """Rows of the entries of the Jacobian."""
+        """Row of each entry of the Jacobian."""
 
     @property
     def jacobian_columns(self) -> np.ndarray:
-        """Columns of the entries of the Jacobian."""
+        """Column of each entry of the Jacobian."""
 
     @property
     def lower(self) -> np.ndarray:
@@ -154,10 +154,10 @@ class SolverReport(Summary):
     violation : float
         Largest violation of rows and bounds, recomputed by brachis; infinite if `x` cannot be evaluated.
     multipliers : (c,) ndarray
-        Multipliers of the rows, with L = objective - multipliers . rows; zeros if the backend gives none.
+        Multipliers of the rows, with L = objective - multipliers . rows. Zeros if the backend gives no multipliers.
     iterations : int
     wall_time : float
-        s.
+        Wall time of the solve, s.
     message : str
         Message of the backend.
     learnt : (v, v) ndarray or None

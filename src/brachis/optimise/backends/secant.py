@@ -23,7 +23,7 @@ import numpy as np
 from brachis.optimise.backends.protocol import Curvature, NonlinearProgram
 
 _ENOUGH = 0.01
-"""Trace of B, as a fraction of its trace with the first guess, above which the solver's multipliers are used."""
+"""Trace of B, relative to the one with the guessed multipliers, above which the solver's multipliers are used."""
 _LEAST_COSINE = 1e-8
 """Cosine between s and y below which A is not updated, because the update divides by s.y."""
 
@@ -36,12 +36,12 @@ class SecantHessian:
     program : NonlinearProgram
     known : Curvature
     learnt : (v, v) ndarray, optional
-        Initial A; zero by default.
+        Initial matrix A; zero by default.
 
     Attributes
     ----------
     learnt : (v, v) ndarray
-        The matrix A.
+        The matrix A, as updated so far.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class SecantHessian:
         return np.bincount(columns, terms, len(self.learnt))
 
     def _update(self, s: np.ndarray, y: np.ndarray, known: np.ndarray) -> None:
-        """Update A after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module."""
+        """Update A after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module docstring."""
         s_y = s @ y
         if not s_y > _LEAST_COSINE * np.linalg.norm(s) * np.linalg.norm(y):
             return

@@ -124,7 +124,7 @@ def _solve_first_program() -> None:
 
 
 def _backend(settings: dict[str, Any]) -> Any:
-    """Return Uno's solver with the given settings. It prints nothing."""
+    """Return Uno's solver with the given settings and without output."""
     import unopy
 
     backend = unopy.UnoSolver()
@@ -257,7 +257,7 @@ def call_uno(
 def _spread_bounds(
     lower: np.ndarray, upper: np.ndarray, max_widening: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Widen bounds of rows, (c,), by up to a fraction `max_widening`, each by a different amount.
+    """Widen bounds of rows, (c,), each by a different amount, up to a fraction `max_widening`.
 
     In the fastest motion, hundreds of neighbouring rows reach their bounds together. The subproblems are then
     degenerate, and take an active-set solver seconds instead of hundredths of a second. Simplex codes perturb bounds

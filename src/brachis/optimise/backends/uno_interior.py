@@ -16,7 +16,7 @@ from brachis.optimise.backends.uno import call_uno, report_result
 
 NAME = "uno_interior"
 _FIRST_GAP = 0.3
-"""Initial barrier parameter, added up over all rows, as a fraction of the objective.
+"""Sum of the initial barrier parameter over all rows, as a fraction of the objective.
 
 Programs over the path start within 1 % of their optimum. With Uno's default of 0.1 a solve first moves away from the
 optimum, and 3 of 8 solves do not return to it within 100 iterations. With a third of the present value, 2 of 8 motions
