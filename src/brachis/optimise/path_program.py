@@ -48,7 +48,7 @@ _SMALL = 2e-5
 _RAMP = 2.0
 """Number of places next to a given end posture over which the narrowing increases from zero."""
 _MORE = 1.2
-"""Factor on a violation by which limits are narrowed."""
+"""Factor on a violation, which gives the amount by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
 """Number of stations that are added in each short piece of a path."""
 _Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
