@@ -13,7 +13,10 @@ _MOST = 8
 
 
 def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
-    """Return derivatives of rotation matrices, (m, ..., 3, 3), from those of quaternions w, x, y, z, (m, ..., 4)."""
+    """Return derivatives of rotation matrices, (m, ..., 3, 3), from those of quaternions w, x, y, z, (m, ..., 4).
+
+    The quaternions may have any length.
+    """
     orders, *places, _ = quaternions.shape
     _check(orders)
     flat = quaternions.reshape(orders, math.prod(places), 4)

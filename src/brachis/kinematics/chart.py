@@ -34,7 +34,7 @@ CHART = "chart"
 DEGREE = 5
 """Degree of the splines that interpolate rows which follow the null space."""
 _SINGULAR = 1e-9
-"""If the smallest singular value at the reference is below this, the chart counts as singular and has no margin."""
+"""If the smallest singular values along the reference are below this, the chart counts as singular, without margin."""
 _ENOUGH = 0.35
 """Minimum transversality of the rows along the reference."""
 _PLACES = (9, 17, 33, 65, 129)

@@ -34,7 +34,7 @@ smooth, the estimated cost of intervals is too high by about this factor."""
 _SHARE = 0.5
 """Fraction of the tolerance that splines may use up. Imperfect joint paths use up more."""
 _AIM = 0.7
-"""Fraction of `_SHARE` at which the next mesh aims."""
+"""Target for the next mesh, as a fraction of the time that splines may cost."""
 _FINER = (0.02, 0.5)
 """Smallest and largest factor on the time that intervals may cost, applied when a mesh is too slow."""
 _WAITS = 0.1

@@ -49,7 +49,7 @@ class PhaseTiming:
     rates : tuple of float
         Rates of the joint path's length at both ends, 1/s.
     timing : Timing or None
-        The timing; None if the limits allow no timing, because of rounding not even the one of the motion itself.
+        The timing; None if the limits allow none. Because of rounding, they may reject even that of the motion itself.
     fixed_duration : float or None
         Duration of the phase if it is given, s.
     """

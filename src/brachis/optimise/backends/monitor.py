@@ -266,7 +266,7 @@ def residual(program: NonlinearProgram, x: np.ndarray) -> float:
 
 
 def row_slack(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
-    """Return the distance of each row from its nearer bound, (c,): negative if violated, -inf if x has no rows."""
+    """Return distances of rows from their nearer bounds, (c,); negative if violated, -inf if x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             rows = program.rows(x)
