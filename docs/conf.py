@@ -63,7 +63,7 @@ def system(command):
 
 get_ipython().system = system
 # Cells have few knot intervals, so that they are quick; a kernel's file names say nothing.
-warnings.filterwarnings("ignore", message=".*the same joint path can be passed in")
+warnings.filterwarnings("ignore", message=".*the same joint path can be travelled in")
 warnings.formatwarning = lambda message, category, *place: f"{{category.__name__}}: {{message}}\\n"
 """
 

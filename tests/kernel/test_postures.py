@@ -120,7 +120,7 @@ def test_what_does_not_fit_is_an_error():
     with pytest.raises(ValueError, match="no solutions to choose from"):
         _ = branch_of(REDUNDANT, OTHERS, 0).address
     formula = Formula.of(lambda a, b: np.stack([a[:, 0], b[:, 0]], axis=1), 2, 1)
-    with pytest.raises(ValueError, match=r"the answers have the shape \(2,\)"):
+    with pytest.raises(ValueError, match=r"the solutions have the shape \(2,\)"):
         _ = branch_of(REDUNDANT, OTHERS, 1, formula).address
 
 
@@ -129,11 +129,11 @@ def test_a_branch_of_another_chain_is_an_error():
     given = {"y": np.zeros((1, 2)), "rows": np.zeros((1, 4))}
     given["targets"] = np.zeros((1, 2))
     branch = branch_of(REDUNDANT, OTHERS)
-    with pytest.raises(ValueError, match="has 3 joints, 1 redundant; needed: 4, 1"):
+    with pytest.raises(ValueError, match="has 3 joints, 1 redundant; needed: 4 and 1"):
         PathMotion.prepare(chain, Prescribed((0, 1, 2)), given, branch=branch)
     branch = branch_of(OTHERS, REDUNDANT)
     chain = chain_of(*random_model(N, 1))
-    with pytest.raises(ValueError, match="has 3 joints, 2 redundant; needed: 3, 1"):
+    with pytest.raises(ValueError, match="has 3 joints, 2 redundant; needed: 3 and 1"):
         PathMotion.prepare(chain, ASKED, given, branch=branch)
     formula = Formula.of(lambda a: a[:, None, :2], 3)
     branch = branch_of(REDUNDANT, OTHERS, 1, formula)

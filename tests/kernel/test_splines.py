@@ -93,7 +93,7 @@ def test_numbers_that_do_not_exist():
         Basis(basis, np.array([len(points) - 3])).sum(points.T)
     with pytest.raises(ValueError, match="negative"):
         Basis(basis, np.array([-1]))
-    with pytest.raises(ValueError, match="one number for each place"):
+    with pytest.raises(ValueError, match="one index for each place"):
         Basis(basis, np.array([0, 1]))
 
 

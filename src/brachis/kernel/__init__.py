@@ -1,4 +1,4 @@
-"""The compiled kernel: the computations for every point of every motion, in C.
+"""The compiled kernel: C code for the computations that are repeated at every point of every motion.
 
 Pinocchio builds the model and serves as the reference: the tests compare the kernel with it. See `docs/mathematics.md`
 for the formulas.

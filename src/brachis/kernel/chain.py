@@ -18,7 +18,7 @@ from brachis.kernel.library import (
 )
 
 _QUANTITIES = ("speed", "angular speed", "acceleration")
-"""Quantities in the order of tool.c."""
+"""Quantities of the tool's motion, in the order of tool.c."""
 
 
 _SHAPES = {
@@ -37,7 +37,7 @@ _SHAPES = {
 
 
 class _Chain(ctypes.Structure):
-    """`chain` of chain.h."""
+    """The structure `chain` of chain.h."""
 
     _fields_ = declare_fields(f"l joints; p {' '.join(_SHAPES)}")
 
@@ -48,7 +48,8 @@ class TorqueDerivatives(NamedTuple):
     Attributes
     ----------
     q, qdot, qddot : (K, n, n) ndarray
-        Derivatives with respect to position, velocity and acceleration; the last is the mass matrix plus armature.
+        Derivatives with respect to position, velocity and acceleration. The last one is the mass matrix, to which the
+        rotor inertias are added.
     """
 
     q: np.ndarray
@@ -69,8 +70,9 @@ class Chain(Structured):
     points : (n, 3) ndarray
         A point on each axis, m.
     tool_position : (3,) ndarray
-        m.
+        Position of the tool, m.
     tool_rotation : (3, 3) ndarray
+        Orientation of the tool.
     masses : (n,) ndarray
         Mass of the body after each joint, kg.
     centers : (n, 3) ndarray
@@ -78,7 +80,7 @@ class Chain(Structured):
     inertias : (n, 6) ndarray
         Moments of inertia about the centers of mass, kg m^2: xx, xy, xz, yy, yz, zz.
     gravity : (3,) ndarray
-        m/s^2.
+        Acceleration of gravity, m/s^2.
     friction : (n, 4) ndarray
         For each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; v_eps of ``tanh(qdot / v_eps)``,
         rad/s. For a prismatic joint the units are kg, N s/m, N and m/s.
@@ -123,14 +125,14 @@ class Chain(Structured):
         return TorqueDerivatives(*self._call("brachis_torque_derivatives", *states))
 
     def mass_matrices(self, q: np.ndarray) -> np.ndarray:
-        """Compute the mass matrices, (K, n, n), rotors included, at K postures, (K, n)."""
+        """Compute the mass matrices, (K, n, n), including the rotors, at K postures, (K, n)."""
         matrices: np.ndarray = self._call("brachis_mass_matrices", q)
         return matrices
 
     def tool(
         self, q: np.ndarray, *, in_tool_axes: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Place the tool at K postures, (K, n).
+        """Compute the pose of the tool and its Jacobian at K postures, (K, n).
 
         Returns
         -------
@@ -165,7 +167,7 @@ class Chain(Structured):
     def tool_size_slopes(
         self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Compute `tool_sizes`, (K,), and slopes in q, qdot and qddot, (K, n) each, which are 0 where the size is 0."""
+        """Compute `tool_sizes`, (K,), and slopes by q, qdot and qddot, (K, n) each; they are 0 where the size is 0."""
         by_q, by_qdot, by_qddot = slopes = np.empty((3, len(q), self.n))
         sizes = self._find_sizes(quantity, (q, qdot, qddot), slopes)
         return sizes, (by_q, by_qdot, by_qddot)

@@ -1,4 +1,4 @@
-"""Slopes of values with respect to curves from their slopes with respect to joints, and entries of a Jacobian.
+"""Slopes of values with respect to curves, from slopes with respect to joints, and the entries of a Jacobian.
 
 See `brachis.optimise.evaluator`.
 """
@@ -34,7 +34,7 @@ class MotionSlopes:
 
 
 class _Variables(ctypes.Structure):
-    """`variables` of chain_rule.c."""
+    """The structure `variables` of chain_rule.c."""
 
     _fields_ = declare_fields(
         "l orders shared_count; p shared; l entries; p points curves basis"
@@ -42,7 +42,7 @@ class _Variables(ctypes.Structure):
 
 
 class CurvePattern:
-    """The place at which each of z variables matters: one of K points and one of c curves.
+    """Where each of z variables has an effect: at one of K points and on one of c curves.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class CurvePattern:
 class VariableSlopes:
     """Slopes of c curves and their time derivatives, at K points, with respect to variables.
 
-    Orders on which no value depends are left out.
+    Derivatives on which no value depends are left out.
 
     Attributes
     ----------
@@ -94,11 +94,11 @@ class VariableSlopes:
 
     @property
     def entries(self) -> int:
-        """Number of entries that a value has in the Jacobian, b K + z."""
+        """Number of entries of each value in the Jacobian, b K + z."""
         return len(self.shared) * self.pattern.shape[0] + self.pattern.size
 
     def structure(self, orders: int, arrays: list[np.ndarray]) -> _Variables:
-        """Return the structure that the library reads; the arrays added to `arrays` must stay alive."""
+        """Return the structure that the library reads. The arrays added to `arrays` must stay alive."""
         orders = min(orders, len(self.basis))
         count = len(self.shared)
         size = self.pattern.size
@@ -108,7 +108,7 @@ class VariableSlopes:
         return _Variables(orders, count, shared, size, *self.pattern.addresses, basis)
 
     def find_entries(self, slopes: np.ndarray) -> np.ndarray:
-        """Return entries of a Jacobian, (b K + z, values), from slopes in the curves, (orders, K, values, c)."""
+        """Return entries of a Jacobian, (b K + z, values), from slopes by the curves, (orders, K, values, c)."""
         orders, count, _, width = slopes.shape
         if (count, width) != self.pattern.shape:
             raise ValueError("the slopes belong to different points or curves")
@@ -136,16 +136,16 @@ def differentiate(
     states : sequence of (K, n) ndarray
         q, qdot and qddot.
     partials : sequence of (sequence of ndarray or None, ndarray or None)
-        Partials of the groups in ``groups.with_partials``: with respect to q, qdot, qddot and qdddot, (K, size, n), or
-        (size, n) if all points share them, and with respect to the first curve, (K, size).
+        Partials of the groups in ``groups.with_partials``. The partials with respect to q, qdot, qddot and qdddot have
+        the shape (K, size, n), or (size, n) if all points share them. The partial by the first curve is (K, size).
     variables : VariableSlopes, optional
 
     Returns
     -------
     slopes : (3 or 4, K, sum of sizes, c) ndarray
-        Slopes with respect to y, ydot, yddot and, with `qdddot_y`, ydddot.
+        Slopes with respect to y, ydot and yddot, and also to ydddot if `qdddot_y` is given.
     entries : (b K + z, sum of sizes) ndarray
-        See `VariableSlopes.find_entries`; (0, sum of sizes) without variables.
+        Entries of the Jacobian, see `VariableSlopes.find_entries`; (0, sum of sizes) if no variables are given.
     """
     count, n, width = motion.gradient.shape
     groups.check_joints(n)

@@ -2,8 +2,8 @@
 
     python src/brachis/kernel/compile.py
 
-Installing the package does the same. It uses the C compiler of the machine (`CC`, or `cc`). If there is none, it uses
-the compiler of the package ziglang. Only the standard library is needed.
+Installing the package does the same. The script uses the machine's C compiler (`CC`, or `cc`). If there is none, it
+uses the compiler of the package ziglang. The script needs only the standard library.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ SCRIPT = Path(__file__).resolve()
 FOLDER = SCRIPT.parent
 VARIANTS = {"baseline": (), "avx2": ("-mavx2",)}
 """Names of the library variants, and the compiler flags for the processor features that they may use."""
-# Without contraction, all variants give the same digits.
+# Without contraction of operations, all variants give the same digits.
 _FLAGS = ("-O3", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno")
 _QUIET = ("-Wno-psabi",)
 
 
 def library_path(variant: str) -> Path:
-    """Return the path of a variant's library, which need not exist."""
+    """Return the path of a variant's library. The file need not exist."""
     return FOLDER / f"kernel_{variant}.so"
 
 
 def describe_file(library: Path) -> str:
-    """Return the size and the digest of a library, which are recorded beside it when it is compiled."""
+    """Return the size and digest of a library, as recorded beside the library when it is compiled."""
     content = library.read_bytes()
     return f"{len(content)} bytes, SHA-256 {hashlib.sha256(content).hexdigest()}"
 
 
 def source_digest() -> str:
-    """Return a digest of the C source, which shows whether a library was compiled from it."""
+    """Return a digest of the C source code. It shows whether a library was compiled from this code."""
     digest = hashlib.sha256()
     for file in sorted([*FOLDER.glob("*.h"), *FOLDER.glob("*.c")]):
         digest.update(file.read_bytes())
@@ -58,7 +58,7 @@ def find_compiler() -> list[str] | None:
 
 
 def _runs(command: list[str]) -> bool:
-    """Tell whether a command can be run: macOS has a `cc` that only says how to install a compiler."""
+    """Tell whether a command can be run. On macOS, `cc` may only tell how to install a compiler."""
     try:
         return not _run(command).returncode
     except OSError:
@@ -70,7 +70,7 @@ def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
 
 
 def compile_kernel() -> list[Path]:
-    """Compile every variant that this kind of machine supports.
+    """Compile every variant for this type of machine.
 
     Returns
     -------
@@ -97,7 +97,8 @@ def compile_kernel() -> list[Path]:
         if flags and platform.machine().lower() not in ("x86_64", "amd64"):
             continue
         library = library_path(variant)
-        # Compiled under another name and moved, so that whoever loads it meanwhile finds the old or the new library.
+        # Compile under another name and then move the file, so that a process that loads the library meanwhile gets
+        # either the old or the new one.
         aside = library.with_suffix(f".{os.getpid()}.tmp")
         command = [
             *compiler,

@@ -1,12 +1,13 @@
-"""Formulas written with NumPy, which are recorded once and evaluated by the library at many points.
+"""Formulas written with NumPy. They are recorded once, and the library evaluates them at many points.
 
-A function is called once with arrays of `Number` in place of values. For square roots and angles it uses the functions
-below, which are NumPy's functions for plain values. Its operations are recorded as a sequence of steps. Its derivatives
-are recorded too, by the chain rule from the last step to the first (reverse accumulation; A. Griewank, A. Walther,
-Evaluating Derivatives, 2008). Steps that are not needed are left out, and equal steps are stored once.
+To record a function, it is called once with arrays of `Number` in place of values. For square roots and angles, the
+function must use the functions of this module. With plain values, these are NumPy's functions. The operations are
+recorded as a sequence of steps. The derivatives are recorded too, by the chain rule from the last step to the first
+(reverse accumulation; A. Griewank, A. Walther, Evaluating Derivatives, 2008). Steps that are not needed are left out,
+and equal steps are stored once.
 
-A function has to perform the same operations for all values: no comparisons, no `numpy.linalg`. Terms with a factor of
-zero count as zero, even if the other factor would be infinite.
+A function must perform the same operations for all values, so it may use neither comparisons nor `numpy.linalg`. Terms
+with a factor of zero count as zero, even if the other factor is infinite.
 """
 
 from __future__ import annotations
@@ -52,11 +53,11 @@ class Number:
     operation : str
         The name of an operation, ``input`` or ``constant``.
     operands : tuple
-        Operands of the operation; for an input its place, for a constant its value.
+        Operands of the operation. For an input, this is its index; for a constant, its value.
     place : int
         Position among the numbers of the record.
     value : float or None
-        Value of a constant.
+        Value if the number is a constant, otherwise None.
     """
 
     __slots__ = ("operands", "operation", "place", "record", "value")
@@ -90,7 +91,7 @@ class Record:
     _known: dict[tuple[Any, ...], Number] = field(default_factory=dict)
 
     def _add_number(self, operation: str, *operands: Any) -> Number:
-        """Return the number for an operation, and create it if it is new."""
+        """Return the number for an operation; create the number if it is new."""
         key = (operation, *operands)  # numbers are compared by identity
         known = self._known.get(key)
         if known is None:
@@ -100,13 +101,13 @@ class Record:
         return known
 
     def inputs(self, count: int) -> np.ndarray:
-        """Create the next inputs, (1, count)."""
+        """Create the next inputs of the formula, (1, count)."""
         begin = sum(number.operation == "input" for number in self.numbers)
         made = [self._add_number("input", begin + i) for i in range(count)]
         return np.array(made, dtype=object).reshape(1, count)
 
     def number(self, value: Any) -> Number:
-        """Return a number unchanged, and any other value as a constant."""
+        """Return a `Number` unchanged, and any other value as a constant."""
         return (
             value
             if isinstance(value, Number)
@@ -121,7 +122,7 @@ class Record:
         return self.number(getattr(np, function)(*values))
 
     def add(self, a: Number, b: Number) -> Number:
-        """Add two numbers, with a subtraction if one of them is negated."""
+        """Add two numbers. If one of them is a negated number, record a subtraction."""
         if a.value is not None and b.value is not None:
             return self.number(a.value + b.value)
         if a.value == 0.0:
@@ -205,7 +206,7 @@ def _make_recordable(function: np.ufunc) -> Callable[..., Any]:
     """Return a NumPy function that also accepts arrays of a formula's numbers, mixed with plain numbers."""
 
     def apply_to_one(*values: Any) -> Any:
-        """Record the step if one of the values belongs to a formula, otherwise compute it."""
+        """Record the step if one of the values belongs to a formula; otherwise compute the result."""
         records = [value.record for value in values if isinstance(value, Number)]
         if not records:
             return function(*values)
@@ -228,7 +229,7 @@ ceil: Callable[..., Any] = _make_recordable(np.ceil)
 
 
 class _Formula(ctypes.Structure):
-    """`formula` of motion.h."""
+    """The structure `formula` of motion.h."""
 
     _fields_ = declare_fields(
         "l first_count second_count constant_count; p constants; l step_count; p steps; "
@@ -248,11 +249,11 @@ class Formula(Structured):
         Shape of the results at a point.
     constants : (c,) ndarray
     steps : (s, 3) int32 ndarray
-        Operation and operands. The operands are indices over inputs, constants and steps.
+        Operation and operands of each step. The operands are indices over inputs, constants and steps.
     outputs : (o,) int32 ndarray
-        Indices of the results, counted in the same way.
+        Indices of the results, over the same inputs, constants and steps.
     discards_incomplete : bool
-        Whether all numbers of a row along the last axis become NaN if one of them is not finite.
+        Whether a row along the last axis becomes NaN entirely if one of its numbers is not finite.
     """
 
     counts: tuple[int, ...]
@@ -319,7 +320,7 @@ class Formula(Structured):
         return cls.of(differentiate, count)
 
     def select(self, index: Any) -> Formula:
-        """Return the formula for some of the results at a point, selected by a NumPy index."""
+        """Return the formula for only some of the results at a point, selected by a NumPy index."""
         outputs = np.reshape(self.outputs, self.shape)[index]
         inputs = sum(self.counts)
         begin = inputs + len(self.constants)
@@ -343,7 +344,7 @@ class Formula(Structured):
         )
 
     def __call__(self, *points: np.ndarray) -> np.ndarray:
-        """Evaluate the formula at K points, (K, count) for every argument; return (K, ...)."""
+        """Evaluate the formula at K points. Each argument has the shape (K, count), the result (K, ...)."""
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
         arrays = [as_contiguous(values, (count, size)) for values, size in pairs]

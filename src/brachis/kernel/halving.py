@@ -1,4 +1,4 @@
-"""Halving of knot intervals where a timing needs it; see `brachis.optimise.timed_splines`."""
+"""Halving of knot intervals where a timing needs shorter ones; see `brachis.optimise.timed_splines`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def halve_intervals(
     shortest: float,
     max_count: int,
 ) -> np.ndarray:
-    """Halve intervals between 0 and 1, beginning with those that cost the most time.
+    """Halve intervals between 0 and 1, starting with those that cost the most time.
 
-    An interval costs its length times the deviation of the accelerations from a straight line within it.
+    The cost of an interval is its length times the deviation of the accelerations from a straight line within it.
 
     Parameters
     ----------
@@ -32,22 +32,23 @@ def halve_intervals(
     rate : (M,) ndarray
         dp/dt at these times.
     jumps, ramps : (M - 1,) ndarray
-        Size of the jump of the accelerations between two times, and the cost of a ramp in its place per unit of length.
+        Size of the jump of the accelerations between two times, and the cost per unit of length of a ramp that replaces
+        the jump.
     least_times : int
-        Minimum number of times within an interval that are needed to tell whether it is smooth.
+        Minimum number of times in an interval that are needed to tell whether the accelerations are smooth there.
     begin_count : int
-        Number of equal intervals at the beginning.
+        Number of equal intervals before halving.
     tolerance : float
         Time that all intervals together may cost.
     shortest : float
         Length below which intervals are not halved.
     max_count : int
-        Number of intervals at which halving ends.
+        Number of intervals at which halving stops.
 
     Returns
     -------
     (N,) ndarray
-        Beginnings of the intervals, ascending.
+        Start of each interval, ascending.
     """
     count, begins = call_checked(
         "brachis_halve",

@@ -1,4 +1,4 @@
-"""Loading of the compiled library, and calls of its functions."""
+"""Loading the compiled library and calling its functions."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ FUNCTIONS = {
 }
 """Return type and arguments of each function: pointer, long, double, int, or nothing.
 
-An array has its shape in brackets: a letter stands for a size, a digit for a number. Arrays after ``>`` are written to.
-Arrays after ``l`` hold whole numbers, all others doubles. A letter by itself is that size. Arguments in braces are
-fields of a structure, whose address the function gets; an ``i`` cannot be a field.
+The shape of an array is in brackets: a letter stands for a size, a digit for a number. The function writes to arrays
+after ``>``. Arrays after ``l`` contain whole numbers, all other arrays doubles. A letter by itself is that size.
+Arguments in braces are fields of a structure, and the function gets its address. An ``i`` cannot be a field.
 """
 _DOUBLE = np.dtype(np.float64)
 WHOLE = np.dtype("l")
-"""Type of the library's whole numbers."""
+"""Type of whole numbers in the library."""
 
 
 def _split(word: str) -> tuple[str, str]:
@@ -118,7 +118,7 @@ def load() -> ctypes.CDLL:
     Raises
     ------
     NotBuiltError
-        The library was not compiled, is damaged, or belongs to other source.
+        The library was not compiled, is damaged, or was compiled from other source code.
     """
     baseline = _open(library_path("baseline"))
     faster = library_path("avx2")
@@ -135,11 +135,11 @@ def _open(path: Path) -> ctypes.CDLL:
             problem = f"{path.name} is damaged: it has {size} instead of {built_size}"
             raise NotBuiltError(problem, SCRIPT)
         library = ctypes.CDLL(str(path))
-    except OSError as error:  # missing, or of another kind of machine
+    except OSError as error:  # the file is missing, or for another kind of machine
         raise NotBuiltError(str(error), SCRIPT) from error
     library.brachis_source.restype = ctypes.c_char_p
     if library.brachis_source().decode() != source_digest():
-        raise NotBuiltError(f"{path.name} was compiled from other source", SCRIPT)
+        raise NotBuiltError(f"{path.name} was compiled from other source code", SCRIPT)
     for name, declaration in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype = _KINDS[declaration[0]]
@@ -158,13 +158,13 @@ def address(values: np.ndarray) -> int:
     """Return the address of a contiguous array."""
     try:
         return _find_address(_find_buffer(values))
-    except (TypeError, ValueError):  # read-only, or empty
+    except (TypeError, ValueError):  # the array is read-only or empty
         place, _ = values.__array_interface__["data"]
         return int(place)
 
 
 def call(name: str, *arguments: Any) -> Any:
-    """Call a function of the library; contiguous arrays and structures are passed by address."""
+    """Call a function of the library. Contiguous arrays and structures are passed by address."""
     plain = [
         address(value) if isinstance(value, np.ndarray) else value
         for value in arguments
@@ -183,13 +183,13 @@ def call_checked(name: str, *arguments: Any, **sizes: int) -> Any:
     name : str
         Name in `FUNCTIONS`.
     *arguments
-        Arguments of the function, except sizes and the arrays that it writes.
+        Arguments of the function, without sizes and without the arrays that the function writes.
     **sizes : int
-        Sizes by their letters. Sizes that follow from the shapes of arrays may be left out.
+        Sizes, named by their letters. Sizes that follow from the shapes of arrays may be omitted.
 
     Returns
     -------
-    The return value of the function, then the arrays that it writes; a list if there is more than one.
+    The return value of the function, then the arrays that the function writes; a list if there is more than one result.
 
     Raises
     ------
@@ -210,16 +210,16 @@ def call_checked(name: str, *arguments: Any, **sizes: int) -> Any:
 
 
 class _CallShapes(NamedTuple):
-    """Shapes in one call.
+    """Shapes and sizes of the arguments in one call.
 
     Attributes
     ----------
     taken : list
         Shape and type of each argument that is passed; empty if no shape is declared.
     sizes : list of int or None
-        Size for each argument that is not an output; None if the argument is passed.
+        For each argument that is not an output, its size, or None if the caller passes the argument.
     written : list of tuple of int
-        Shapes of arrays that are written to.
+        Shapes of the arrays that the function writes.
     """
 
     taken: list[tuple[Any, ...]]
@@ -262,12 +262,12 @@ def shape_of(letters: str, sizes: Mapping[str, int]) -> tuple[int, ...]:
 
 
 class Structured:
-    """A dataclass that the library reads through a structure, which is built once and lives as long as the object."""
+    """A dataclass that the library reads through a structure. It is built once and lives as long as the object."""
 
     __dataclass_fields__: dict[str, Any]
 
     def _make_structure(self) -> ctypes.Structure:
-        """Build the structure; the arrays to which it points are attributes of it."""
+        """Build the structure. Arrays to which the structure points are stored as attributes of the structure."""
         raise NotImplementedError
 
     @property
@@ -275,7 +275,7 @@ class Structured:
         """The structure that the library reads."""
         attributes = vars(self)
         if "_structure" not in attributes:
-            # Threads that ask at the same time get the same structure.
+            # Threads that ask for the structure at the same time get the same one.
             attributes.setdefault("_structure", self._make_structure())
         return attributes["_structure"]
 
@@ -292,12 +292,12 @@ class Structured:
 def as_contiguous(
     values: Any, shape: tuple[int, ...], dtype: np.dtype[Any] = _DOUBLE
 ) -> np.ndarray:
-    """Return an array of this shape as contiguous numbers, by default doubles.
+    """Return an array, which must have the given shape, as contiguous numbers, by default doubles.
 
     Raises
     ------
     ValueError
-        The array has a different shape, and the library would read beyond its end.
+        The array has a different shape, so the library would read beyond its end.
     TypeError
         The array is complex.
     """
@@ -317,8 +317,8 @@ def as_doubles_at_points(
 ) -> tuple[np.ndarray, int]:
     """Return numbers at K points, (K, ...), as contiguous doubles, and the offset from one point to the next.
 
-    If all points share the same numbers, those of one point are returned, and the offset is 0. `values` may then also
-    be given for one point only. Raises as `as_contiguous` does.
+    If all points share the same numbers, only those of one point are returned, and the offset is 0. In this case
+    `values` may also be given for one point only. Raises the same errors as `as_contiguous`.
     """
     if values.ndim == len(shape) - 1:
         return as_contiguous(values, shape[1:]), 0

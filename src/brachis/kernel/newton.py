@@ -1,4 +1,4 @@
-"""Newton's method for postures; see `brachis.ik.newton`."""
+"""Newton's method for finding postures; see `brachis.ik.newton`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from brachis.kernel.library import (
 
 
 class _Prescribed(ctypes.Structure):
-    """`prescribed` of tool.h."""
+    """The structure `prescribed` of tool.h."""
 
     _fields_ = declare_fields(
         "l in_tool_axes rows first_axis second_axis third_axis turns tool_axis first second; d sign"
@@ -26,7 +26,7 @@ class _Prescribed(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Prescribed(Structured):
-    """The prescribed part of the tool's pose: rows of its position and an angle or its orientation, or the whole pose.
+    """The prescribed part of the tool's pose: position rows, with an angle or the orientation, or the whole pose.
 
     Attributes
     ----------
@@ -35,11 +35,11 @@ class Prescribed(Structured):
     turns : {0, 1, 3}
         Number of rotation rows: none, one for an angle about a world axis, or three for the orientation.
     in_tool_axes : bool
-        Whether the rows are motions along and about the tool's axes; only for a whole pose.
+        Whether the rows are motions along and about the tool's axes. Only possible if the whole pose is prescribed.
     heading : tuple of int
-        For an angle: the tool's axis, and the two world axes of the plane in which the axis makes this angle.
+        If an angle is prescribed: the tool's axis, and the two world axes of the plane in which the angle is measured.
     sign : float
-        Sign of the second world axis.
+        Sign of the component along the second world axis.
     """
 
     axes: tuple[int, ...]
@@ -55,13 +55,13 @@ class Prescribed(Structured):
 
     @property
     def parts(self) -> list[int]:
-        """Indices of the prescribed rows of the tool's twist, which is linear, then angular."""
+        """Indices of the prescribed rows of the tool's twist (linear velocity first, then angular)."""
         turning = [3, 4, 5] if self.turns == 3 else [6 - sum(self.heading[1:])]
         return [*self.axes, *turning[: self.turns]]
 
     @property
     def coordinates(self) -> int:
-        """Number of task coordinates; an orientation has nine, the rotation matrix."""
+        """Number of task coordinates. An orientation has nine: the entries of the rotation matrix."""
         return len(self.axes) + (9 if self.turns == 3 else self.turns)
 
     def _make_structure(self) -> _Prescribed:
@@ -81,9 +81,9 @@ def find_postures(
     *,
     beside: bool,
 ) -> np.ndarray:
-    """Find postures, (K, n), that reach targets, (K, c), under linear conditions.
+    """Find postures, (K, n), that reach targets, (K, c), and satisfy linear conditions.
 
-    The conditions are rows, (K, r, n), and levels, (K, r). For the other parameters see
+    The conditions are rows, (K, r, n), and their required values, (K, r). For the other parameters see
     `brachis.ik.newton.Newton.solve`.
     """
     rows, levels = conditions

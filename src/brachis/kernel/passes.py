@@ -1,4 +1,4 @@
-"""Passes over the phase plane of a joint path; see `brachis.timing.phase_plane`."""
+"""Backward and forward passes over the phase plane of a joint path; see `brachis.timing.phase_plane`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def bounds_of_pairs(
     Returns
     -------
     floor, ceiling : (P,) ndarray
-        The smallest and the largest x. The largest is -1 if parallel lines leave nothing between them.
+        The smallest and the largest x. The largest x is -1 if parallel lines rule out every x.
     """
     floor, ceiling = call_checked(
         "brachis_bounds_of_pairs", slope, lower, upper, parallel
@@ -45,15 +45,15 @@ def go_backwards(
     Parameters
     ----------
     steps : three (P - 1, c) ndarrays
-        Factor, lower and upper: the next x lies between ``factor x + lower`` and ``factor x + upper``.
+        Arrays factor, lower and upper: the next x lies between ``factor x + lower`` and ``factor x + upper``.
     levels : tuple of (P - 1,) ndarray
         The smallest and the largest x at all stations except the last.
     last : float
         x at the last station.
     flat : float
-        Factor below which the next x does not increase with this x. Such rows are left out.
+        Factor below which a row is left out, because the next x does not increase with this x.
     rounding : float
-        Fraction of x by which an interval may be empty because of rounding.
+        Amount, as a fraction of x, by which the lower end of an interval may exceed the upper end due to rounding.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def go_forwards(
     within: tuple[np.ndarray, np.ndarray],
     first: float,
 ) -> np.ndarray:
-    """Find the largest x at the stations, (P,), in order, within intervals, (P,) each; see `go_backwards`."""
+    """Find the largest x at each station, (P,), in order, within given intervals, (P,); see `go_backwards`."""
     x: np.ndarray = call_checked(
         "brachis_go_forwards", factor, upper, *within, first, P=len(factor) + 1
     )

@@ -58,11 +58,11 @@ _OUTPUTS = {
 }
 """The arrays that the library writes; `a` is the number of solutions of a closed form."""
 _OF_MOTION = ("ydot", "yddot", "xi", "xi_ds", "xi_dds")
-"""Inputs that are needed for more than postures."""
+"""Inputs that are needed for the motion, but not for postures alone."""
 
 
 class Fault(IntEnum):
-    """Reason why there is no motion; the numbers are those of postures.c."""
+    """Reason why the motion cannot be computed. The numbers are those of postures.c."""
 
     NO_POSTURE = 1
     SINGULAR = 2
@@ -70,7 +70,7 @@ class Fault(IntEnum):
 
 
 class _PathMotion(ctypes.Structure):
-    """`path_motion` of motion.h."""
+    """The structure `path_motion` of motion.h."""
 
     _fields_ = declare_fields(
         f"p arm task branch; l count rows_step; d side;p {' '.join((*_INPUTS, *_OUTPUTS))}"
@@ -96,27 +96,28 @@ def _written(name: str) -> Any:
 class PathMotion(Structured):
     """Motion at K points along a path.
 
-    `prepare` comes first. If the closed form has no formula, its solutions are then written to `answers`; known
-    postures are written to `q`. Without `branch` and ``inputs["reference"]`` the postures must be known.
+    Call `prepare` first. If the closed form has no formula, then write its solutions to `answers`. If postures are
+    known, write them to `q`. Postures must be known if there is neither a `branch` nor ``inputs["reference"]``.
 
     Attributes
     ----------
     chain : Chain
     prescribed : Prescribed
     branch : Branch or None
-        Branch by which postures are found; None in a chart.
+        Branch on which postures are found; None in a chart.
     side : float
-        Sign that det J_aug must have; 0 allows both.
+        Required sign of det J_aug; 0 allows both signs.
     inputs : dict of str to ndarray
-        Always the curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) if all points share them.
-        For a closed form or a chart also ``targets``, (K, coordinates). For a chart also its ``reference``, (K, n + r +
-        n r): posture, sigma and dq/dsigma. For `evaluate` also ``ydot`` and ``yddot``, and the path's ``xi``, ``xi_ds``
-        and ``xi_dds``, (K, m). If rows change along the path, also their three derivatives, ``row_derivatives``, (3, K,
-        r, n + 1). To count turns, either times ``t``, (K,), or postures ``near``, (K, n), that are known to be close.
+        The curves ``y``, (K, 1 + r), and ``rows`` [C, p], (K, r, n + 1), or (r, n + 1) if all points share them, are
+        always needed. A closed form or a chart also needs ``targets``, (K, coordinates). A chart also needs its
+        ``reference``, (K, n + r + n r): posture, sigma and dq/dsigma. `evaluate` also needs ``ydot`` and ``yddot``, and
+        the path's ``xi``, ``xi_ds`` and ``xi_dds``, (K, m). If rows change along the path, it also needs their three
+        derivatives, ``row_derivatives``, (3, K, r, n + 1). Turns are counted with either times ``t``, (K,), or postures
+        ``near``, (K, n), that are known to be close.
     rows_step : int
         Offset between the rows of successive points, in doubles; 0 if all points share them.
     written : ndarray
-        All that the library writes, including the arrays below.
+        Everything that the library writes, including the arrays below.
     answers : (K, A, m) ndarray
         Solutions of a closed form.
     q, qdot, qddot : (K, n) ndarray
@@ -148,13 +149,13 @@ class PathMotion(Structured):
         branch: Branch | None = None,
         side: float = 0.0,
     ) -> PathMotion:
-        """Check the inputs and allocate the outputs; see the class.
+        """Check the inputs and allocate the outputs; see `PathMotion`.
 
         Raises
         ------
         ValueError
-            An array is missing or has the wrong shape, or the branch belongs to a different chain. The library would
-            then read beyond the ends of arrays.
+            An array is missing or has the wrong shape, or the branch belongs to a different chain. In each case the
+            library would read beyond the ends of arrays.
         """
         n = chain.n
         m = prescribed.count
@@ -211,13 +212,13 @@ class PathMotion(Structured):
         )
 
     def find_postures(self) -> np.ndarray:
-        """Find only the postures, (K, n); NaN where they do not exist."""
+        """Find only the postures, (K, n). A posture that does not exist is NaN."""
         call("brachis_postures", self.address)
         postures: np.ndarray = self.q
         return postures
 
     def evaluate(self) -> Fault | None:
-        """Find postures and motion; return the fault, or None."""
+        """Find postures and motion. Return the fault, or None if there was none."""
         _need(self.inputs, _OF_MOTION)
         fault = call("brachis_evaluate", self.address)
         return Fault(fault) if fault else None
@@ -231,7 +232,7 @@ class PathMotion(Structured):
     def singular_slopes(
         self, values: np.ndarray, vectors: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate the results of `find_least_singular` for J_aug, (K,), in q, (K, n), and in s, (K,)."""
+        """Differentiate the smallest singular values of J_aug, (K,), with respect to q, (K, n), and s, (K,)."""
         count, n = self.qdot.shape
         by_q, by_s = call_checked(
             "brachis_singular_slopes", self.address, values, vectors, K=count, n=n
@@ -240,13 +241,13 @@ class PathMotion(Structured):
 
 
 def _need(inputs: Mapping[str, np.ndarray], names: Sequence[str]) -> None:
-    """Refuse incomplete inputs."""
+    """Raise an error if inputs are missing."""
     missing = [name for name in names if name not in inputs]
     if missing:
         raise ValueError(f"{', '.join(missing)} of the motion is missing")
 
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the smallest singular values, (K,), and their right vectors for matrices with given inverses, (K, n, n)."""
+    """Find the smallest singular value, (K,), and its right vector for matrices with given inverses, (K, n, n)."""
     values, vectors = call_checked("brachis_least_singular", inverses)
     return values, vectors

@@ -1,4 +1,4 @@
-"""The choice of postures along a path: those of a branch of a closed form, or of a chart."""
+"""The branch of a closed form from which postures along a path are chosen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from brachis.kernel.library import Structured, address, as_contiguous, declare_f
 
 
 class _Branch(ctypes.Structure):
-    """`branch` of motion.h."""
+    """The structure `branch` of motion.h."""
 
     _fields_ = declare_fields(
         "p answers_of; l alternatives; p redundant nonredundant turns ranged start"
@@ -21,10 +21,11 @@ class _Branch(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class Branch(Structured):
-    """A branch of a closed form, which gives m of n joints from the target and the redundant joints.
+    """A branch of a closed form. The closed form gives m of n joints from the target and the redundant joints.
 
-    Of several solutions, the one closest to the previous posture is taken, where full turns do not count. Angles get
-    the turns closest to the previous posture, or those to which their velocities lead.
+    Of several solutions, the one closest to the previous posture is chosen; full turns do not count as a difference.
+    Full turns are then added to the angles so that they are closest to the previous posture, or to where the velocities
+    lead.
 
     Attributes
     ----------
@@ -33,11 +34,11 @@ class Branch(Structured):
     turns : (n,) bool ndarray
         True for joints whose turns are counted.
     ranged : (n,) bool ndarray
-        True for joints with a finite range: their turns must be certain.
+        True for joints with a finite range. The number of turns of these joints must be certain.
     start : (n,) ndarray
-        The first posture gets the turns closest to this one.
+        Posture to which the first posture is brought as close as possible by full turns.
     alternatives : int
-        Number of solutions, A; those that do not exist are not finite.
+        Number of solutions, A. Solutions that do not exist are not finite.
     answers_of : Formula or None
         Formula of the target and the redundant joints, with (A, m) results; None if the solutions are given.
     """
@@ -52,11 +53,11 @@ class Branch(Structured):
 
     @property
     def counts_turns(self) -> bool:
-        """Whether the turn of some angle matters."""
+        """Whether the number of turns matters for any joint, because its range is finite."""
         return bool(self.ranged.any())
 
     def check_fits(self, n: int, r: int, coordinates: int) -> None:
-        """Refuse different numbers of joints, redundant joints or task coordinates.
+        """Raise an error if the numbers of joints, redundant joints or task coordinates differ.
 
         With different numbers the library would read beyond the ends of arrays.
 
@@ -68,7 +69,7 @@ class Branch(Structured):
         redundant = len(self.redundant)
         if (joints, redundant) != (n, r):
             raise ValueError(
-                f"the branch has {joints} joints, {redundant} redundant; needed: {n}, {r}"
+                f"the branch has {joints} joints, {redundant} redundant; needed: {n} and {r}"
             )
         if self.answers_of is None or self.answers_of.counts == (coordinates, r):
             return
@@ -81,7 +82,7 @@ class Branch(Structured):
         joints = np.concatenate([self.redundant, self.nonredundant])
         if not np.array_equal(np.sort(joints), np.arange(n)):
             raise ValueError(
-                "the redundant and the other joints must be all joints, each once"
+                "the redundant and the other joints must be all joints of the robot, each once"
             )
         if self.alternatives < 1:
             raise ValueError("the branch has no solutions to choose from")
@@ -91,7 +92,7 @@ class Branch(Structured):
             needed = (self.alternatives, len(self.nonredundant))
             if self.answers_of.shape != needed:
                 raise ValueError(
-                    f"the answers have the shape {self.answers_of.shape}; needed: {needed}"
+                    f"the solutions have the shape {self.answers_of.shape}; needed: {needed}"
                 )
         indices = [self.redundant.astype("l"), self.nonredundant.astype("l")]
         tables = [

@@ -9,11 +9,14 @@ import numpy as np
 from brachis.kernel.library import call_checked
 
 _MOST = 8
-"""Maximum number of derivatives that the library has room for, including the value itself."""
+"""Maximum number of derivatives for which the library has room, including the value itself."""
 
 
 def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
-    """Differentiate rotation matrices, (m, ..., 3, 3), given by quaternions w, x, y, z of any length, (m, ..., 4)."""
+    """Return derivatives of rotation matrices, (m, ..., 3, 3), from those of quaternions w, x, y, z, (m, ..., 4).
+
+    The quaternions may have any length.
+    """
     orders, *places, _ = quaternions.shape
     _check(orders)
     flat = quaternions.reshape(orders, math.prod(places), 4)
@@ -22,7 +25,7 @@ def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
 
 
 def body_twists(poses: np.ndarray) -> np.ndarray:
-    """Differentiate poses.
+    """Compute body twists and their derivatives from poses.
 
     Parameters
     ----------
@@ -42,6 +45,6 @@ def body_twists(poses: np.ndarray) -> np.ndarray:
 
 
 def _check(orders: int) -> None:
-    """Refuse more derivatives, including the value itself, than the library has room for."""
+    """Raise an error if the library has no room for so many derivatives, including the value itself."""
     if not 1 <= orders <= _MOST:
         raise ValueError(f"{orders} derivatives; allowed: 1 to {_MOST}")

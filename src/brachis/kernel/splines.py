@@ -1,8 +1,8 @@
 """Splines without SciPy, because importing SciPy takes longer than an ordinary plan.
 
-A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots after
-its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are computed by de Boor's recursion
-(Cohen, Lyche and Riesenfeld, 1980).
+A control point belongs to several polynomial pieces. It is the blossom (polar form) b of any of them, evaluated at the
+d knots after its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are computed by de Boor's
+recursion (Cohen, Lyche and Riesenfeld, 1980).
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ class Spline:
     def through(cls, places: np.ndarray, values: np.ndarray, degree: int = 3) -> Spline:
         """Interpolate values, (P, ...), at ascending places, (P,), with an odd degree d.
 
-        The first (d + 1) / 2 intervals are one polynomial, and so are the last ("not a knot"). With d places or fewer,
+        The first (d + 1) / 2 intervals share one polynomial, and so do the last ("not a knot"). With d places or fewer,
         the spline consists of straight lines.
 
         Raises
         ------
         ValueError
-            There are too few places, they do not ascend, or the number of values differs.
+            There are too few places, the places do not ascend, or there are more or fewer values than places.
         """
         if len(places) <= degree:
             degree = 1
@@ -81,7 +81,7 @@ class Spline:
         return cls(knots, points, degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
-        """Evaluate the spline, or its derivative of order `nu`, at x, of any shape; at a knot, just after it."""
+        """Evaluate the spline, or its derivative of order `nu`, at x of any shape; at a knot, just after the knot."""
         if nu > 0:
             return self.derivative(x, nu - 1)
         x = np.asarray(x, dtype=float)
@@ -94,7 +94,7 @@ class Spline:
     def derivatives(
         self, x: np.ndarray, order: int, rounding: float = 0.0
     ) -> np.ndarray:
-        """Return value and derivatives up to `order`, (order + 1, K, ...), at x, (K,); at a knot, those just after it.
+        """Return value and derivatives up to `order`, (order + 1, K, ...), at x, (K,), or just after x if x is a knot.
 
         An x at most `rounding` before a knot is treated as at this knot.
         """
@@ -127,7 +127,7 @@ class Spline:
 def collocation(
     knots: np.ndarray, degree: int, places: np.ndarray, nu: int = 0
 ) -> np.ndarray:
-    """Return a matrix, (P, L), so that ``matrix @ control_points`` is the spline, or a derivative, at places, (P,)."""
+    """Return a matrix, (P, L). ``matrix @ control_points`` is the spline, or a derivative, at places, (P,)."""
     return Spline(knots, np.eye(len(knots) - degree - 1), degree)(places, nu)
 
 
@@ -137,7 +137,7 @@ def blossom(
     spans: np.ndarray,
     arguments: Sequence[np.ndarray],
 ) -> np.ndarray:
-    """Evaluate the blossoms of a spline's polynomials; see the module.
+    """Evaluate the blossoms of a spline's polynomials; see the docstring of the module.
 
     Parameters
     ----------
@@ -155,7 +155,9 @@ def blossom(
     count = len(spans)
     points = len(knots) - degree - 1
     if count and not degree <= spans.min() <= spans.max() < points:
-        raise ValueError(f"a piece does not exist; they are {degree} to {points - 1}")
+        raise ValueError(
+            f"a piece does not exist; the pieces are {degree} to {points - 1}"
+        )
     places = np.reshape(arguments, (degree, count))
     values: np.ndarray = call_checked(
         "brachis_blossoms", knots, control_points, spans, places, g=degree, L=points
@@ -180,27 +182,27 @@ def bernstein(coefficients: np.ndarray, spans: np.ndarray, u: np.ndarray) -> np.
     """
     width, count, *shape = coefficients.shape
     if len(spans) and not 0 <= spans.min() <= spans.max() < count:
-        raise ValueError(f"a piece does not exist; they are 0 to {count - 1}")
+        raise ValueError(f"a piece does not exist; the pieces are 0 to {count - 1}")
     columns = coefficients.reshape(width, count, math.prod(shape))
     values = call_checked("brachis_bernstein", columns, spans, u)
     return np.reshape(values, (len(u), *shape))
 
 
 def _find_spans(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
-    """Find the knot at which the span of each x, (K,), begins; x outside the knots belongs to the outer span."""
+    """Find the knot at which the span of each x, (K,), begins. An x outside the knots belongs to the outer span."""
     spans = np.searchsorted(knots, x, side="right") - 1
     return np.clip(spans, degree, len(knots) - degree - 2)
 
 
 class _Basis(ctypes.Structure):
-    """`basis` of splines.c."""
+    """The structure `basis` of splines.c."""
 
     _fields_ = declare_fields("l orders count width; p values first")
 
 
 @dataclass(frozen=True, eq=False)
 class Basis(Structured):
-    """Basis functions of splines and their derivatives, at K places, without those that are zero there.
+    """Basis functions of splines and their derivatives at K places. Functions that are zero there are left out.
 
     Attributes
     ----------
@@ -213,11 +215,11 @@ class Basis(Structured):
     first: np.ndarray
 
     def __post_init__(self) -> None:
-        """Refuse indices of control points that do not exist."""
+        """Raise an error if indices of control points are impossible."""
         if self.first.shape != (self.values.shape[1],):
-            raise ValueError("first needs one number for each place")
+            raise ValueError("`first` must have one index for each place")
         if self.first.min(initial=0) < 0:
-            raise ValueError("numbers of control points are negative")
+            raise ValueError("indices of control points are negative")
 
     @cached_property
     def _needed(self) -> int:
@@ -237,7 +239,7 @@ class Basis(Structured):
         curves, point_count = control_points.shape
         if count and point_count < self._needed:
             raise ValueError(f"a control point does not exist; there are {point_count}")
-        # The shapes are known here, so `call_checked` is not needed; this function is called most often.
+        # The shapes are known, so the slower `call_checked` is not needed. No function is called more often.
         values = np.empty((orders, count, curves))
         points = as_contiguous(control_points, (curves, point_count))
         call("brachis_curves", self.address, curves, point_count, points, values)

@@ -18,8 +18,8 @@ def tool_derivatives(
         Columns of the Jacobian; see `Chain.tool`.
     qdot, qddot : (K, n) ndarray
     in_tool_axes : bool
-        Whether the twists are along the tool's axes. If they are along the world's axes, a is the acceleration of the
-        tool's origin.
+        Whether the twists are given along the tool's axes. If they are given along the world's axes, a is the
+        acceleration of the tool's origin.
 
     Returns
     -------

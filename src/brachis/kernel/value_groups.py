@@ -1,4 +1,4 @@
-"""Values of limits in groups: joint quantities and formulas, which the kernel computes, and all other values."""
+"""Values of limits in groups. The kernel itself computes joint quantities and formulas, but not other values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from brachis.kernel.formula import Formula
 from brachis.kernel.library import address, as_contiguous, as_doubles_at_points, call
 
 QUANTITIES = ("q", "qdot", "qddot", "qdddot", "torque")
-"""Quantities in the order of motion.h."""
+"""Quantities of a joint, in the order of motion.h."""
 _TORQUE = len(QUANTITIES) - 1
 _FORMULA = len(QUANTITIES)
 _PARTIAL = ("q", "qdot", "qddot", "qdddot")
@@ -28,14 +28,14 @@ _GROUP = np.dtype(
         ("s", np.intp),
     ]
 )
-"""`value_group` of motion.h."""
+"""The structure `value_group` of motion.h."""
 
 Partial = np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
 class ScaledQuantity:
-    """Values that are each a quantity of one joint, minus an offset, times a factor.
+    """Values of the form (quantity of one joint - offset) factor.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class FormulaQuantity:
 
 
 Quantity = ScaledQuantity | FormulaQuantity
-"""A quantity that the kernel computes by itself."""
+"""A quantity that the kernel computes itself."""
 
 
 class ValueGroups:
@@ -82,7 +82,7 @@ class ValueGroups:
     Parameters
     ----------
     quantities : sequence of ScaledQuantity, FormulaQuantity or None
-        Quantities of the groups. A group with None has partials.
+        Quantities of the groups. None stands for a group whose values the kernel does not compute; it has partials.
     sizes : sequence of int
         Number of values in each group.
 
@@ -123,7 +123,7 @@ class ValueGroups:
                 self._set(self._table[number], quantity)
 
     def __reduce__(self) -> tuple[type[ValueGroups], tuple[Any, ...]]:
-        """Pickle without addresses."""
+        """Leave out addresses when pickling."""
         return ValueGroups, (self._quantities, self._sizes)
 
     def _set_formula(self, number: int, quantity: FormulaQuantity) -> None:
@@ -165,7 +165,7 @@ class ValueGroups:
         self.has_jerk |= scaled.quantity == "qdddot"
         if quantity == _TORQUE:
             if self.chain not in (None, scaled.chain):
-                raise ValueError("torques are of more than one chain")
+                raise ValueError("torques belong to more than one chain")
             self.chain = scaled.chain
 
     def _set_joints(self, n: int) -> None:
@@ -174,12 +174,12 @@ class ValueGroups:
         self._joints = n
 
     def check_joints(self, n: int) -> None:
-        """Refuse a motion with a different number of joints, because the library would read beyond its end."""
+        """Raise an error for a different number of joints: the library would read beyond the ends of arrays."""
         if self._joints not in (None, n):
             raise ValueError(f"the motion has {n} joints; needed: {self._joints}")
 
     def split(self, values: np.ndarray, count: int) -> list[np.ndarray]:
-        """Divide values at K points, stored group after group, into arrays of each group, (K, size)."""
+        """Divide values at K points, stored group after group, into one array per group, (K, size)."""
         groups = zip(self._first, self._sizes, strict=False)
         return [
             values[count * first : count * (first + size)].reshape(count, size)
@@ -189,19 +189,19 @@ class ValueGroups:
     def values(
         self, states: Sequence[np.ndarray], torque: Partial = None
     ) -> list[np.ndarray]:
-        """Compute the values of quantities.
+        """Compute the values of the groups that have a quantity.
 
         Parameters
         ----------
         states : sequence of (K, n) ndarray
-            q, qdot, qddot and, where a group needs it, qdddot.
+            q, qdot and qddot, and also qdddot if a group needs it.
         torque : (K, n) ndarray, optional
             Torque, if a group needs it.
 
         Returns
         -------
         list of (K, size) ndarray
-            Values of every group; those of a group with partials are not set.
+            Values of each group. The values of groups with partials are not set.
         """
         count, n = states[0].shape
         self.check_joints(n)
@@ -225,7 +225,7 @@ class ValueGroups:
         points: tuple[int, int],
         arrays: list[np.ndarray],
     ) -> np.ndarray:
-        """Return the table that the library reads, with partials at K points of n joints; see `differentiate`.
+        """Return the table that the library reads, including partials at K points of n joints; see `differentiate`.
 
         The arrays that are added to `arrays` must stay alive.
         """
@@ -247,7 +247,7 @@ class ValueGroups:
 def hold_and_address(
     values: Partial, shape: tuple[int, ...], arrays: list[np.ndarray]
 ) -> int | None:
-    """Return the address of an array, or None; the array that is added to `arrays` must stay alive."""
+    """Return the address of an array, or None. The array added to `arrays` must stay alive."""
     if values is None:
         return None
     arrays.append(as_contiguous(values, shape))

@@ -1,16 +1,16 @@
 """Joint motion along a path as a function of y = (s, sigma), in a chart around a known joint path.
 
 The rows C of sigma = C(s) q - p(s) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is
-regular there, and also around it as far as its least singular value stays away from zero. If one C suffices for the
-whole path, it is constant and p = 0. Postures follow from Newton's method. For the formulas of the motion see
-`path_map`.
+regular there. It is also regular around the reference, as far as its smallest singular value stays away from zero. If
+one matrix C suffices for the whole path, C is constant and p = 0. Postures are computed by Newton's method. For the
+formulas of the motion see `path_map`.
 
 The self-motion at a posture is the null space of the task Jacobian, with an orthonormal basis N, (n, r). Rows C are
-transversal if C N is regular. For orthonormal rows, the least singular value of C N is 1 if they span the null space
-itself, and 0 if they are orthogonal to a part of it. The best constant rows are the leading eigenvectors of the mean of
-N N^T. If these are not transversal enough, the rows follow the null space. Its basis is then continued from place to
-place by the rotation that brings it closest to the previous basis (orthogonal Procrustes problem; P. H. Schoenemann,
-Psychometrika 31, 1966).
+transversal if C N is regular. For orthonormal rows, the smallest singular value of C N is 1 if the rows span the null
+space itself, and 0 if they are orthogonal to one of its directions. The best constant rows are the leading eigenvectors
+of the mean of N N^T. If these are not transversal enough, the rows follow the null space. At each place, the basis of
+the null space is then rotated to be as close as possible to the previous basis (orthogonal Procrustes problem; P. H.
+Schoenemann, Psychometrika 31, 1966).
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
 CHART = "chart"
-"""Label of a chart, in place of the label of a branch."""
+"""Label of a chart, used where a closed form has the label of a branch."""
 DEGREE = 5
-"""Degree of the splines through rows that follow the null space."""
+"""Degree of the splines that interpolate rows which follow the null space."""
 _SINGULAR = 1e-9
-"""A reference with a smaller least singular value is singular everywhere; its chart has no margin anywhere."""
+"""If the smallest singular values along the reference are below this, the chart counts as singular, without margin."""
 _ENOUGH = 0.35
-"""Required transversality of the rows along the reference."""
+"""Minimum transversality of the rows along the reference."""
 _PLACES = (9, 17, 33, 65, 129)
-"""Numbers of places for the splines of rows that follow the null space; the first one that suffices is used."""
+"""Numbers of places for the splines of rows that follow the null space. The first number that suffices is used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +48,8 @@ class ChartRows:
     Attributes
     ----------
     coefficients : (B, r, n + 1) ndarray
-        Coefficients of [C, p]: a single entry if they are constant, otherwise the control points of splines of degree
-        5.
+        Coefficients of [C, p]. If C and p are constant, there is a single entry; otherwise the entries are the control
+        points of splines of degree 5.
     knots : (B + 6,) ndarray
         Knots of the splines; empty if the rows are constant.
     """
@@ -59,12 +59,12 @@ class ChartRows:
 
     @classmethod
     def constant(cls, rows: np.ndarray) -> ChartRows:
-        """Use the same rows, (r, n), along the whole path, with p = 0."""
+        """Return rows, (r, n), that are the same along the whole path, with p = 0."""
         return cls(np.concatenate([rows, np.zeros((len(rows), 1))], axis=1)[None])
 
     @classmethod
     def along(cls, s: np.ndarray, rows: np.ndarray, reference: np.ndarray) -> ChartRows:
-        """Interpolate rows, (S, r, n), and p = C q_ref for reference postures, (S, n), at S places by splines."""
+        """Interpolate rows, (S, r, n), and p = C q_ref by splines, from reference postures, (S, n), at S places."""
         offset = np.einsum("sij,sj->si", rows, reference)
         values = np.concatenate([rows, offset[:, :, None]], axis=2)
         spline = Spline.through(s, values, DEGREE)
@@ -77,12 +77,12 @@ class ChartRows:
 
     @property
     def is_constant(self) -> bool:
-        """Whether the rows are the same along the path. Then sigma of a posture is the same, too."""
+        """Whether the rows are the same along the path. If so, sigma depends only on the posture."""
         return not len(self.knots)
 
     @property
     def selected(self) -> tuple[int, ...]:
-        """The joints that the rows select, ascending; none unless all rows are unit vectors."""
+        """The joints that the rows select, ascending; empty unless all rows are unit vectors."""
         rows = self.coefficients[0, :, :-1]
         joints = np.argmax(rows, axis=1)
         selects = self.is_constant and np.array_equal(
@@ -99,7 +99,7 @@ class ChartRows:
         return LastCall(self._orders)
 
     def _orders(self, s: np.ndarray) -> np.ndarray:
-        """Return [C, p] and its first three derivatives with respect to s, (4, K, r, n + 1), for splines."""
+        """Return [C, p] and three derivatives with respect to s, (4, K, r, n + 1), if they are splines."""
         return np.array([self._spline(s, order) for order in range(4)])
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -130,14 +130,14 @@ class ChartMap(PathMap):
     Parameters
     ----------
     task_map : TaskMap
-        Of the robot.
+        Task map of the robot.
     path : Path
     rows : ChartRows
-        C and p.
+        Rows C and offsets p.
     s : (S,) ndarray
         Path coordinates of the reference, from 0 to 1.
     reference : (S, n) ndarray
-        Postures q_ref there, so close to each other that straight lines can join them.
+        Postures q_ref at these coordinates, close enough for linear interpolation between them.
     """
 
     branch_label = CHART
@@ -163,7 +163,7 @@ class ChartMap(PathMap):
         self.reference = reference
         self._newton = Newton(task_map)
         null = null_spaces(self._newton.task_coordinates(reference)[1])
-        across = rows.at(s)[0] @ null  # it may be singular in places
+        across = rows.at(s)[0] @ null  # may be singular at some places
         self_motion = null @ np.linalg.pinv(across, rcond=_SINGULAR)
         sigma = rows.values(s, reference)
         table = np.column_stack([reference, sigma, self_motion.reshape(len(s), -1)])
@@ -175,7 +175,7 @@ class ChartMap(PathMap):
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
         self._typical = max(float(np.median(least)), _SINGULAR)
         self._start_margin = float(least[0]) / self._typical
-        # A determinant of zero has no side; then no posture is on it.
+        # If the determinant is zero, it has no sign, and no posture has the required one.
         self.side = float(np.sign(np.linalg.det(augmented[0]))) or np.nan
 
     def _augmented_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -197,17 +197,17 @@ class ChartMap(PathMap):
         return np.column_stack([s, self.rows.values(s, q)])
 
     def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
-        """Return the targets, the rows, and the reference, where Newton's method starts."""
+        """Return the targets, the rows and the reference, from which Newton's method starts."""
         s = y[:, 0]
         inputs = {"targets": sample.target, "reference": self._reference_at(s)}
         return inputs | self.rows.kernel_inputs(s)
 
     def start_margins(self) -> np.ndarray:
-        """Return the margin of the reference at its beginning."""
+        """Return the margin at the beginning of the reference."""
         return np.array([self._start_margin])
 
     def margins(self, state: PathState) -> np.ndarray:
-        """Return the least singular value of J_aug, (K, 1), relative to its median along the reference."""
+        """Return the smallest singular value of J_aug, (K, 1), relative to its median along the reference."""
         return state.least_singular[0][:, None] / self._typical
 
     def margin_gradient(self, state: PathState) -> tuple[np.ndarray, np.ndarray]:
@@ -230,11 +230,12 @@ def chart_around(
     task_map : TaskMap
     path : Path
     s : (S,) ndarray
-        Path coordinates from 0 to 1. Of places with equal coordinates the first one is used, or the last one at 1.
+        Path coordinates from 0 to 1. Of several places with the same coordinate, the first one is used; at 1, the last
+        one.
     reference : (S, n) ndarray
-        Postures there.
+        Postures at these coordinates.
     rows : ChartRows, optional
-        Rows of the chart. By default they are chosen.
+        Rows of the chart. By default they are chosen automatically.
 
     Returns
     -------
@@ -243,7 +244,7 @@ def chart_around(
     Raises
     ------
     UnreachableError
-        The null space turns faster than the rows can follow, as happens close to singularities of the arm.
+        The null space turns faster than the rows can follow. This happens close to singularities of the arm.
     """
     growing = _growing(s)
     s = s[growing]
@@ -274,7 +275,7 @@ def chart_around(
 
 
 def _growing(s: np.ndarray) -> np.ndarray:
-    """Return the indices at which path coordinates, (S,), have grown, with the first and the last index."""
+    """Return indices of path coordinates, (S,): the first, the last, and those at which they have grown."""
     furthest = np.maximum.accumulate(s)
     apart = 1e-7
     grown = np.append(True, np.diff(furthest) > apart) & (s < s[-1] - apart)
@@ -283,9 +284,9 @@ def _growing(s: np.ndarray) -> np.ndarray:
 
 
 def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
-    """Return the least singular values of C N, (K,), for rows (K, r, n) and bases (K, n, r); inf without redundancy.
+    """Return the smallest singular values of C N, (K,), for rows (K, r, n) and bases (K, n, r); inf if r is 0.
 
-    Both are in the scales of the joints, as in `Newton.self_motions`.
+    Rows and bases are in the scales of the joints, as in `Newton.self_motions`.
     """
     if not null.shape[2]:
         return np.full(len(null), np.inf)
@@ -293,7 +294,7 @@ def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
 
 
 def moving_most(null: np.ndarray) -> np.ndarray:
-    """Select by pivoting the r joints, (K, r), ascending, whose rows of null spaces, (K, n, r), span the most."""
+    """Select by pivoting the r joints, (K, r), ascending, that move most in null spaces, (K, n, r)."""
     residual = null.copy()
     chosen = []
     for _ in range(null.shape[2]):

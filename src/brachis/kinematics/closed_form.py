@@ -35,7 +35,7 @@ class ClosedFormMap(PathMap):
     Parameters
     ----------
     task_map : TaskMap
-        Of the robot.
+        Task map of the robot.
     path : Path
     solver : IKSolver
     redundant : tuple of int
@@ -43,14 +43,14 @@ class ClosedFormMap(PathMap):
     branch : int
         Index into ``solver.branches``.
     start : (n,) ndarray
-        Start posture. The turns of angles by 2 pi are chosen so that the motion begins as close to it as possible.
+        Start posture. Full turns are added to the angles so that the motion begins as close as possible to it.
     """
 
     branch_of: Branch
     faults: ClassVar = {
         Fault.NO_POSTURE: "the target is out of the branch's reach",
         Fault.SINGULAR: "the Jacobian of the non-redundant joints is singular",
-        Fault.TURNS_TOO_FAR: "a joint turns too far between collocation points to count its turns",
+        Fault.TURNS_TOO_FAR: "a joint turns so far between collocation points that its turns cannot be counted",
     }
 
     def __init__(
@@ -98,19 +98,19 @@ class ClosedFormMap(PathMap):
         return self.solver.branch_margins(q, self.branch)
 
     def start_margins(self) -> np.ndarray:
-        """Return the margins of the branch at the start."""
+        """Return the margins of the branch in the start posture."""
         return self.branch_margins(self.start[None])[0]
 
     def margins(self, state: JointState) -> np.ndarray:
-        """Return the margins of the branch."""
+        """Return the margins of the branch, (K, b), for a state."""
         return self.branch_margins(state.q)
 
     def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
-        """Differentiate the margins of the branch, which do not depend on s."""
+        """Differentiate the margins of the branch with respect to q. They do not depend on s."""
         return self.solver.margin_gradient(state.q, self.branch), None
 
     def margin_quantity(self) -> FormulaQuantity | None:
-        """Return the margins in the form that the kernel needs."""
+        """Return the margins of the branch in the form that the kernel needs."""
         return self.solver.margin_formulas(self.branch, self.robot.n)
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
@@ -120,11 +120,11 @@ class ClosedFormMap(PathMap):
     def kernel_inputs(
         self, _y: np.ndarray, sample: PathSample
     ) -> dict[str, np.ndarray]:
-        """Return the targets, and rows that each select a redundant joint."""
+        """Return the targets and the rows. Each row selects a redundant joint."""
         return {"targets": sample.target, "rows": self._rows}
 
     def write_answers(self, motion: PathMotion) -> None:
-        """Write the solutions, if the kernel has no formula for them."""
+        """Write the solutions if the kernel has no formula for computing them."""
         if self.branch_of.answers_of is None:
             targets = motion.inputs["targets"]
             q_r = motion.inputs["y"][:, 1:]

@@ -1,10 +1,10 @@
-"""A joint motion as nodes, between which quintic polynomials agree with the closed form up to rounding.
+"""A joint motion as nodes. Between them, quintic polynomials agree with the closed form up to rounding.
 
-It must be possible to evaluate a saved trajectory without the closed form: its family may be a plug-in, and the
-verification must not depend on it. Joint positions, velocities and accelerations at the nodes define quintic Hermite
-pieces. They join with continuous acceleration if the curves have it, which splines of degree 2 do not have at knots.
-Nodes are added until the pieces agree with the closed form in between, and until their jerks agree at the beginnings of
-the pieces, where the third derivative of a quintic's error is largest.
+It must be possible to evaluate a saved trajectory without the closed form: the closed form may come from a plug-in, and
+the verification must not depend on it. Joint positions, velocities and accelerations at the nodes define quintic
+Hermite pieces. The acceleration is continuous from piece to piece if that of the curves is continuous; for splines of
+degree 2, it jumps at knots. Nodes are added until the pieces agree with the closed form between the nodes. The jerks
+must agree at the beginning of each piece, where the third derivative of a quintic's error is largest.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from brachis.kinematics.joint_map import JointMap, JointState
 Curves = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
 _POSITION_TOLERANCE = 1e-11
-"""Allowed gap between pieces and closed form, rad or m."""
+"""Largest permitted gap between the pieces and the closed form, rad or m."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Nodes:
         Times, ascending from 0 to t_end, s.
     q, qdot, qddot : (L + 1, n) ndarray
     qddot_before : (L + 1, n) ndarray
-        Acceleration just before the nodes. It differs from `qddot` where the acceleration jumps.
+        Acceleration just before each node. It differs from `qddot` where the acceleration jumps.
     """
 
     times: np.ndarray
@@ -60,14 +60,14 @@ def join_nodes(nodes_by_phase: Sequence[Nodes]) -> Nodes:
 
 
 def _join(arrays: Sequence[np.ndarray]) -> np.ndarray:
-    """Join arrays, without the last row of each array except the last."""
+    """Join arrays, leaving out the last row of each array except the last array."""
     return np.concatenate([*(array[:-1] for array in arrays[:-1]), arrays[-1]])
 
 
 def interpolate(
     joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jumps: bool
 ) -> Nodes:
-    """Place nodes so densely that quintic pieces can replace the closed form.
+    """Place nodes densely enough for quintic pieces to replace the closed form.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def interpolate(
     UnreachableError
         The motion leaves the branch between the breaks.
     """
-    # Two pieces in the longest interval, one in shorter intervals: the jerk of short pieces shows rounding.
+    # Use two pieces in the longest interval and one in shorter ones: in short pieces, rounding shows in the jerk.
     steps = np.ceil(2 * np.diff(breaks) / np.diff(breaks).max()).astype(int)
     times = spread(breaks, steps)
     inherited = np.full(len(times) - 1, np.inf)
@@ -102,7 +102,7 @@ def interpolate(
         gaps, noises = _measure_gaps(times, state, before, orders=2 if jumps else 3)
         excess = gaps.max(axis=0)
         noise = noises.max(axis=0)
-        # A gap that halving did not reduce by half, or that is as small as noise, is noise.
+        # Treat a gap as noise if halving did not reduce it by half, or if it is no larger than the noise.
         bad = (excess > 1.0) & ((excess > noise) | (excess < 0.5 * inherited))
         if not bad.any():
             break
@@ -110,7 +110,7 @@ def interpolate(
         inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
     if _POSITION_TOLERANCE * gaps[0].max() > 1e-9:
         raise UnreachableError("the motion is too sharp for polynomial pieces")
-    # The middles are exact as well; using them as nodes reduces the error by another factor of 64.
+    # The middles are exact as well. Using them as nodes reduces the error by another factor of 64.
     q = _sum_positions(joint_map, curves, merged, state, before)
     return Nodes(merged, q, state.qdot, state.qddot, before)
 
@@ -122,10 +122,11 @@ def _sum_positions(
     state: JointState,
     before: np.ndarray,
 ) -> np.ndarray:
-    """Sum up positions, (L + 1, n), so that every piece has the jerk of the closed form in its middle.
+    """Add up positions, (L + 1, n), so that in its middle every piece has the jerk of the closed form.
 
-    Each position of the closed form has an independent error of about 1e-15 rad. Over 0.1 ms, this is a jerk of 0.1
-    rad/s^3. The error of the sum at the end is distributed over the pieces so that it adds the same jerk to each.
+    Each position from the closed form has an independent error of about 1e-15 rad. In a piece of 0.1 ms, such an error
+    amounts to a jerk of 0.1 rad/s^3. At the end the sum has an error, which is distributed over the pieces so that it
+    adds the same jerk to each.
     """
     h = np.diff(times)[:, None]
     jerk = joint_map.state(*curves(spread(times, 2))).qdddot[1::2]
@@ -147,14 +148,14 @@ def _measure_gaps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the largest gaps of every piece in position, acceleration and jerk, and their noise, in tolerances.
 
-    States alternate between nodes and middles. In the middle of a quintic Hermite piece of length h:
+    The states are those at nodes and at middles, alternately. In the middle of a quintic Hermite piece of length h:
     q = (q0 + q1)/2 + 5h/32 (v0 - v1) + h^2/64 (a0 + a1),  qddot = 3 (v1 - v0) / (2h) - (a0 + a1)/4.
     At its beginning, qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
 
     Returns
     -------
     gaps, noises : (orders, L) ndarray
-        Gaps and noise of 2 or 3 orders.
+        Gaps and noise for the position, the acceleration and, if `orders` is 3, the jerk.
     """
     h = np.diff(times)[:, None]
     q = state.q[::2]
@@ -164,7 +165,7 @@ def _measure_gaps(
     position += h**2 / 64.0 * ends - state.q[1::2]
     acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends - state.qddot[1::2]
     largest = 1.0 + np.abs(state.qddot).max()
-    # For each order the gap, its noise, and the tolerance.
+    # For each order: the gap, its noise, and the tolerance.
     # Positions close to a branch boundary have a noise of at most 1e-12 rad or m.
     measures = [
         (np.abs(position), 1e-12 + 0.0 * h, _POSITION_TOLERANCE),

@@ -1,7 +1,7 @@
-"""The protocol of joint maps: from curves y(t) to joint motion and its exact derivatives.
+"""The interface of joint maps, which turn curves y(t) into joint motion and its exact derivatives.
 
-With qddot = f(y, ydot, yddot), the third order needs no separate formulas. With D for d/dt along the motion, d(D f)/dy
-= D(df/dy), d(D f)/dydot = D(df/dydot) + df/dy, and so on. Hence
+With qddot = f(y, ydot, yddot), the third order needs no separate formulas. Let D be d/dt along the motion. Then d(D
+f)/dy = D(df/dy), d(D f)/dydot = D(df/dydot) + df/dy, and so on. Hence
 
     qdddot            = f_y ydot + f_ydot yddot + G ydddot
     dqdddot/dydddot   = G
@@ -9,11 +9,11 @@ With qddot = f(y, ydot, yddot), the third order needs no separate formulas. With
     dqdddot/dydot     = 3 dqddot/dy
     dqdddot/dy        = D(dqddot/dy)
 
-Only the last line is new; it is computed by differences along the motion.
+Only the last line is a new quantity. It is computed by differences along the motion.
 
-Along a path of the tool, y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
-(`chart`). Along a path of all joints, y = (s); without a path, y = q. The code that builds, solves and refines programs
-accepts any of these maps.
+Along a path of the tool, either y = (s, q_r) and the closed form gives the other joints (`closed_form`), or y = (s,
+sigma) (`chart`). Along a path of all joints, y = (s). Without a path, y = q. The code that builds, solves and refines
+programs accepts any of these maps.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class JointState(SharedTorques):
 
     @cached_property
     def derivatives(self) -> JointDerivatives:
-        """Exact derivatives."""
+        """Exact derivatives of the joint motion with respect to the curves."""
         return self.joint_map.derivatives(self)
 
     @property
@@ -81,7 +81,7 @@ class JointState(SharedTorques):
         return MotionSlopes(self.gradient, *self.derivatives)
 
     def values_of(self, groups: ValueGroups) -> list[np.ndarray]:
-        """Compute the values of limits, (K, size) for each group; unset for a group with partials."""
+        """Compute the values of limits, (K, size) for each group. They are not set for a group with partials."""
         states = [self.q, self.qdot, self.qddot]
         if groups.has_jerk:
             states.append(self.qdddot)
@@ -100,18 +100,18 @@ class JointState(SharedTorques):
 
     @cached_property
     def qdddot_y(self) -> np.ndarray:
-        """The derivative of the jerk with respect to y, (K, n, c); raises UnreachableError as `state` does."""
+        """The derivative of the jerk with respect to y, (K, n, c). Raises UnreachableError as `JointMap.state` does."""
         near = np.tile(self.q, (2, 1))
 
         def slopes(*curves: np.ndarray) -> tuple[np.ndarray]:
-            """Return dqddot/dy, (2 K, n, c), at neighbouring moments."""
+            """Return dqddot/dy, (2 K, n, c), at neighbouring instants."""
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
         return rates(slopes, self.curves)[0]
 
 
 class JointDerivatives(NamedTuple):
-    """Derivatives of a `JointState`, (K, n, c) each, without dqdot/dydot = dqddot/dyddot = G.
+    """Derivatives of a `JointState`, (K, n, c) each, except dqdot/dydot = dqddot/dyddot = G.
 
     Attributes
     ----------
@@ -130,15 +130,15 @@ class JointMap(ABC):
     ----------
     robot : Robot
     start : (n,) ndarray
-        Posture at, or close to, the beginning, which decides about turns by 2 pi.
+        Posture at, or close to, the beginning. It determines the number of full turns of each angle.
     path : Path or None
-        Path whose path coordinate s is y[0]. None without a path; then y does not contain s.
+        Path whose path coordinate s is y[0]. None without a path, in which case y does not contain s.
     r : int
         Number of freely chosen joints.
     redundant_joints : tuple of str
-        Names of the joints that are themselves curves.
+        Names of the joints that are themselves among the curves.
     branch_label : str
-        Label of the branch to which `margins` belong; empty without margins.
+        Label of the branch to which `margins` belong; empty if there are no margins.
     """
 
     robot: Robot
@@ -158,7 +158,7 @@ class JointMap(ABC):
 
     @abstractmethod
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
-        """Return the values of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""
+        """Return the values of the curves, (c,), in a posture, (n,), at path coordinate s; NaN for a posture of NaN."""
 
     @abstractmethod
     def postures(self, y: np.ndarray) -> np.ndarray:
@@ -178,9 +178,9 @@ class JointMap(ABC):
         *curves : (K, c) ndarray
             y, ydot, yddot and ydddot.
         t : (K,) ndarray, optional
-            The times, ascending from the start, s. They are used to count turns.
+            Times in s, ascending from the start. They are used to count turns.
         near : (K, n) ndarray, optional
-            Postures known to be close, which decide about turns. The times may then be arbitrary.
+            Postures known to be close. They determine the turns, so the times may be arbitrary.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class JointMap(ABC):
         return submap
 
     def start_margins(self) -> np.ndarray:
-        """Return the margins, (b,), of the start, which vanish where the map ends; b = 0 if it ends nowhere."""
+        """Return the margins, (b,), at the start. Margins vanish where the map ends; b = 0 if it ends nowhere."""
         return np.empty(0)
 
     def margins(self, state: Any) -> np.ndarray:
@@ -218,13 +218,13 @@ class JointMap(ABC):
 
 @dataclass(frozen=True)
 class JointSpaceState(JointState):
-    """Joint motion at K times, and the path there."""
+    """Joint motion at K times, together with the path at these times."""
 
     path: PathSample
 
 
 class JointSpaceMap(JointMap):
-    """The `JointMap` of a path of all joints, q = q(s). Only s(t) is chosen: y = (s).
+    """The `JointMap` of a path of all joints, q = q(s). Only s(t) is free: y = (s).
 
     With the derivatives q_ds, q_dds and q_ddds of the path with respect to s,
 
@@ -235,7 +235,7 @@ class JointSpaceMap(JointMap):
     ----------
     robot : Robot
     path : Path
-        The path; its targets are joint positions.
+        Path whose targets are joint positions.
     """
 
     path: Path
@@ -246,7 +246,7 @@ class JointSpaceMap(JointMap):
         self.start = path.sample(np.zeros(1)).target[0]
 
     def coordinates(self, s: float, _q: np.ndarray) -> np.ndarray:
-        """Return s, the only curve."""
+        """Return y = (s), because s is the only curve."""
         return np.array([s])
 
     def postures(self, y: np.ndarray) -> np.ndarray:
@@ -254,7 +254,7 @@ class JointSpaceMap(JointMap):
         return self.path.sample(y[:, 0]).target
 
     def state(self, *curves: np.ndarray, **_options: object) -> JointSpaceState:
-        """Return the motion along the path, which also prescribes the turns of the joints."""
+        """Return the motion along the path. The path also prescribes the turns of the joints."""
         y, ydot, yddot, ydddot = curves
         path = self.path.sample(y[:, 0])
         qdot = path.xi * ydot

@@ -1,6 +1,6 @@
 """Joint motion along a path of the tool as a function of y = (s, sigma).
 
-The self-motion of the arm is measured by r functions of the joints, which are linear at every s:
+The self-motion of the arm is measured by r functions of the joints. At every s they are linear:
 
     sigma = C(s) q - p(s).
 
@@ -21,8 +21,8 @@ and, by differentiating J_aug qdot and J_aug qddot,
                                 - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0])
 
 with the derivatives V_q, A_q, A_v of task velocity and acceleration (`TaskMap`). If C is constant, the lower parts
-vanish. The decomposition of the paper is the case in which each row of C selects a joint (`closed_form`): then G_nr =
-J_nr^-1 [xi, -J_r], and so on.
+vanish. In the decomposition of the paper, each row of C selects a joint (`closed_form`). In this case G_nr = J_nr^-1
+[xi, -J_r], and so on.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class PathState(JointState):
 
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
-        """The least singular values of J_aug, (K,), and their right singular vectors, (K, n)."""
+        """The smallest singular value of J_aug at each point, (K,), and its right singular vector, (K, n)."""
         return find_least_singular(self.motion.inverse)
 
 
@@ -71,7 +71,7 @@ class PathMap(JointMap):
     Parameters
     ----------
     task_map : TaskMap
-        Of the robot.
+        Task map of the robot.
     path : Path
     start : (n,) ndarray
         Posture at, or close to, the beginning.
@@ -85,8 +85,8 @@ class PathMap(JointMap):
     faults : dict of Fault to str
         Text of the message for each fault.
     sample_at : LastCall
-        Function that samples the path and remembers its last result: in a program over the path, all iterates have the
-        same s.
+        Function that samples the path and caches its last result, because all iterates of a program over the path have
+        the same s.
     """
 
     path: Path
@@ -104,17 +104,17 @@ class PathMap(JointMap):
 
     @abstractmethod
     def kernel_inputs(self, y: np.ndarray, sample: PathSample) -> dict[str, np.ndarray]:
-        """Return the arrays from which the kernel finds postures; see `PathMotion`.
+        """Return the arrays from which the kernel computes postures; see `PathMotion`.
 
         Parameters
         ----------
         y : (K, 1 + r) ndarray
         sample : PathSample
-            The path at these points.
+            The path, sampled at these points.
         """
 
     def write_answers(self, motion: PathMotion) -> None:
-        """Write solutions that the kernel cannot compute to a prepared motion."""
+        """Write into a prepared motion the solutions that the kernel cannot compute."""
 
     def postures(self, y: np.ndarray, *, near: np.ndarray | None = None) -> np.ndarray:
         """Return joint positions, (K, n), for curves y, (K, 1 + r), at successive times.
@@ -123,7 +123,7 @@ class PathMap(JointMap):
         ----------
         y : (K, 1 + r) ndarray
         near : (K, n) ndarray, optional
-            Postures known to be close. The times may then be arbitrary.
+            Postures known to be close. If they are given, the times may be arbitrary.
 
         Returns
         -------
@@ -141,7 +141,7 @@ class PathMap(JointMap):
         inputs: dict[str, np.ndarray],
         sample: PathSample,
     ) -> PathMotion:
-        """Prepare a motion from the given curves, times and close postures."""
+        """Prepare a motion from inputs such as curves and times, and from samples of the path."""
         motion = PathMotion.prepare(
             self.robot.chain,
             self.task_map.prescribed,
@@ -166,7 +166,7 @@ class PathMap(JointMap):
     ) -> PathState:
         """Return the joint motion at K times; see `JointMap.state` and the formulas of the module.
 
-        Without `t` and `near`, successive times must be so close that no joint turns by more than pi in between.
+        Without `t` and `near`, successive times must be so close that no joint turns by more than pi between them.
         """
         y, ydot, yddot, ydddot = curves
         sample = self.sample_at(y[:, 0])

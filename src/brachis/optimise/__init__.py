@@ -1,1 +1,1 @@
-"""The optimisation: a nonlinear program in phases, its meshes, its solvers, and the refinement of its solutions."""
+"""The optimisation: a nonlinear program in phases, its meshes and solvers, and the refinement of its solutions."""

@@ -1,14 +1,14 @@
-"""Splines whose first and last control points are fixed or tied together by the boundary conditions.
+"""Splines whose first and last control points are fixed, or tied together, by boundary conditions.
 
-    control points = S free + sum of T^i fixed_i,    with T the duration
+    control points = S free + sum of T^i fixed_i,    where T is the duration
 
 Suppose the first k derivatives are given at the start. A clamped spline begins like the polynomial y0 + v t + a t^2 / 2
-+ ... if its first k + 1 control points are those of the polynomial: y0 + v T b_i1 + a T^2 b_i2 + ..., with b_i1 the
++ ... if its first k + 1 control points are those of the polynomial: y0 + v T b_i1 + a T^2 b_i2 + .... Here b_i1 are the
 Greville abscissae and b_ij the blossoms of t^j / j!. At rest v, a, ... are zero, and these control points are equal.
-The fixed terms of the other control points fade away from the polynomial, as v T xi_i (1 - xi_i)^2, and their free
-parts are added. This does not restrict the motion. But when only the duration gets longer, the curve stays smooth,
-which solvers need. Conditions on derivatives at a seam are linear in the control points too (see `periodic`). Boundary
-conditions therefore need no rows in the NLP.
+In the other control points, the fixed terms of the polynomial fade out, as v T xi_i (1 - xi_i)^2, and free parts are
+added. This does not restrict the motion. But if only the duration gets longer, the curve stays smooth, which solvers
+need. Conditions on derivatives at a seam are also linear in the control points (see `periodic`). Boundary conditions
+therefore need no rows in the NLP.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class EndCondition:
     Attributes
     ----------
     value : float
-        Value at the end; NaN if it is free.
+        Value at the end; NaN if the value is free.
     derivatives : (k,) ndarray
-        The first k time derivatives, per second; empty if they are free.
+        The first k time derivatives, per second; empty if the derivatives are free.
     """
 
     value: float
@@ -43,20 +43,20 @@ class EndCondition:
 
     @property
     def rate(self) -> float:
-        """The first derivative, per second; zero if it is free."""
+        """The first derivative at the end, per second; zero if it is free."""
         return float(self.derivatives[:1].sum())
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMatrix:
-    """The matrix S from free variables to control points, stored by its nonzero entries in the order of its rows.
+    """The matrix S from free variables to control points. Its nonzero entries are stored in the order of its rows.
 
     Attributes
     ----------
     point, variable : (z,) int ndarray
         Row and column of each entry.
     weight : (z,) ndarray
-        The entries.
+        Value of each entry.
     shape : tuple of int
         Numbers of control points and of free variables.
     """
@@ -68,7 +68,7 @@ class FreeMatrix:
 
     @classmethod
     def of(cls, matrix: np.ndarray) -> FreeMatrix:
-        """Store the nonzero entries of a matrix, (N + d, free)."""
+        """Store the nonzero entries of a dense matrix, (N + d, free)."""
         point, variable = np.nonzero(matrix)
         return cls(point, variable, matrix[point, variable], matrix.shape)
 
@@ -98,7 +98,7 @@ class BoundarySpline:
     free_matrix : FreeMatrix
         The matrix S.
     fixed_terms : (1 + p, N + d) ndarray
-        Fixed terms of the control points, one for each power of the duration up to the highest that matters, p.
+        Fixed terms of the control points, one row for each power of the duration up to p, the highest that is needed.
     """
 
     free_matrix: FreeMatrix
@@ -110,7 +110,7 @@ class BoundarySpline:
     ) -> BoundarySpline:
         """Build a spline with conditions at both ends."""
         count = len(knots) - degree - 1
-        # Control points of one group are one variable; those of group -1 are fixed.
+        # All control points of a group are a single variable. Control points of group -1 are fixed.
         group = np.arange(count)
         numbers = [1 + len(condition.derivatives) for condition in (start, end)]
         terms = np.zeros((max(numbers), count))
@@ -139,7 +139,7 @@ class BoundarySpline:
         return self.free_matrix.shape[1]
 
     def fixed_points(self, duration: float) -> np.ndarray:
-        """Return the part of the control points that the boundary conditions fix, (N + d,)."""
+        """Return the contribution of the boundary conditions to the control points, (N + d,)."""
         return sum_powers(self.fixed_terms, duration)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
@@ -147,7 +147,7 @@ class BoundarySpline:
         return self.free_matrix.control_points(free) + self.fixed_points(duration)
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
-        """Return free variables for given control points; a variable shared by several points is their mean."""
+        """Return free variables for given control points. A variable shared by several points is set to their mean."""
         free_points = control_points - self.fixed_points(duration)
         matrix = self.free_matrix
         is_alone = (matrix.counts[matrix.point] == 1) & (matrix.weight == 1.0)
@@ -162,7 +162,7 @@ def stack_splines(
     count: int,
     variables: int,
 ) -> tuple[FreeMatrix, np.ndarray]:
-    """Stack splines over the same knots: the control points of each follow those of the spline before it.
+    """Stack splines over the same knots. The control points of each spline follow those of the one before it.
 
     Parameters
     ----------
@@ -202,9 +202,9 @@ def stack_splines(
 def sum_powers(
     terms: np.ndarray, duration: float, *, slope: bool = False
 ) -> np.ndarray:
-    """Add up terms, (1 + k, p), times the powers of a duration, s; with `slope`, return the derivative of this sum.
+    """Add up terms, (1 + k, p), times the powers of a duration, s. If `slope`, return the derivative of this sum.
 
-    Do not write to the array that is returned.
+    Do not write to the returned array.
     """
     if len(terms) == 1:
         return np.zeros_like(terms[0]) if slope else terms[0]
@@ -215,10 +215,10 @@ def sum_powers(
 
 
 def _blossoms(knots: np.ndarray, degree: int, anchor: int, highest: int) -> np.ndarray:
-    """Return control points of t^j / j!, for j up to `highest`, with t = 0 at the end of control point `anchor`.
+    """Return control points of t^j / j!, for j up to `highest`, with t = 0 at the end to which `anchor` belongs.
 
-    The blossom of t^j / j! is e_j (d - j)! / d!, with e_j the elementary symmetric polynomial of a control point's d
-    knots.
+    The blossom of t^j / j! is e_j (d - j)! / d!, where e_j is the elementary symmetric polynomial of the d knots of a
+    control point.
 
     Returns
     -------
@@ -243,11 +243,11 @@ def _blossoms(knots: np.ndarray, degree: int, anchor: int, highest: int) -> np.n
 def periodic(
     knots: np.ndarray, degree: int, start: float, jump: float
 ) -> BoundarySpline:
-    """Build a spline with equal derivatives at both ends, and a value at the end that is ahead by a jump.
+    """Build a spline with equal derivatives at both ends, whose value at the end is ahead of the start by a jump.
 
-    The derivatives are those that are continuous within the spline, at most the first three. Let A and B give the value
-    and derivatives from the first and the last p + 1 control points. The last control points are then B^-1 A times the
-    first ones, plus the jump.
+    The derivatives that are made equal are those that are continuous within the spline, at most the first three. Let A
+    and B be the matrices that give the value and derivatives from the first and the last p + 1 control points. The last
+    control points are then B^-1 A times the first ones, plus the jump.
 
     Parameters
     ----------
@@ -257,6 +257,7 @@ def periodic(
     start : float
         Value at the start; NaN if it is free.
     jump : float
+        Value at the end minus value at the start.
     """
     orders = min(degree, ORDERS)
     _, derivatives = local_basis(knots, degree, np.array([0.0, 1.0]))
@@ -265,7 +266,7 @@ def periodic(
     free = len(knots) - degree - 1 - orders
     matrix = np.eye(free + orders, free)
     matrix[free:, :orders] = np.linalg.solve(last, first)
-    matrix[-1] = np.eye(free)[0]  # the value itself, without rounding
+    matrix[-1] = np.eye(free)[0]  # the value itself, without rounding error
     terms = np.zeros((1, len(matrix)))
     terms[0, free:] = jump
     if not np.isnan(start):
@@ -281,12 +282,12 @@ class Boundary:
     Attributes
     ----------
     start, end : (c,) tuple of EndCondition
-        Conditions on every curve.
+        Conditions on each curve at the start and at the end.
     periodic : bool
-        Whether the motion continues smoothly from its end to its start. No derivatives are given then. Values that are
-        given at both ends tell by how much the end is ahead of the start.
+        Whether the motion continues smoothly from its end to its start. If so, no derivatives are given. If values are
+        given at both ends, their difference is the distance by which the end is ahead of the start.
     time_law : TimeLaw or None
-        Time law of s(t), if it is given. The duration is then given too, and the first curve has no spline.
+        Time law of s(t), if it is given. In this case the duration is given too, and the first curve has no spline.
     """
 
     start: tuple[EndCondition, ...]
@@ -303,7 +304,7 @@ class Boundary:
         *,
         periodic: bool = False,
     ) -> Boundary:
-        """Build conditions from values, (c,), NaN where free, and a number of derivatives that vanish at both ends."""
+        """Build conditions from values, (c,), NaN if free, and a number of derivatives that vanish at both ends."""
         zeros = np.zeros(derivatives)
         sides = [
             tuple(EndCondition(float(value), zeros) for value in values)
@@ -313,17 +314,17 @@ class Boundary:
 
     @property
     def law_curves(self) -> int:
-        """Number of curves that the time law gives and that have no spline: 1 or 0."""
+        """Number of curves that are given by a time law and therefore have no spline: 1 or 0."""
         return int(self.time_law is not None)
 
     @property
     def rates(self) -> tuple[float, float]:
-        """First derivatives of the first curve at start and end, 1/s; zero if they are free."""
+        """First derivatives of the first curve at its start and end, 1/s; zero if they are free."""
         return self.start[0].rate, self.end[0].rate
 
     @property
     def ahead(self) -> np.ndarray:
-        """Distance by which the end of each curve is ahead of its start, (c,); zero where this is free."""
+        """Distance by which the end of each curve is ahead of its start, (c,); zero if the distance is free."""
         pairs = zip(self.start, self.end, strict=True)
         return np.nan_to_num([end.value - start.value for start, end in pairs])
 
@@ -343,12 +344,12 @@ class Boundary:
 
 @dataclass(frozen=True)
 class LocalBasis:
-    """Basis functions at K times, for the value and three derivatives.
+    """Basis functions at K times, for the value and three derivatives of splines.
 
     Attributes
     ----------
     first : (K,) int ndarray
-        Number of the first of the d + 1 control points that matter at each time.
+        Index of the first of the d + 1 control points that have an effect at each time.
     values : (4, K, d + 1) ndarray
         Basis functions and their derivatives, per unit of normalised time.
     """
@@ -358,8 +359,8 @@ class LocalBasis:
 
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
-        """Sample the basis at normalised times `t_norm`, (K,); at a knot, just after it."""
-        # Rounding must not decide the side of a knot, because the highest derivative jumps there.
+        """Evaluate the basis at normalised times `t_norm`, (K,); at a knot, just after the knot."""
+        # Rounding must not decide on which side of a knot a time lies, because the highest derivative jumps there.
         breaks = np.unique(knots)
         place = np.searchsorted(breaks, t_norm - 1e-13).clip(max=len(breaks) - 1)
         near = breaks[place]
@@ -368,7 +369,7 @@ class LocalBasis:
 
     @property
     def columns(self) -> np.ndarray:
-        """Control points that matter at each time, (K, d + 1)."""
+        """Control points that have an effect at each time, (K, d + 1)."""
         return self.first[:, None] + np.arange(self.values.shape[2])
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
@@ -381,21 +382,21 @@ class LocalBasis:
 
 
 class SparsityPattern:
-    """The times at which the free variables of splines matter: each pair occurs once, spline by spline.
+    """The times at which free variables of splines have an effect. Each pair of time and variable occurs once.
 
     Parameters
     ----------
     columns : (K, d + 1) int ndarray
-        Control points of a spline that matter at each time; see `LocalBasis`.
+        Control points of a spline that have an effect at each time; see `LocalBasis`.
     matrix : FreeMatrix
         Stacked matrix of splines over the same knots.
     curves : int
-        Number of these splines.
+        Number of the splines in `matrix`.
 
     Attributes
     ----------
     curve, point, variable : (z,) int ndarray
-        Indices of the spline, of the time, and of the variable.
+        Indices of the spline, the time and the variable of each pair, spline by spline.
     """
 
     def __init__(self, columns: np.ndarray, matrix: FreeMatrix, curves: int) -> None:

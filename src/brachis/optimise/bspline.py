@@ -1,13 +1,14 @@
-"""B-spline basis functions as functions of the interval lengths, and their exact derivatives with respect to these.
+"""B-spline basis functions as functions of the interval lengths, and their exact derivatives by these lengths.
 
-A point lies at a fixed fraction of its interval. The d + 1 basis functions of degree d that are nonzero there depend
-only on the lengths of the 2 d - 1 intervals around it, by the recursion of Cox and de Boor (Piegl and Tiller, The NURBS
-Book, A2.2). The denominators are never less than the point's own interval, so neighbouring intervals may have length
-zero, as they do beyond the ends of a clamped knot vector. The recursion is rational and accepts complex lengths. A step
-along the imaginary axis gives derivatives without cancellation (Squire and Trapp, 1998).
+A point lies at a fixed fraction of its interval. The d + 1 basis functions of degree d that are nonzero at the point
+depend only on the lengths of the 2 d - 1 intervals around it. They are computed by the recursion of Cox and de Boor
+(Piegl and Tiller, The NURBS Book, A2.2). The denominators are never less than the length of the point's own interval.
+Neighbouring intervals may therefore have length zero, as they do beyond the ends of a clamped knot vector. The
+recursion is rational, so lengths may be complex. A step along the imaginary axis gives derivatives without
+cancellation (Squire and Trapp, 1998).
 
-Knot insertion gives the same curves over a finer knot vector: the control points are blossoms of the old pieces at the
-new knots (see `brachis.kernel`).
+Knot insertion gives the same curves over a finer knot vector. The new control points are blossoms of the old pieces at
+the new knots (see `brachis.kernel`).
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ import numpy as np
 from brachis.kernel import blossom
 
 ORDERS = 4
-"""Value and three derivatives."""
+"""Number of orders: the value and three derivatives."""
 
 
 def local_basis(
     knots: np.ndarray, degree: int, t_norm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return value and three derivatives of the basis functions that are nonzero at given times.
+    """Return value and three derivatives of those basis functions that are nonzero at given times.
 
     Parameters
     ----------
@@ -32,14 +33,14 @@ def local_basis(
     degree : int
         d >= 2.
     t_norm : (K,) ndarray
-        Times; those outside the knots are moved to the nearest end.
+        Times. A time outside the knots is moved to the nearest end.
 
     Returns
     -------
     first : (K,) int ndarray
-        Interval of each time. It is also the index of the first control point that matters there.
+        Index of the interval of each time. It is also the index of the first control point with an effect there.
     values : (4, K, d + 1) ndarray
-        Values and derivatives, per unit of the knots' time.
+        Values, and derivatives per unit of the time of the knots.
     """
     breaks = knots[degree : len(knots) - degree]
     first, fraction = locate(breaks, np.clip(t_norm, breaks[0], breaks[-1]))
@@ -48,14 +49,14 @@ def local_basis(
 
 
 def locate(breaks: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the interval of each of the given times, (K,), and the fraction of it that lies before the time."""
+    """Find the interval in which each time, (K,), lies, and the fraction of this interval before the time."""
     interval = np.searchsorted(breaks, times, side="right") - 1
     interval = interval.clip(0, len(breaks) - 2)
     return interval, (times - breaks[interval]) / np.diff(breaks)[interval]
 
 
 def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarray:
-    """Return B, (K, N + d), so that ``B @ control_points`` is the spline at given times; see `local_basis`."""
+    """Return the matrix B, (K, N + d). ``B @ control_points`` is the spline at given times; see `local_basis`."""
     first, values = local_basis(knots, degree, t_norm)
     matrix = np.zeros((len(first), len(knots) - degree - 1))
     np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values[0], axis=1)
@@ -68,14 +69,14 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     lengths : (..., 2 d - 1) ndarray, real or complex
-        Lengths of the intervals around each point; the middle one is its own interval. d >= 2.
+        Lengths of the intervals around each point. The interval in the middle contains the point. d >= 2.
     fraction : (...) ndarray
-        Position within the point's own interval, 0 to 1.
+        Position of the point within its own interval, 0 to 1.
 
     Returns
     -------
     (4, ..., d + 1) ndarray
-        Values and derivatives, in the unit of the lengths.
+        Values, and derivatives per unit of the lengths.
     """
     degree = (lengths.shape[-1] + 1) // 2
     middle = degree - 1
@@ -135,7 +136,7 @@ def _slope(
 
 
 def _add_neighbours(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Add two sets of values, the first one shifted by one basis function."""
+    """Add two sets of values. The first set is shifted by one basis function."""
     zero = np.zeros_like(first[..., :1])
     moved = np.concatenate([zero, first], axis=-1)
     return moved + np.concatenate([second, zero], axis=-1)
@@ -178,7 +179,7 @@ def insert_knots(
     (c, N' + d) ndarray
     """
     new = np.arange(len(finer) - degree - 1)
-    # A polynomial evaluated far from its own interval would lose all digits; the middle knot's interval is closest.
+    # Far from its own interval, a polynomial would lose all digits. Use the one of the middle knot's interval.
     middle = finer[new + (degree + 1) // 2]
     interval = np.searchsorted(knots, middle, side="right") - 1
     interval = np.clip(interval, degree, len(knots) - degree - 2)

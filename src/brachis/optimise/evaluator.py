@@ -21,8 +21,8 @@ from brachis.limits import Limit, Partials
 class Evaluator:
     """Values and slopes of all limits along curves y(t).
 
-    Each phase has an evaluator, which it uses for the rows of the program, their Jacobian, and the checks between
-    collocation points.
+    Each phase has an evaluator. The phase uses it for the rows of the program, for their Jacobian, and for the checks
+    between collocation points.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Evaluator:
     joint_map, limits
         As given.
     is_mean : (c,) bool ndarray
-        True for each value of the limits that is limited as a mean over the motion.
+        True for each value of the limits whose mean over the motion is limited.
     """
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit]) -> None:
@@ -60,10 +60,9 @@ class Evaluator:
         *curves : (K, 1 + r) ndarray
             y, ydot, yddot and ydddot.
         t : (K,) ndarray, optional
-            The times, ascending from the start, s. They are used to count turns.
+            Times in s, ascending from the start. They are used to count turns.
         near : (K, n) ndarray, optional
-            Known postures close to the ones sought. They decide which turn is meant; the times may then be in any
-            order.
+            Known postures close to those at these times. They determine the turns, so the times may be in any order.
 
         Raises
         ------
@@ -76,12 +75,12 @@ class Evaluator:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Joint motion and limits at K times; values are computed once, when they are first needed.
+    """Joint motion and limits at K times. Values are computed once, when they are first needed.
 
     Attributes
     ----------
     limits : tuple of Limit
-        The limits; together they have c values.
+        The limits, with c values together.
     motion : JointState
         Joint motion: q, qdot, qddot and qdddot, (K, n), and the gradient dq/dy.
     groups : ValueGroups
@@ -94,7 +93,7 @@ class Evaluation:
 
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
-        """Values of each limit, (K, number of its values)."""
+        """Values of each limit, (K, number of values) for each limit."""
         motion = self.motion
         values = motion.values_of(self.groups)
         for number in self.groups.with_partials:
@@ -114,16 +113,16 @@ class Evaluation:
         Returns
         -------
         slopes : (3 or 4, K, c, 1 + r) ndarray
-            With respect to y, ydot, yddot and, where a limit depends on the jerk, ydddot.
+            Slopes with respect to y, ydot and yddot, and also to ydddot if a limit depends on the jerk.
         entries : (z, c) ndarray
-            Entries of the Jacobian with respect to the variables, if these are given.
+            Entries of the Jacobian with respect to the variables, if variables are given.
         """
         limits = (self.limits[number] for number in self.groups.with_partials)
         partials = [limit.partials(self.motion) for limit in limits]
         return self._differentiate(self.groups, partials, variables)
 
     def chain(self, partials: Partials) -> np.ndarray:
-        """Differentiate functions, given by their partials, with respect to y, ydot, yddot and, if needed, ydddot."""
+        """Return slopes by y, ydot, yddot and, if needed, ydddot, of functions that are given by their partials."""
         return self._differentiate(ValueGroups([None], [partials.size]), [partials])[0]
 
     def _differentiate(
@@ -132,7 +131,7 @@ class Evaluation:
         partials: list[Partials],
         variables: VariableSlopes | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate the values of groups; `partials` belong to the groups that have partials."""
+        """Differentiate the values of groups. `partials` are those of the groups that have partials."""
         motion = self.motion
         slopes = motion.slopes
         if groups.has_jerk or any(
@@ -144,7 +143,7 @@ class Evaluation:
         return differentiate(groups, slopes, states, arrays, variables)
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
-        """Return violations of the limits that count, (K, number of values); negative where a limit is met."""
+        """Return violations of the limits that `counts` accepts, (K, number of values); negative if a limit is met."""
         pairs = zip(self.limits, self.by_limit, strict=True)
         violations = [
             limit.violation(values) for limit, values in pairs if counts(limit)

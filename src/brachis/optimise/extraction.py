@@ -1,4 +1,4 @@
-"""Trajectories from solutions of programs, phase by phase; each phase begins exactly where the one before it ends."""
+"""Trajectories from solutions of programs. Each phase begins exactly where the one before it ends."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
 
 @dataclass(frozen=True, eq=False)
 class _Section:
-    """A phase of a trajectory: its curves, its nodes, and the time that the arm waits after it, s."""
+    """A phase of a trajectory: its curves, its nodes, and the pause after it, s."""
 
     spline: PhaseSpline
     nodes: Nodes
@@ -83,7 +83,7 @@ class _Section:
 
     @classmethod
     def of(cls, phase: Phase, motion: Motion, before: _Section | None) -> _Section:
-        """Extract the motion of a phase, beginning in the posture in which the section before it ends."""
+        """Extract the motion of a phase, which begins in the posture in which the section before it ends."""
         joint_map = phase.joint_map
         path = joint_map.path
         assert path is not None
@@ -98,7 +98,7 @@ class _Section:
         return cls(motion.as_spline(), nodes, phase.pause)
 
     def wait(self) -> _Section:
-        """Return the section in which the arm waits at rest where this section ends."""
+        """Return the section of the pause, in which the arm waits at rest where this section ends."""
         q = np.tile(self.nodes.q[-1], (2, 1))
         still = np.zeros_like(q)
         times = np.array([0.0, self.pause])
@@ -107,7 +107,7 @@ class _Section:
 
 
 def _join(program: Program, x: np.ndarray) -> list[Motion]:
-    """Return the motions of all phases, linked exactly: a solver meets the links only to within its tolerance."""
+    """Return the motions of all phases, linked exactly. A solver links phases only to within its tolerance."""
     motions = program.motions(x)
     for link in program.links:
         before = motions[link.before]
@@ -119,11 +119,11 @@ def _join(program: Program, x: np.ndarray) -> list[Motion]:
 
 
 def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
-    """Return a motion that begins with the values and derivatives that a link takes over from `last`, (4, c)."""
+    """Return the motion with a new start: a link sets some values and derivatives to those of `last`, (4, c)."""
     orders = np.array(motion.at(np.zeros(1)))[:, 0]
     fixed_derivatives = phase.boundary.start[-1].derivatives
     fixed_orders = len(fixed_derivatives)
-    # Set them exactly: over an interval of microseconds, rounding errors become an acceleration not allowed at rest.
+    # Set them exactly: in an interval of microseconds, a rounding error becomes an acceleration not allowed at rest.
     orders[1 : 1 + fixed_orders, list(link.curves)] = fixed_derivatives[:, None]
     joined = np.ix_(link.orders, link.curves)
     orders[joined] = last[joined]

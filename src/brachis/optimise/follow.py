@@ -1,10 +1,10 @@
 """Splines along the fastest timing of a phase's joint path, within its limits.
 
-Splines follow a timing approximately (`timed_splines`). Where they exceed a limit, the limit is narrowed by the excess
-and the joint path is timed again, until the limits are met. This keeps the motion as fast as possible.
+Splines follow a timing approximately (`timed_splines`). Where they exceed a limit, the limit is narrowed by the excess.
+The joint path is then timed again, until the limits are met. This keeps the motion as fast as possible.
 
-Knots are placed where accelerations jump, and where limits were exceeded over fewer knots. They keep their places on
-the path, whatever its timing.
+Knots are placed where accelerations jump, and where splines over fewer knots exceeded limits. Each knot keeps its place
+on the path in every timing.
 """
 
 from __future__ import annotations
@@ -29,48 +29,48 @@ from brachis.timing import Timing
 from brachis.timing.joint_path import halfway
 
 _FIRST_LOSS = 5.0
-"""Time that the first intervals may cost together, divided by the time that splines may cost. The estimate is too high
-by about this factor where accelerations are smooth."""
+"""Time that the first intervals together may cost, divided by the time that splines may cost. Where accelerations are
+smooth, the estimated cost of intervals is too high by about this factor."""
 _SHARE = 0.5
-"""Fraction of the tolerance that splines may use up; joint paths use up more."""
+"""Fraction of the tolerance that splines may use up. Imperfect joint paths use up more."""
 _AIM = 0.7
-"""Fraction of this share at which the next mesh aims."""
+"""Target for the next mesh, as a fraction of the time that splines may cost."""
 _FINER = (0.02, 0.5)
-"""Smallest and largest factor on the time that intervals may cost, after a mesh was too slow."""
+"""Smallest and largest factor on the time that intervals may cost, applied when a mesh is too slow."""
 _WAITS = 0.1
-"""Fraction of the splines' share that the timing waits at an end, for each derivative that vanishes there."""
+"""Wait at an end for each derivative that vanishes there, as a fraction of the time that splines may cost."""
 _FIRST_WAIT = 0.01
-"""Length of such a wait over the initial knots, as a fraction of the time."""
+"""Wait at an end in splines over the initial knots, as a fraction of the motion time."""
 _FOR_AIM = 3
-"""Number of the first mesh that may use up all of the tolerance. On paths with many quick bends (example 16), staying
-within the share would take several times as many knots."""
+"""Number of the first mesh that may use up all of the tolerance. On paths with many quick bends (example 16), splines
+that use up only `_SHARE` would need several times as many knots."""
 _MESHES = 6
 """Maximum number of meshes that are tried."""
 _MOST_INTERVALS = 200_000
-"""Maximum number of intervals of a phase. The verification checks 8 instants in each, and at most 2,000,000 in all."""
+"""Maximum number of intervals of a phase. The verification checks 8 instants in each, 2,000,000 at most."""
 _LOOKS = (4, 10)
-"""Number of times in each interval at which limits are checked: at first, and once they are met there."""
+"""Number of instants per interval at which limits are checked in the first rounds, and after they are met there."""
 _ROUNDS = 40
-"""Maximum number of splines that are laid over the same mesh."""
+"""Maximum number of times that splines are laid over the same mesh."""
 _PATIENCE = 8
-"""Maximum number of rounds without gain. With 3 the seven joints of example 16 ended 6.8 % slower than with 8."""
+"""Maximum number of rounds without gain. With 3, the motion of example 16 was 6.8 % slower than with 8."""
 _ENOUGH = 5e-5
-"""Violation of a limit that is small enough, as a fraction of the limit."""
+"""Largest permitted violation of a limit, as a fraction of the limit."""
 _UNCHANGED = 1e-5
-"""Changes of a rate or an acceleration up to this fraction of its limit need no new check, and limits are not narrowed
-for violations up to this. It is a fifth of `_ENOUGH`. A path through 500 waypoints ended 4e-5 later when everything was
-checked again and narrowed in every round."""
+"""If a rate or an acceleration changes by no more than this fraction of its limit, it is not checked again. Limits are
+not narrowed for smaller violations either. The value is a fifth of `_ENOUGH`. A motion through 500 waypoints took 4e-5
+longer when everything was checked again and narrowed in every round."""
 _AT_ONCE = 8192
-"""Number of times that are checked together: their states stay in the processor's cache."""
+"""Number of instants that are checked together, so that their states stay in the processor's cache."""
 _SMALL = 0.01
 """Violation above which limits are narrowed by the violation itself."""
 _MORE = 1.5
-"""Factor on smaller violations: splines respond by less than limits are narrowed."""
+"""Factor on violations below `_SMALL`, because splines respond by less than limits are narrowed."""
 _MOST_MORE = 8.0
-"""Largest such factor where few intervals exceed a limit. The factor makes up for what the last narrowing lacked there.
-With 1.5 a path through 500 waypoints took 18 rounds; with 8 it takes 11."""
+"""Largest factor on small violations if few intervals exceed a limit. It makes up for insufficient narrowing in the
+last round. With 1.5, a path through 500 waypoints took 18 rounds; with 8, it takes 11."""
 _RARE = 0.01
-"""Fraction of the intervals that counts as few. When more were narrowed by this factor, that path was 3e-5 slower."""
+"""Fraction of intervals that counts as few. With a larger fraction, a path of 500 waypoints was 3e-5 slower."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class LaidSplines:
     motion : Motion
     timing : Timing
     delay : float
-        Time at which the timing begins, s.
+        Time at which the timing begins in the motion, s.
     """
 
     motion: Motion
@@ -97,7 +97,7 @@ class LaidSplines:
     def states(
         self, joint_map: JointMap, t: np.ndarray
     ) -> Iterator[tuple[slice, JointState]]:
-        """Yield the joint motion at times, (K,), s, part by part; raise UnreachableError as `JointMap.state` does."""
+        """Yield the joint motion at times, (K,), s, in parts; raise UnreachableError as `JointMap.state` does."""
         for begin in range(0, len(t), _AT_ONCE):
             rows = slice(begin, begin + _AT_ONCE)
             station = np.searchsorted(self.times[1:-1], t[rows])
@@ -107,19 +107,19 @@ class LaidSplines:
 
 @dataclass(frozen=True)
 class SplineFit:
-    """Splines over one mesh, and how well they meet the limits.
+    """Splines over one mesh, and how far they violate the limits.
 
     Attributes
     ----------
     laid : LaidSplines
     violation : float
-        Largest violation of a limit; infinite if it is not known.
+        Largest violation of a limit; infinite if the violation is not known.
     slower : float
-        Smallest fraction by which this mesh makes the motion slower; infinite if the limits cannot be met.
+        Minimum fraction by which the motion is slower over this mesh; infinite if the limits cannot be met.
     outside : float
-        Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
+        Largest violation of limits on postures, which a longer time does not relieve; infinite if not known.
     beyond : (N,) ndarray
-        Largest violation in each interval before limits were narrowed; empty if it is not known.
+        Largest violation in each interval before limits were narrowed; empty if not known.
     """
 
     laid: LaidSplines
@@ -130,12 +130,12 @@ class SplineFit:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """Sort key, smaller for better splines: the violation of limits on postures above `_ENOUGH`, then the time."""
+        """Sort key, smaller for better splines. Violations of limits on postures come first, then the time."""
         return max(self.outside, _ENOUGH), self.needed_time
 
     @property
     def needed_time(self) -> float:
-        """Approximate time in which the limits would be met, s."""
+        """Approximate motion time with which the limits would be met, s."""
         return self.laid.motion.t_end * (1.0 + self.violation)
 
 
@@ -158,7 +158,7 @@ def follow(
     points : int
         Number of collocation points per interval.
     deadline : Deadline, optional
-        After it no further mesh is tried, and no limit is narrowed further.
+        After this deadline no further mesh is tried, and no limit is narrowed further.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def follow(
     x : (v,) ndarray
         The splines. None is returned in place of all three if the limits allow no timing.
     violation : float
-        Largest violation of a limit, as a fraction of it; infinite if it is not known.
+        Largest violation of a limit, as a fraction of the limit; infinite if not known.
     """
     timing = phase_timing.timing
     if timing is None:
@@ -181,8 +181,8 @@ def follow(
         breaks = even_out(np.union1d(breaks, needed))
         if len(breaks) > _MOST_INTERVALS:
             break
-        # Over the last mesh, limits are narrowed until they are met, however slow the motion becomes. A mesh is last,
-        # too, if it is so fine that the timing, known only at its stations, cannot guide a finer one.
+        # Over the last mesh, limits are narrowed until they are met, however slow the motion becomes. A mesh is also
+        # the last one if the timing, known only at its stations, cannot guide a finer mesh.
         is_fine = 2 * len(breaks) > len(timing.times)
         is_last = number == _MESHES or is_fine or deadline.passed
         enough = aim if number < _FOR_AIM else tolerance
@@ -213,7 +213,7 @@ def begin(
     intervals: int,
     points: int,
 ) -> tuple[Phase, np.ndarray]:
-    """Lay splines along a timing over few intervals; they may exceed limits.
+    """Lay splines along a timing over few intervals. The splines may exceed limits.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def begin(
     timing : Timing
         Timing of the joint path.
     lost : float
-        Fraction of the time that the intervals may cost together.
+        Fraction of the time that the intervals together may cost.
     intervals : int
         Approximate number of intervals.
 
@@ -244,7 +244,7 @@ def _knots(
     shortest: float,
     max_intervals: int = _MOST_INTERVALS + 1,
 ) -> np.ndarray:
-    """Choose knots, (N + 1,), with `breaks_for`; if accelerations vanish at an end, make the end intervals short."""
+    """Choose knots, (N + 1,), with `breaks_for`. If accelerations vanish at an end, shorten the end intervals."""
     breaks = breaks_for(phase_timing.course, timing, lost, max_intervals)
     if max(_vanishing(phase)) > 0:
         breaks = even_out(np.union1d(breaks, [shortest, 1.0 - shortest]))
@@ -252,7 +252,7 @@ def _knots(
 
 
 def _vanishing(phase: Phase) -> tuple[int, int]:
-    """Return the number of derivatives, from the acceleration on, that vanish at each end of a phase."""
+    """Return the number of vanishing derivatives at each end of a phase, from the acceleration upwards."""
     ends = phase.boundary.start, phase.boundary.end
     first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
     return first, last
@@ -263,8 +263,8 @@ def _lay_splines(
 ) -> LaidSplines:
     """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`.
 
-    Each acceleration, or derivative of it, that vanishes at an end needs one more interval there, as long as its
-    neighbour. The timing begins later by the time of the added intervals.
+    For the acceleration, and for each of its derivatives, that vanishes at an end, an interval as long as its neighbour
+    is added there. The start of the timing is delayed by the duration of the added intervals.
     """
     first, last = _vanishing(phase)
     ahead = breaks[1] * np.arange(first)
@@ -281,7 +281,7 @@ def _lay_splines(
         for spline, nearly in zip(splines, motion.control_points, strict=True)
     ]
     if phase.joint_map.path is not None:
-        # Where the tool stands still, means of its rate are not exact.
+        # Where the tool stands still, means of its rate are inexact, and s might decrease.
         points[0] = np.maximum.accumulate(points[0].clip(max=points[0][-1]))
     motion = replace(motion, control_points=np.array(points))
     return LaidSplines(motion, timing, delays[0])
@@ -295,7 +295,7 @@ def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndar
 
 
 def _look_at_postures(phase: Phase, fit: SplineFit) -> SplineFit:
-    """Find by how much splines violate limits on postures, if their violation of other limits is known."""
+    """Find the violation of limits on postures, if the splines' violation of other limits is known."""
     if not np.isfinite(fit.violation):
         return fit
     t = spread(fit.laid.motion.breaks, _LOOKS[-1])
@@ -310,20 +310,20 @@ def _look_at_postures(phase: Phase, fit: SplineFit) -> SplineFit:
 
 
 class _Violations:
-    """Largest violations of limits between knots; they are kept where the timing of the path does not change.
+    """Largest violations of limits between knots. They stay valid where the timing of the path does not change.
 
     Parameters
     ----------
     phase : Phase
     phase_timing : PhaseTiming
-        Phase timing that has a timing.
+        Phase timing whose `timing` is not None.
     breaks : (N + 1,) ndarray
         Knots in the normalised time of this timing.
 
     Attributes
     ----------
     by_limit : dict of Limit to (N, c) ndarray
-        Violations by interval; those during the waits at the ends count for the first and the last interval.
+        Violations in each interval. Those during the waits at the ends count for the first and the last interval.
     """
 
     def __init__(
@@ -344,12 +344,12 @@ class _Violations:
         self.forget()
 
     def forget(self) -> None:
-        """Mark all intervals to be checked next time."""
+        """Mark all intervals for checking next time."""
         self._known = np.full((len(self._fastest), 1), np.inf)
         self._earlier: dict[Limit, tuple[np.ndarray, np.ndarray]] = {}
 
     def look(self, laid: LaidSplines, looks: int) -> None:
-        """Check the limits near changes of the timing: at stations, and at the ends of `looks` steps in each interval.
+        """Check limits close to changes of the timing: at stations, and at the ends of `looks` steps in each interval.
 
         Raises
         ------
@@ -373,7 +373,7 @@ class _Violations:
         self.worst = np.max([np.zeros(len(is_new)), *largest], axis=0)
 
     def find_excess(self, least: float) -> Iterator[tuple[Limit, np.ndarray]]:
-        """Yield amounts by which to narrow limits, (N, c): violations, with small ones times at least `least`."""
+        """Yield amounts by which to narrow limits, (N, c): violations; small ones are multiplied by `least` or more."""
         is_rare = np.mean(self.worst > _ENOUGH) < _RARE
         largest = _MOST_MORE if is_rare else _MORE
         for limit, known in self.by_limit.items():
@@ -388,20 +388,20 @@ class _Violations:
             yield limit, excess / limit.violation_scale
 
     def _raise(self, laid: LaidSplines, t: np.ndarray, interval: np.ndarray) -> None:
-        """Raise the known violations of intervals, (K,), ascending, to those found at times in them, (K,), s."""
+        """Raise the known violations of intervals, (K,), ascending, to the violations at times in them, (K,), s."""
         for rows, state in laid.states(self._phase.joint_map, t):
             for limit, violations in self.by_limit.items():
                 values = limit.violation(limit.values(state))
                 _raise_to(violations, interval[rows], values)
 
     def _find_changes(self, timing: Timing) -> np.ndarray:
-        """Tell near which intervals, (N,), a timing has changed since they were last checked."""
+        """Tell for each interval, (N,), whether the timing has changed close to it since it was last checked."""
         rate = timing.middle_rate / self._fastest
         now = np.column_stack([rate, self._course.accelerations(timing)])
         is_changed = (np.abs(now - self._known) > _UNCHANGED).any(axis=1)
         self._known = np.where(is_changed[:, None], now, self._known)
         (step,) = np.nonzero(is_changed)
-        # A knot has an effect as far as splines share control points.
+        # The effect of a knot extends as far as splines share control points.
         beside = self._phase.degree + 1
         count = len(self.worst)
         first = (self._interval[step] - beside).clip(min=0)
@@ -418,7 +418,7 @@ def _hold_limits(
     allowed: float,
     deadline: Deadline,
 ) -> SplineFit:
-    """Lay splines until the limits are met, or until they are slower by more than a fraction `allowed` of the time."""
+    """Lay splines until they meet the limits, or are slower by more than a fraction `allowed` of the time."""
     fastest = phase_timing.timing
     assert fastest is not None
     timing = fastest
@@ -478,7 +478,7 @@ def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
 def _between_stations(
     values: np.ndarray, breaks: np.ndarray, timing: Timing
 ) -> np.ndarray:
-    """Return bounds between stations, (P - 1, c), from lines drawn above the values of the knot intervals, (N, c)."""
+    """Return bounds between stations, (P - 1, c), from lines that lie above the values of knot intervals, (N, c)."""
     padded = np.concatenate([values[:1], values, values[-1:]])
     at_breaks = np.maximum(padded[1:], padded[:-1])
     t = timing.times / timing.t_end
@@ -492,7 +492,7 @@ def _between_stations(
 
 
 def _raise_to(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
-    """Raise rows of a table, (R, c), to the largest of their values, (K, c); the row numbers, (K,), ascend."""
+    """Raise rows of a table, (R, c), to the largest of their values, (K, c). The row numbers, (K,), ascend."""
     first = np.flatnonzero(np.diff(rows, prepend=-1))
     largest = np.maximum.reduceat(values, first)
     table[rows[first]] = np.maximum(table[rows[first]], largest)

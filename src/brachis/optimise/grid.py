@@ -1,13 +1,13 @@
 """Positions of knots and collocation points: fixed, or moved by the interval lengths h as variables of the NLP.
 
-A collocation point keeps its interval and its fraction of the interval. Where the knots are free, h = (h_1, ..., h_N)
-are variables at the end of x, in normalised time. They are bounded from below, and a row holds their sum at 1. The
-collocation points then move with the knots, and the basis functions at a point depend on the 2 d - 1 intervals around
-it. A fixed grid has the same interface, with no variables, no rows and empty derivatives.
+A collocation point stays in its interval, at the same fraction of the interval. If the knots are free, the lengths h =
+(h_1, ..., h_N), in normalised time, are variables at the end of x. They have lower bounds, and a row requires their sum
+to be 1. The collocation points then move with the knots, and the basis functions at a point depend on the lengths of
+the 2 d - 1 intervals around it. A fixed grid has the same interface, but no variables, no rows and empty derivatives.
 
-Means over time are weighted sums over the collocation points. The motion is smooth within a knot interval but not
-across its ends, so every interval is integrated separately. Each step between neighbouring points is integrated with
-the cubic through the four nearest points. Points that lie much closer together than the others in their interval are
+Means over time are weighted sums over the collocation points. Every interval is integrated separately, because the
+motion is smooth within a knot interval but not across its ends. Each step between neighbouring points is integrated
+with the cubic through the four nearest points. Points much closer together than the other points of their interval are
 skipped, because cubics through them would oscillate.
 """
 
@@ -31,9 +31,9 @@ from brachis.optimise.bspline import (
 
 
 def _spaced_places(u: np.ndarray) -> list[int]:
-    """Return the numbers of places u, ascending, without places closer than half the median step to the one before.
+    """Return the indices of places u, ascending, leaving out a place less than half a median step after another.
 
-    Both ends are kept.
+    Both ends are included.
     """
     if len(u) == 1:
         return [0]
@@ -46,7 +46,7 @@ def _spaced_places(u: np.ndarray) -> list[int]:
 
 
 def _weights(u: np.ndarray) -> np.ndarray:
-    """Return the weights, (P,), of the integral over [0, 1] of the cubics through values at places u, (P,)."""
+    """Return weights, (P,), for values at places u, (P,), to integrate the cubics through them over [0, 1]."""
     count = min(4, len(u))
     ends = np.concatenate([[0.0], u[1:-1], [1.0]])
     weights = np.zeros(len(u))
@@ -63,12 +63,12 @@ def _weights(u: np.ndarray) -> np.ndarray:
 class FixedGrid:
     """Fixed knots, and collocation points.
 
-    In a `FreeGrid` the interval lengths h, (v,), are variables; here h is empty.
+    In a `FreeGrid` the interval lengths h, (v,), are variables. In a `FixedGrid` h is empty.
 
     Parameters
     ----------
     knots : (N + 2 d + 1,) ndarray
-        Knots in normalised time; where they are variables, the knots with which the grid was created.
+        Knots in normalised time. If they are variables, these are the knots with which the grid was created.
     degree : int
     t_norm : (K,) ndarray
         Collocation points in normalised time, ascending from 0 to 1, at these knots.
@@ -84,7 +84,7 @@ class FixedGrid:
     total : (0,) or (1,) ndarray
         Required value of the row that holds the sum of h.
     point, variable : (z,) int ndarray
-        Sparsity pattern of the curves' derivatives with respect to h; each place occurs once.
+        Sparsity pattern of the curves' derivatives with respect to h. Each pair occurs once.
     """
 
     lower: np.ndarray = np.empty(0)
@@ -100,11 +100,11 @@ class FixedGrid:
         self.breaks = knots[degree : len(knots) - degree]
 
     def knots_at(self, _h: np.ndarray) -> np.ndarray:
-        """Return the knots, in units of h."""
+        """Return the knots in the units of h."""
         return self.knots
 
     def t_norm_at(self, _h: np.ndarray) -> np.ndarray:
-        """Return the collocation points, in units of h."""
+        """Return the collocation points in the units of h."""
         return self.t_norm
 
     def lengths_of(self, _knots: np.ndarray) -> np.ndarray:
@@ -112,7 +112,7 @@ class FixedGrid:
         return np.empty(0)
 
     def basis(self, _h: np.ndarray) -> LocalBasis:
-        """Return the basis functions at the collocation points: the same object as long as they do not change."""
+        """Return the basis functions at the collocation points. Unless they change, it is always the same object."""
         return self._basis
 
     @cached_property
@@ -120,7 +120,7 @@ class FixedGrid:
         return LocalBasis.of(self.knots, self.degree, self.t_norm)
 
     def slopes(self, _h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-        """Return slopes, (4, z, c), of value and three derivatives of splines, (c, N + d), with respect to h."""
+        """Return the slopes by h, (4, z, c), of the value and three derivatives of splines, (c, N + d)."""
         return np.empty((ORDERS, 0, len(control_points)))
 
     def fix(self, _h: np.ndarray) -> FixedGrid:
@@ -129,13 +129,13 @@ class FixedGrid:
 
     @cached_property
     def _interval_weights(self) -> np.ndarray:
-        """Weights, (N, K), of the collocation points in integrals over each interval, each taken as of length 1."""
+        """Weights, (N, K), of the collocation points in the mean over each interval."""
         weights = np.zeros((len(self.breaks) - 1, len(self.t_norm)))
         ends = itertools.pairwise(self.breaks)
         for row, (low, high) in zip(weights, ends, strict=True):
             is_behind = self.t_norm > low - tolerances.TIME
             inside = np.flatnonzero(is_behind & (self.t_norm < high + tolerances.TIME))
-            # Where accelerations jump at knots, the values at the end of an interval belong to the next interval.
+            # If accelerations jump at knots, the values at the end of an interval are those of the next interval.
             if self.degree < 3 and high < self.breaks[-1]:
                 inside = inside[:-1]
             u = (self.t_norm[inside] - low) / (high - low)
@@ -161,7 +161,7 @@ class FreeGrid(FixedGrid):
     knots, degree, t_norm
         See `FixedGrid`.
     shortest : float
-        Shortest length of an interval, in normalised time.
+        Minimum length of an interval, in normalised time.
     """
 
     total = np.ones(1)
@@ -177,14 +177,14 @@ class FreeGrid(FixedGrid):
         self._interval, self._fraction = locate(breaks, t_norm)
         around = self._interval[:, None] + np.arange(1 - degree, degree)
         self._inside = (around >= 0) & (around < count)
-        # Beyond both ends, use an interval of zero length.
+        # Beyond both ends, intervals have zero length.
         self._around = np.where(self._inside, around, count)
         self.point, _ = np.nonzero(self._inside)
         self.variable = around[self._inside]
         self._basis_at = LastCall(self._find_basis)
 
     def knots_at(self, h: np.ndarray) -> np.ndarray:
-        """Return the knots for interval lengths `h`, each at least the shortest length."""
+        """Return the knots for interval lengths `h`, which are first raised to the minimum length."""
         breaks = np.concatenate([[0.0], np.cumsum(np.maximum(h, self.lower))])
         return clamped_knots(self.degree, breaks / breaks[-1])
 
@@ -200,7 +200,7 @@ class FreeGrid(FixedGrid):
         return np.append(h, 0.0)[self._around]
 
     def basis(self, h: np.ndarray) -> LocalBasis:
-        """Return the basis functions at the collocation points; they are cached until `h` changes."""
+        """Return the basis functions at the collocation points. The functions are cached until `h` changes."""
         return self._basis_at(h)
 
     def _find_basis(self, h: np.ndarray) -> LocalBasis:
@@ -220,10 +220,10 @@ class FreeGrid(FixedGrid):
         return FixedGrid(self.knots_at(h), self.degree, t_norm / t_norm[-1])
 
     def mean_weights(self, h: np.ndarray) -> np.ndarray:
-        """Return the weights of the mean over time: the weights of every interval times its length."""
+        """Return the weights of the mean over time: the weights within each interval times its length."""
         return h @ self._interval_weights
 
     @property
     def mean_slopes(self) -> np.ndarray:
-        """Derivatives of `mean_weights` with respect to h: the weights of every interval."""
+        """Derivatives of `mean_weights` with respect to h: the weights within each interval."""
         return self._interval_weights

@@ -1,6 +1,6 @@
-"""Initial guesses: splines through a joint path, a smooth s(t), and a time that is long enough.
+"""Initial guesses: splines through a joint path, with a smooth s(t) and a sufficiently long time.
 
-The end time is scaled until all limits are met. This gives the solver a feasible start unless gravity rules one out.
+The end time is scaled until all limits are met. This gives the solver a feasible start, unless gravity rules that out.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ def starting_point(
     joint_paths: Sequence[np.ndarray],
     durations: Sequence[float | None],
 ) -> np.ndarray | None:
-    """Fit splines to a joint path of every phase, and scale each phase's time until the limits are met.
+    """Fit splines to a joint path for each phase, and scale the time of each phase until the limits are met.
 
-    Points of the joint path itself serve as control points, which smooths the path. Where the smoothed path leaves the
-    branch, a least-squares fit follows the joint path more closely.
+    Points of the joint path are used as control points, which smooths the path. If the smoothed path leaves the branch,
+    a least-squares fit is used, which follows the joint path more closely.
 
     Parameters
     ----------
     program : Program
     joint_paths : sequence of (S, c) ndarray
-        For each phase, successive values of its curves: along a path, s and the redundant joints.
+        For each phase, successive values of its curves. Along a path, these are s and the redundant joints.
     durations : sequence of float or None
-        For each phase, the duration of the motion from which its values come, at evenly spaced times, s. With None the
-        phase gets a smooth motion from end to end.
+        For each phase, the duration, s, of a motion whose values at evenly spaced times form the joint path. With None,
+        the phase gets a smooth motion from end to end.
 
     Returns
     -------
     (v,) ndarray or None
-        None if a collocation point of the fit is out of reach.
+        Starting point; None if a collocation point of the fit is out of reach.
     """
     x_by_phase = []
     for phase, joint_path, duration in zip(
@@ -58,7 +58,7 @@ def starting_point(
 
 
 def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    """Use points of the joint path as control points."""
+    """Return variables with points of the joint path as control points."""
     t_norm = greville(phase.knots, phase.degree)
     t_end, points = _motion_along(phase, joint_path, duration, t_norm)
     values = points[:, phase.boundary.law_curves :]
@@ -66,7 +66,7 @@ def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.
 
 
 def _follow(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    """Fit curves to the joint path by least squares."""
+    """Return the variables of curves fitted to the joint path by least squares."""
     t_norm = spread(phase.breaks, 4)
     t_end, targets = _motion_along(phase, joint_path, duration, t_norm)
     return fit_curves(phase, t_end, t_norm, targets)
@@ -77,9 +77,9 @@ def _motion_along(
 ) -> tuple[float, np.ndarray]:
     """Return duration, s, and values, (K, c), of a motion along a joint path, (S, c), at normalised times, (K,).
 
-    If a duration is given, the values of the path are at evenly spaced times. Without one, the motion is smooth from
-    rest to rest and takes 1 s. If rates are given at the ends, the first curve has a constant acceleration between
-    them. Where a time law gives the first curve, the other curves follow it.
+    If a duration is given, the values of the path are at evenly spaced times. Without a duration, the motion takes 1 s
+    and is smooth from rest to rest. If rates are given at the ends, the first curve has a constant acceleration between
+    them. If a time law gives the first curve, the other curves follow it.
     """
     if phase.time_law is not None:
         s = phase.time_law.at(t_norm * phase.time_law.duration)[0]
@@ -88,7 +88,7 @@ def _motion_along(
     grid = np.linspace(0.0, 1.0, len(joint_path))
     boundary = phase.boundary
     if boundary.periodic:
-        # A uniform drift makes the path end at the required distance ahead of its start.
+        # Add a uniform drift, so that the end of the path is at the required distance ahead of its start.
         missing = boundary.ahead - (joint_path[-1] - joint_path[0])
         joint_path = joint_path + grid[:, None] * missing
     first, last = boundary.rates
@@ -106,17 +106,17 @@ def _motion_along(
 def fit_curves(
     phase: Phase, duration: float, t_norm: np.ndarray, targets: np.ndarray
 ) -> np.ndarray:
-    """Return the point x whose curves fit given values by least squares, exactly if the splines can represent them.
+    """Return the point x whose curves fit given values by least squares. The fit is exact if splines allow it.
 
     Parameters
     ----------
     phase : Phase
     duration : float
-        s.
+        Duration of the phase, s.
     t_norm : (K,) ndarray
         Normalised times.
     targets : (K, c) ndarray
-        Values of the curves at these times; the value of a curve with a time law is ignored.
+        Values of the curves at these times. The values of a curve with a time law are ignored.
 
     Returns
     -------
@@ -136,10 +136,10 @@ def fit_curves(
 def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     """Scale the time of every phase until velocity, acceleration and torque limits are just met.
 
-    If they cannot be met, the time is chosen that exceeds them least. Far above the least time no limit is active, and
-    a solver that has seen no curvature creeps towards the solution. If the arm passes postures in which it cannot stay
-    at rest, a long time does not meet the limits either. Between ends in motion, a longer time slows only the middle of
-    the motion. A given duration is not changed.
+    If the limits cannot be met, the time is chosen with which they are exceeded least. With a time far above the least
+    time no limit is active, and a solver that has found no curvature creeps towards the solution. If the arm passes
+    postures in which it cannot stay at rest, a long time does not meet the limits either. If a phase begins or ends in
+    motion, a longer time slows only its middle. A given duration is not changed.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
     least = np.inf
     while x[0] < 200.0:
         worst = phase.worst_time_scaling_ratio(x)
-        # A long motion between moving ends may run backwards along the path.
+        # If a phase begins or ends in motion, a long motion may run backwards along the path.
         if has_path and phase.state(x).ydot[:, 0].min() < 0.0:
             return best
         if worst <= 1.0:
@@ -189,7 +189,7 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
 
 
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:
-    """Return the largest ratio of a value to its limit, among limits that a longer time relieves, such as on torque."""
+    """Return the largest ratio of a value to its limit, among limits that a longer time relieves, such as torque."""
     return max(
         phase.worst_time_scaling_ratio(x_of_phase)
         for phase, x_of_phase in program.split(x)

@@ -1,7 +1,7 @@
-"""Solve again, and keep the better motion.
+"""Solve changed programs, and keep the better motion each time.
 
-A finer mesh, free knots, another chart and other redundant joints are all changes of a solved program. `improve` tries
-such changes in turn and returns a `SolvedProgram`.
+A finer mesh, free knots, a different chart and different redundant joints are all changes of a solved program.
+`improve` tries such changes in turn and returns a `SolvedProgram`.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ class SolvedProgram(Summary):
     ----------
     program : Program
     reports : tuple of SolverReport
-        Reports of all solves that led to this program; the last one belongs to `program`. Empty if nothing has been
+        Reports of all solves that led to this program. The last report is that of `program`. Empty if nothing has been
         solved yet.
     not_completed : str
-        Description of work that was not done because time ran out or a solve failed; empty if all was done.
+        Text that says what was not done because time ran out or a solve failed; empty if everything was done.
     violation : float
-        Largest violation of a limit between the collocation points, as a fraction of it; infinite where the closed form
-        has no solution, NaN if it was not checked (see `refine`).
+        Largest violation of a limit between the collocation points, as a fraction of the limit. Infinite if the closed
+        form has no solution somewhere, NaN if the violation was not checked (see `refine`).
     time_scaled : float
         Factor by which refinement lengthened the motion as its last step.
     """
@@ -61,17 +61,17 @@ class SolvedProgram(Summary):
 
     @property
     def report(self) -> SolverReport:
-        """Report of the program's own solve."""
+        """Report of the solve of `program` itself."""
         return self.reports[-1]
 
     @property
     def usable(self) -> bool:
-        """Whether the program's own solve ended with a motion."""
+        """Whether the solve of `program` itself ended with a motion."""
         return bool(self.reports) and self.report.status.usable
 
     @property
     def x(self) -> np.ndarray:
-        """The solution, (v,), with its time scaled."""
+        """The solution, (v,), with its time multiplied by `time_scaled`."""
         return self.program.scale_time(self.report.x, self.time_scaled)
 
     @property
@@ -81,18 +81,18 @@ class SolvedProgram(Summary):
 
     @property
     def converged(self) -> bool:
-        """Whether the first solve succeeded, so that `x` is a motion and not just an iterate."""
+        """Whether the first solve succeeded. If so, `x` is a motion and not just an iterate."""
         return self.reports[0].status.usable
 
 
 Solve = Callable[[Program, np.ndarray], SolverReport]
-"""Solves a program from a point x, (v,)."""
+"""Function that solves a program from a point x, (v,)."""
 Attempt = Callable[[Program, np.ndarray], SolvedProgram]
-"""Solves a changed program from a point x, (v,), possibly in several steps that change the program again."""
+"""Function that solves a changed program from a point x, (v,), possibly with further changes."""
 Change = Callable[[SolvedProgram], tuple[Program, np.ndarray] | str | None]
-"""Turns the solved program kept so far into a new program and the point from which to solve it.
+"""Function that turns the solved program kept so far into a new program and the point from which to solve it.
 
-If no further change is worth trying, it returns None, or a text that says what was not done.
+If no further change is worth trying, the function returns None, or a text that says what was not done.
 """
 
 
@@ -107,33 +107,33 @@ def improve(
     deadline: Deadline = NEVER,
     if_lost: str = "",
 ) -> SolvedProgram:
-    """Try changes of a solved program in turn, and keep the better motion each time.
+    """Try changes of a solved program in turn. Keep the better motion each time.
 
     Parameters
     ----------
     first : SolvedProgram
-        The program to begin with. Until a solve gives a motion, each new attempt replaces the one before.
+        The solved program to start with. Until a solve gives a motion, each attempt replaces the one before.
     changes : iterable of callable
-        Functions that each get the solved program kept so far.
+        Functions, each called with the solved program kept so far.
     attempt : callable
         Function that solves the program that a change proposes; see `attempt_once`.
     least_gain : float, optional
-        A motion is kept if it is shorter by more than this fraction. By default every motion is kept, however long.
+        Fraction of the time by which a new motion must be shorter to be kept. By default every motion is kept.
     go_on_above : float or None, optional
-        The next change is tried after a gain of more than this fraction, by default after every motion. With None all
-        changes are tried.
+        Gain, as a fraction of the time, above which the next change is tried. By default it is tried after every
+        motion. With None, all changes are tried.
     judge : callable, optional
-        Function that rates a solved program; a smaller number is better, and infinity means no motion. The default is
+        Function that rates a solved program. A smaller number is better, and infinity means no motion. The default is
         the objective of a successful solve.
     deadline : Deadline, optional
-        No change is tried after this deadline.
+        Deadline after which no change is tried.
     if_lost : str, optional
-        Text that says what was not done if the last change gave no motion.
+        Text that says what was not done, used if the last change gave no motion.
 
     Returns
     -------
     SolvedProgram
-        The program that was kept, with the reports of all solves; its own report comes last.
+        The program that was kept, with the reports of all solves. Its own report comes last.
     """
     judge = judge or _objective
     incumbent = first
@@ -148,7 +148,7 @@ def improve(
             break
         tried = attempt(*proposal)
         value = judge(tried)
-        gain = 1.0 - value / best  # not a number where neither is a motion
+        gain = 1.0 - value / best  # NaN if neither is a motion
         reports = (*incumbent.reports, *tried.reports)
         was_usable = incumbent.usable
         if gain > least_gain or not was_usable:
@@ -163,14 +163,14 @@ def improve(
 
 
 def _objective(solved: SolvedProgram) -> float:
-    """Return the objective of a successful solve, and infinity for any other."""
+    """Return the objective of a successful solve; infinity for any other solve."""
     return solved.report.objective if solved.usable else np.inf
 
 
 def attempt_once(
     solve: Solve, program: Program, x: np.ndarray, *, accept_early_end: bool = False
 ) -> SolvedProgram:
-    """Attempt a single solve.
+    """Solve a program from x, (v,), once.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def attempt_once(
     program : Program
     x : (v,) ndarray
     accept_early_end : bool, optional
-        Whether to accept a solve that ended early with a feasible motion that is faster than its starting point.
+        Whether to accept a solve that ended early, if its motion is feasible and faster than the starting point.
     """
     report = solve(program, x)
     if accept_early_end:
@@ -189,7 +189,7 @@ def attempt_once(
 def attempt_in_turn(
     solves: Sequence[Solve], program: Program, x: np.ndarray
 ) -> SolvedProgram:
-    """Try several solves from x, (v,), one after the other, until one gives a faster motion; see `attempt_once`."""
+    """Try several solves from x, (v,), in turn, until one of them gives a faster motion; see `attempt_once`."""
     reports: tuple[SolverReport, ...] = ()
     for solve in solves:
         tried = attempt_once(solve, program, x, accept_early_end=True)
@@ -218,9 +218,9 @@ def judge_early_end(report: SolverReport, before: float) -> SolverReport:
 
 
 def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
-    """After a solve ran out of time, keep its last point or its starting point x, whichever is feasible.
+    """If a solve ran out of time, keep its last point or its starting point x, whichever is feasible.
 
-    Any motion within the limits is better than none. If both are feasible, the faster one is kept.
+    Any motion within the limits is better than none. If both points are feasible, the faster one is kept.
     """
     report = solved.report
     if report.status is not SolveStatus.TIME_LIMIT:
@@ -248,33 +248,33 @@ def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
 def with_last(
     last: SolverReport, reports: Sequence[SolverReport]
 ) -> tuple[SolverReport, ...]:
-    """Move one of the reports to the end."""
+    """Return the reports with one of them, `last`, moved to the end."""
     return (*(report for report in reports if report is not last), last)
 
 
 _ITERATIONS = 100
-"""Maximum number of iterations per redundant joint that ``auto`` allows a solver on one guess."""
+"""Maximum number of iterations per redundant joint that ``auto`` allows for a solve from one guess."""
 
 _LARGE_PROGRAM = 250
 """Number of variables of a program over the path above which an interior-point method is at least as fast as other
 methods."""
 _NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
-"""`SolverOptions` for solves that start from a motion that is nearly as fast as possible. Very many rows are close to
-their bounds there, and a small subproblem takes half as long."""
+"""`SolverOptions` for solves from a motion that is nearly as fast as possible. At such a motion very many rows are
+close to their bounds. With these options a small subproblem takes half as long."""
 _PROGRESS = 1e-4
-"""Gain over five iterates, as a fraction of the free time. Where many motions are equally fast, a solve ends below this
-gain."""
+"""Gain over five iterates, as a fraction of the free time. If many motions are equally fast, a solve with less gain
+ends."""
 
 _NEARLY = 0.05
-"""Violation that a solution over the path may have, since its joint path is timed again. With 0.01, an active-set
-method worked for 11 s on a program that an interior-point method had left at 0.03."""
+"""Permitted violation of a solution over the path, whose joint path is timed again. With 0.01, an active-set method
+took 11 s for a program that an interior-point method had left with a violation of 0.03."""
 _SAME = 1e-3
-"""Fraction of the time by which a solution may get longer over different knots or points."""
+"""Relative tolerance for comparing the time of a starting point with that of the last solution."""
 
 
 @dataclass(frozen=True)
 class SolverSession:
-    """A backend that solves programs one after the other. Call the session to solve a program.
+    """A session with a backend, which solves one program after another. Call the session to solve a program.
 
     Attributes
     ----------
@@ -284,11 +284,11 @@ class SolverSession:
     deadline : Deadline
         Deadline of all solves together.
     progress : callable, optional
-        Called between iterations with their number and the objective.
+        Function called between iterations with their number and the objective.
     acceptable : float
-        Largest violation with which a solution is usable, however the solve ended.
+        Largest violation with which a solution counts as usable, however the solve ended.
     for_large : Solver, optional
-        Solver that is tried first on large programs over the path, which are sparse; see `solver_for_large`.
+        Solver tried first on large programs over the path, because they are sparse; see `solver_for_large`.
     """
 
     backend: Solver
@@ -312,8 +312,8 @@ class SolverSession:
     ) -> SolverSession:
         """Create a session with the settings of the task's ``solver`` part.
 
-        In charts, and where the time is given, many motions are equally fast. There a solve ends after fewer iterates
-        without gain.
+        In charts, and where the time is given, many motions are equally fast. In these cases a solve ends after fewer
+        iterates without gain.
         """
         iterations = settings.max_iterations
         default = SolverSettings.model_fields["max_iterations"].default
@@ -333,7 +333,7 @@ class SolverSession:
     def over_path(self, options: SolverOptions) -> SolverSession:
         """Return the session for programs over the path, with different options.
 
-        The task can only lower the limits on iterations and time. It does not set the tolerance of these programs.
+        For these programs, the task can only lower the limits on iterations and time. It does not set the tolerance.
         """
         task = self.options
         path_options = replace(
@@ -347,12 +347,12 @@ class SolverSession:
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
 
-        If the last solve ended at x, this one continues with the Hessian that the last one built up.
+        If the last solve ended at x, this solve continues with the Hessian that the last one built up.
         """
         learnt = None
         if self._last and np.array_equal(self._last[0].x, x):
             learnt = self._last[0].learnt
-        # Only the free time can get shorter.
+        # The gain is relative to the free time, because only the free time can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress
         until = self.deadline.within(self.options.time_limit)
@@ -360,7 +360,7 @@ class SolverSession:
         def solve_with(
             backend: Solver, problem: NonlinearProgram, x: np.ndarray
         ) -> SolverReport:
-            """Solve in the time that is left."""
+            """Solve within the time that is left."""
             nonlocal learnt
             near_options = _NEAR_OPTIONS if isinstance(problem, NearRows) else {}
             options = replace(
@@ -374,7 +374,7 @@ class SolverSession:
             if report.learnt is not None:
                 learnt = report.learnt
             self._last[:] = [report]
-            return replace(report, learnt=None)  # results stay small
+            return replace(report, learnt=None)  # to keep results small
 
         is_large = len(x) > _LARGE_PROGRAM and self.for_large is not self.backend
         if isinstance(program, PathProgram) and is_large and self.for_large:
@@ -386,7 +386,7 @@ class SolverSession:
         if self.backend.is_interior:
             return self._accept(solve(program, x))
         is_answer = self._goes_on(program, x)
-        # Without these rows, a joint with no near row is unconstrained: its jerk reached 500 times its limit.
+        # Without these rows, nothing limits a joint that has no near row. Its jerk reached 500 times the limit.
         kept_rows = program.third_order_rows if isinstance(program, Program) else ()
         report = solve_near_rows(
             program, x, solve, is_answer=is_answer, kept_rows=kept_rows
@@ -394,10 +394,10 @@ class SolverSession:
         return self._accept(report)
 
     def _goes_on(self, program: Program | PathProgram, x: np.ndarray) -> bool:
-        """Tell whether the last solve gave a motion, and a point, (v,), is about as fast as that motion.
+        """Tell whether the last solve gave a motion, and the point x, (v,), is about as fast as that motion.
 
-        Return False over the path and where the knots are free: such solves end at a different motion if some values
-        are left out.
+        Return False for programs over the path or with free knots. If some values are left out, such solves end at a
+        different motion.
         """
         is_fixed = isinstance(program, Program) and not program.has_free_knots
         if not (is_fixed and self._last and self._last[0].status.usable):
@@ -412,7 +412,7 @@ class SolverSession:
 
 
 def solves_in_turn(solve: Solve) -> list[Solve]:
-    """List a solve; for a session with a different solver for large programs, add the session with that solver."""
+    """List the solve. If it is a session with a solver for large programs, add the session with that solver."""
     if not isinstance(solve, SolverSession) or solve.for_large in (None, solve.backend):
         return [solve]
     return [solve, replace(solve, backend=solve.for_large)]

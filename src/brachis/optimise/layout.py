@@ -1,18 +1,18 @@
-"""Order of the variables, the rows and the entries of the Jacobian in a phase.
+"""Order of the variables, of the rows and of the entries of the Jacobian in a phase.
 
-Variables: first the duration T in seconds, then the free control points (see `boundary`) of each curve. The curves are
-s(t), where there is a path and no time law, then each redundant joint in chain order. Boundary conditions are built
-into the control points and have no rows. Where the knots are free, the interval lengths h in normalised time come last
-(see `grid`). A given duration has equal bounds.
+Variables: the duration T in seconds comes first, then the free control points (see `boundary`) of each curve. The
+curves are s(t), if there is a path and no time law, then each redundant joint in chain order. Boundary conditions are
+built into the control points and have no rows. If the knots are free, the interval lengths h in normalised time come
+last (see `grid`). If the duration is given, its lower and upper bounds are equal.
 
-Rows: first each limit that applies at every instant, in the order of the list, with its c values at collocation point
-0, then at point 1, and so on. Along a path, differences of successive control points of s follow; they are >= 0, so
-that ds/dt >= 0 at all times (see `ProgressRows`). Where the knots are free, the last row is the sum of h, which is 1.
-All rows are dimensionless. Means over time are rows of the program, not of a phase.
+Rows: each limit that applies at every instant comes first, in the order of the list, with its c values at collocation
+point 0, then at point 1, and so on. Along a path, differences of successive control points of s follow. They must be >=
+0, so that ds/dt >= 0 at all times (see `ProgressRows`). If the knots are free, the last row is the sum of h, which must
+be 1. All rows are dimensionless. Means over time are rows of the program, not of a phase.
 
-Entries of the Jacobian: first those of all limits that apply at every instant, with respect to T, to the variables of
-each curve and to h. For each pair of point and variable, the entries of all limits stand together. The entries of the
-differences follow, and last a 1 for each length in h.
+Entries of the Jacobian: those of all limits that apply at every instant come first, with respect to T, to the variables
+of each curve and to h. For each pair of point and variable, the entries of all limits are together. The entries of the
+differences follow. The last entries are a 1 for each length in h.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ from brachis.optimise.boundary import (
 from brachis.optimise.grid import FixedGrid
 
 SHORTEST_TIME = 1e-4
-"""Shortest duration of a phase, s. A motion as short as this is not held back by any limit."""
+"""Minimum duration of a phase, s. No limit holds back a motion that is so short."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgressRows:
-    """Rows for differences of successive control points of s that bounds on single variables do not cover.
+    """Rows for those differences of successive control points of s that bounds on single variables do not cover.
 
     Attributes
     ----------
     fixed_terms : (1 + k, p) ndarray
         Fixed terms of the rows, one for each power of the duration.
     matrix : FreeMatrix
-        Contributions of the phase's variables to the rows; each place occurs once. The duration, variable 0, adds
-        nothing.
+        Contributions of the phase's variables to the rows. Each entry occurs once. The duration, variable 0, has no
+        contribution.
     """
 
     fixed_terms: np.ndarray
@@ -85,7 +85,7 @@ class ProgressRows:
         return sum_powers(self.fixed_terms, x[0]) + self.matrix.control_points(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Return the entries of the Jacobian, (z,). Do not write to the array."""
+        """Return the entries of the Jacobian, (z,). Do not write to the returned array."""
         matrix = self.matrix
         if len(self.fixed_terms) == 1:
             return matrix.weight
@@ -94,7 +94,7 @@ class ProgressRows:
 
 
 def _differences(matrix: FreeMatrix) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Subtract from each row of a matrix the row before it; return row, column and value of the nonzero entries."""
+    """Subtract from each row the row before it, and return row, column and value of the nonzero entries."""
     rows, columns = matrix.shape
     row = np.concatenate([matrix.point - 1, matrix.point])
     column = np.tile(matrix.variable, 2)
@@ -109,16 +109,16 @@ def _differences(matrix: FreeMatrix) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 class VariableLayout:
-    """Positions of the variables in x, and the collocation points at which they matter; see the module.
+    """Positions of the variables in x, and the collocation points that they affect; see the docstring of the module.
 
     Parameters
     ----------
     grid : FixedGrid
     boundary : Boundary
     has_path : bool
-        Whether there is a path. The first spline is then s, except with a time law, which gives the duration and s.
+        Whether there is a path. If so, the first spline is s, unless a time law gives the duration and s.
     splines : tuple of BoundarySpline, optional
-        Splines of another grid with the same knots, which are reused.
+        Splines to reuse, from another grid with the same knots.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class VariableLayout:
     slices : tuple of slice
         Positions of the variables of each curve.
     lengths : slice
-        Positions of the variables h; empty where the knots are fixed.
+        Positions of the variables h; empty if the knots are fixed.
     free_matrix : FreeMatrix
         Matrix of all curves' control points with respect to all variables; see `stack_splines`.
     fixed_terms : (1 + p, c (N + d)) ndarray
@@ -162,7 +162,7 @@ class VariableLayout:
             self.progress = ProgressRows.of(splines[0])
             constant, *by_powers = splines[0].fixed_terms
             if not np.any(by_powers):
-                # Free control points have zeros there.
+                # The fixed terms of free control points are zero.
                 self.x_lower[self.slices[0]] = constant[0]
                 self.x_upper[self.slices[0]] = constant.max()
 
@@ -174,20 +174,20 @@ class VariableLayout:
 
     @cached_property
     def sparsity(self) -> SparsityPattern:
-        """Collocation points at which the variables of the curves matter; built on demand."""
+        """Pattern of the collocation points at which the variables of the curves have an effect. Built on demand."""
         grid = self._grid
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
         return SparsityPattern(columns, self.free_matrix, len(self.splines))
 
     @cached_property
     def point(self) -> np.ndarray:
-        """Points, (z,), at which variables matter: first T, then the variables of each curve, then h."""
+        """Points, (z,), at which variables have an effect: first T, then the variables of each curve, then h."""
         curve_points = np.arange(len(self._grid.t_norm))
         return np.concatenate([curve_points, self.sparsity.point, self._grid.point])
 
     @cached_property
     def variable(self) -> np.ndarray:
-        """Variables, (z,), that matter at these points."""
+        """Variables, (z,), that have an effect at the points in `point`."""
         of_time = np.zeros(len(self._grid.t_norm), dtype=int)
         of_lengths = self._grid.variable + self.lengths.start
         return np.concatenate([of_time, self.sparsity.variable, of_lengths])
@@ -201,9 +201,9 @@ class VariableLayout:
         return CurvePattern(self.sparsity.point, curve, count, width)
 
     def names(self, curves: Sequence[str]) -> list[str]:
-        """Name the variables: ``t_end`` is the duration, ``s[3]`` is control point 3 of s, ``h[0]`` is a length.
+        """Name the variables, for example ``t_end`` (duration), ``s[3]`` (control point 3 of s), ``h[0]`` (length).
 
-        Numbers begin at 0. A variable that moves several control points has the number of the first one.
+        Numbers begin at 0. A variable that moves several control points has the number of the first of them.
 
         Parameters
         ----------
@@ -220,7 +220,7 @@ class VariableLayout:
 
 
 class RowLayout:
-    """Order of the rows and of the entries of the Jacobian; see the module.
+    """Order of the rows and of the entries of the Jacobian; see the docstring of the module.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ class RowLayout:
 
     @cached_property
     def of_limits(self) -> list[np.ndarray]:
-        """Indices of the rows of each limit, (K, c) each; empty, (0, c), for a limit on means."""
+        """Indices of the rows of each limit, (K, c) for each limit; empty, (0, c), for a limit on means."""
         ends = np.cumsum([times * count for times, count in self._shapes])
         return [
             np.arange(end - times * count, end).reshape(times, count)
@@ -261,7 +261,7 @@ class RowLayout:
 
     @cached_property
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the entries of the Jacobian, (nnz,) each; each place occurs once."""
+        """Rows and columns of the entries of the Jacobian, (nnz,) each. Each entry occurs once."""
         variables = self._variables
         progress = variables.progress
         count, _ = variables.pattern.shape

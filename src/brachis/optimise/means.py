@@ -1,9 +1,9 @@
 """Means over the whole motion: their values, slopes and curvature.
 
-A mean is taken over all phases and over the pauses at rest between them, weighted by their durations.
+A mean extends over all phases and the pauses at rest between them, weighted by their durations.
 
-Values that are limited as means are squares f^2, with the Hessian 2 f' f'^T + 2 f f''. The first term is the
-Gauss-Newton part. With the slopes g = 2 f f' it equals g g^T / (2 f^2).
+The values whose means are limited are squares f^2. Their Hessian is 2 f' f'^T + 2 f f''. The first term is the
+Gauss-Newton part, which equals g g^T / (2 f^2) with the slopes g = 2 f f'.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from brachis.limits import Limit, Moments, Partials
 from brachis.optimise.phase import Phase
 
 _NEARLY_ZERO = 1e-12
-"""Values below this get no curvature: their slopes are nearly zero too, and the quotient would be rounding error."""
+"""Value below which no curvature is computed: the slopes are nearly zero too, and the quotient is rounding error."""
 
 PhasePoints = Sequence[tuple[Phase, np.ndarray]]
-"""Phases, each with its variables."""
+"""Sequence of phases, each with its variables."""
 
 
 class Means:
-    """Means of those values that are limited as means over the motion.
+    """Means, over the motion, of the values whose means are limited.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Means:
     limits : tuple of Limit
         The limits on means.
     lower, upper : (m,) ndarray
-        Their bounds.
+        Bounds of the means.
     """
 
     def __init__(self, limits: Sequence[Limit]) -> None:
@@ -45,7 +45,7 @@ class Means:
         self.upper = np.concatenate([none, *(limit.upper for limit in self.limits)])
 
     def __len__(self) -> int:
-        """Count the values, m."""
+        """Return the number of values, m."""
         return len(self.lower)
 
     def values(self, phase_points: PhasePoints) -> np.ndarray:
@@ -60,7 +60,7 @@ class Means:
         return sum(sums) / _end_time(phase_points)
 
     def slopes(self, phase_points: PhasePoints) -> np.ndarray:
-        """Compute the slopes of the values with respect to all variables, (m, v)."""
+        """Compute the slopes of the means with respect to all variables, (m, v)."""
         if not self.limits:
             return np.empty((0, sum(len(x) for _, x in phase_points)))
         total = self.values(phase_points)
@@ -76,7 +76,7 @@ class Means:
     def curvature(self, phase_points: PhasePoints, weights: np.ndarray) -> np.ndarray:
         """Compute the Gauss-Newton part, (v, v), of the Hessian of ``weights . values``, with weights (m,).
 
-        It leaves out the pauses, and the effect of the durations on the shares of the phases.
+        It leaves out the pauses, and the effect that durations have on the shares of the phases.
         """
         ends = np.cumsum([0, *(len(x) for _, x in phase_points)])
         total = np.zeros((ends[-1], ends[-1]))
@@ -95,7 +95,7 @@ class Means:
         return float(max(violations, default=-np.inf))
 
     def _values_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Return the values while the arm waits at the end of the phase, (m,)."""
+        """Return the values, (m,), while the arm waits at the end of the phase."""
         still = Moments.at_rest(phase.state(x).q[-1:])
         return np.concatenate([limit.values(still)[0] for limit in self.limits])
 
@@ -142,7 +142,7 @@ def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarra
 
 
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
-    """Return the slopes of a limit at rest with respect to the posture, (c, n); zero if it does not depend on it."""
+    """Return the slopes of a limit at rest with respect to the posture, (c, n); zero if there is no dependence."""
     if partials.q is None:
         return np.zeros((partials.size, q.shape[1]))
     return partials.q[0]

@@ -1,12 +1,12 @@
 """Changes to the knots of a solved program: more knots, better ones, or free ones.
 
 - `solve_by_levels` reaches a given large number of intervals from a few. A cold solve with hundreds of variables takes
-  seconds. From the exact copy of a coarser motion, each level takes a few iterations.
-- `refine_mesh` halves the intervals that cost the most time. A time-optimal motion has 1 + r limits active at almost
-  every instant, and jumps from one set of active limits to another. A spline can only ramp between them, and this costs
-  about the ramp's length times its height.
+  seconds. Started from an exact copy of a coarser motion, each level takes a few iterations.
+- `refine_mesh` halves the intervals that cost the most time. In a time-optimal motion 1 + r limits are active at almost
+  every instant, and the motion jumps from one set of active limits to another. A spline can only ramp from set to set.
+  This costs about the ramp's length times its height.
 - `optimise_knots` makes the interval lengths variables of the optimisation.
-- `adapt_mesh` does the one that the task asks for.
+- `adapt_mesh` makes the change that the task asks for.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
 _FEW_INTERVALS = 12
-"""Minimum number of intervals of a phase at the coarsest level."""
+"""Minimum number of intervals of a phase in the coarsest level."""
 _SHORTEST = 5e-5
-"""Shortest length of an interval as a fraction of t_E. In a shorter one, collocation points would coincide."""
+"""Minimum length of an interval, as a fraction of t_E. In a shorter interval, collocation points would coincide."""
 
 
 def coarsest(program: Program) -> Program:
@@ -58,16 +58,16 @@ def solve_by_levels(
     ----------
     target : Program
     coarse : SolvedProgram
-        The solved ``coarsest(target)``. It may have a different branch margin, which is kept.
+        The solved ``coarsest(target)``. If its branch margin is different, that margin is kept.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     deadline : Deadline, optional
-        No level is started after this deadline.
+        Deadline after which no level is started.
 
     Returns
     -------
     SolvedProgram
-        The program over the target's knots, or over the knots of the last level that could be solved.
+        The program over the knots of the target, or over those of the finest level that could be solved.
     """
 
     def change_to(level: Program, solved: SolvedProgram) -> tuple[Program, np.ndarray]:
@@ -94,7 +94,7 @@ def solve_by_levels(
 def _transfer(
     solved: SolvedProgram, phases: Sequence[Phase]
 ) -> tuple[Program, np.ndarray]:
-    """Express a solved program and its solution over the knots of phases; these contain all of its own knots."""
+    """Express a solved program and its solution over the knots of `phases`, which contain all of its own knots."""
     finer = solved.program.with_phases(phases)
     pairs = zip(solved.program.motions(solved.x), phases, strict=True)
     motions = [motion.with_knots(phase.knots) for motion, phase in pairs]
@@ -102,7 +102,7 @@ def _transfer(
 
 
 def _levels(program: Program) -> Iterator[Program]:
-    """Yield programs over more and more of the knots, from the coarsest to the given one; points per interval stay."""
+    """Yield the program over more and more of its knots, with the same number of points per interval."""
     counts = [phase.intervals / _FEW_INTERVALS for phase in program.phases]
     halvings = [int(np.log2(max(count, 1.0))) for count in counts]
     for k in range(max(halvings), 0, -1):
@@ -114,7 +114,7 @@ def _levels(program: Program) -> Iterator[Program]:
 
 
 def _thin_out(phase: Phase, step: int) -> Phase:
-    """Keep every `step`-th knot and collocation point, and the last ones."""
+    """Return a phase with every `step`-th knot and collocation point, and with the last ones."""
 
     def thin_out(values: np.ndarray) -> np.ndarray:
         return np.union1d(values[::step], values[-1:])
@@ -126,9 +126,9 @@ def _thin_out(phase: Phase, step: int) -> Phase:
 COARSE_INTERVALS = 10
 """Number of intervals of the first mesh."""
 _FEW_VARIABLES = 150
-"""Number of variables up to which it is cheap to halve every interval, in case the wrong ones were chosen."""
+"""Number of variables up to which every interval is halved, in case the wrong intervals were chosen."""
 _MOST_VARIABLES = 300
-"""Maximum number of variables. Solves with more take seconds each and gain about 0.1 %."""
+"""Maximum number of variables. A solve with more variables takes seconds and gains about 0.1 %."""
 _COARSER = "the mesh is coarser than spline.tolerance requires"
 
 
@@ -138,18 +138,18 @@ def refine_mesh(
     """Insert knots into a solved program until further knots gain little.
 
     Every round halves the intervals that cost the most time, and solves again from the same motion. The rounds end when
-    the last two together gained less than half the tolerance. Before that, a small mesh is halved everywhere.
+    the last two together have gained less than half the tolerance. Before they end, a small mesh is halved everywhere.
 
     Parameters
     ----------
     solved : SolvedProgram
-        The solved program, with one report.
+        The solved program. It must have one report.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
-        Spline settings; the tolerance is a fraction of the end time.
+        Spline settings. The tolerance is a fraction of the end time.
     deadline : Deadline
-        No round is started after this deadline.
+        Deadline after which no round is started.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def refine_mesh(
     shortest = max(0.5 * spline.tolerance, _SHORTEST)
 
     def halve(solved: SolvedProgram) -> tuple[Program, np.ndarray] | str | None:
-        """Halve the intervals that matter, unless this is no longer worthwhile."""
+        """Halve the intervals that cost the most time, unless this is no longer worthwhile."""
         program = solved.program
         times = np.array([report.objective for report in solved.reports])
         gains = 1.0 - times[1:] / times[:-1]
@@ -187,7 +187,7 @@ def refine_mesh(
 def _choose_intervals(
     solved: SolvedProgram, allowed: Sequence[np.ndarray]
 ) -> Sequence[np.ndarray]:
-    """Choose the intervals that cost the most time and together account for 60 % of the loss in all phases."""
+    """Choose the intervals that cost the most time, which together cause 60 % of the loss in all phases."""
     x = solved.x
     try:
         losses = [_loss(*pair) for pair in solved.program.split(x)]
@@ -204,9 +204,9 @@ def _choose_intervals(
 
 
 def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Time that each interval costs, (N,), s, from the swing of the most active limits, one for each curve.
+    """Estimate the time that each interval costs, (N,), s, from the swing of the most active limits.
 
-    Where the duration is given, no time can be lost.
+    As many limits are considered as there are curves. If the duration is given, no time can be lost.
     """
     if phase.time_law is not None:
         return np.zeros(phase.intervals)
@@ -230,7 +230,7 @@ def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:
 
 
 _BEYOND_LIMITS = 1e9
-"""Stands for the end time of a motion that violates the limits, s: any motion within the limits is better."""
+"""End time assigned to a motion that violates the limits, s. Any motion within the limits is better."""
 
 
 def optimise_knots(
@@ -239,8 +239,8 @@ def optimise_knots(
     """Optimise the interval lengths of a solved program together with the motion.
 
     Collocation points keep their places within their intervals while the knots move. Then the knots are fixed, and
-    `refine` adds points until the limits are also met between collocation points. The knots are freed again, with the
-    added points, as long as this gains time.
+    `refine` adds points until the limits are also met between collocation points. As long as this gains time, the knots
+    are freed again, with the added points.
 
     Parameters
     ----------
@@ -249,15 +249,15 @@ def optimise_knots(
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     shortest : float
-        Shortest length of an interval, in mean intervals; it is at least 5e-5 t_E.
+        Minimum length of an interval, in mean intervals. Whatever this value, it is at least 5e-5 t_E.
     refinement : RefinementOptions
-        Options of `refine`. After their deadline the knots are not freed again.
+        Options of `refine`. The knots are not freed again after the deadline of these options.
 
     Returns
     -------
     SolvedProgram
-        The program with its knots fixed at the best places found; the given program if moving the knots led to no
-        motion within the limits.
+        The program with its knots fixed at the best places found. If moving the knots led to no motion within the
+        limits, the given program is returned.
     """
     intervals = max(phase.intervals for phase in solved.program.phases)
     shortest = max(shortest, _SHORTEST * intervals)
@@ -268,10 +268,10 @@ def optimise_knots(
         return free, free.variables_from(solved.program.motions(solved.x))
 
     def move_fix_and_refine(free: Program, x: np.ndarray) -> SolvedProgram:
-        """Move the knots, fix them where they end, and refine."""
+        """Move the knots, fix them at their final places, and refine."""
         moved = solve(free, x)
         fixed, start = free.fix_knots(moved.x)
-        # This takes a few iterations where the solver stalled before the knots had settled.
+        # If the solver stalled before the knots had settled, this takes a few iterations.
         report = judge_early_end(solve(fixed, start), free.end_time(x))
         refined = refine(fixed, report, solve, refinement)
         return replace(refined, reports=(moved, *refined.reports))
@@ -310,7 +310,7 @@ def adapt_mesh(
     *,
     target: Program | None = None,
 ) -> SolvedProgram:
-    """Free the knots of a solved program, refine them, or leave them, as the task's ``spline`` part asks.
+    """Free the knots of a solved program, add knots, or change nothing, as the task's ``spline`` part asks.
 
     Parameters
     ----------
@@ -319,14 +319,14 @@ def adapt_mesh(
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
     refinement : RefinementOptions
-        Options of `refine`. After their deadline no further round is started.
+        Options of `refine`. No further round is started after the deadline of these options.
     target : Program, optional
-        The program over all its knots, if the solved one is its coarsest level (see `solve_by_levels`).
+        The program over all its knots, if `solved` is only its coarsest level (see `solve_by_levels`).
 
     Returns
     -------
     SolvedProgram
-        The program with fixed knots. Its reports are the given ones and those of further solves.
+        The program with fixed knots. Its reports are those of the given program and of further solves.
     """
     if not solved.usable:
         return solved

@@ -1,4 +1,4 @@
-"""The motion of a phase: curves y(t) as splines, of which the first may be given by a time law."""
+"""The motion of a phase: curves y(t) as splines. The first curve may be given by a time law instead."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 
 _ROUNDING = 1e-13
-"""Error of a time due to rounding, as a fraction of the end time."""
+"""Rounding error of a time, as a fraction of the end time."""
 _S_MISS = 2e-13
-"""Largest deviation of the spline of s from the time law."""
+"""Largest permitted deviation of the spline of s from the time law."""
 _LOOKS = 5
-"""Number of times in each interval at which the spline and the time law are compared."""
+"""Number of instants in each interval at which the spline and the time law are compared."""
 _SAMPLES = 20
-"""Number of samples per station between which a time law is taken as linear, to find when it passes a station."""
+"""Number of samples of a time law per station. Linear interpolation between samples gives the time at a station."""
 
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
@@ -50,17 +50,18 @@ def follow_law(
 
 @dataclass(frozen=True, repr=False)
 class Motion(PhaseSpline):
-    """The curves that belong to a point x of a phase. Where a time law gives s(t), s has no spline.
+    """The curves that belong to a point x of a phase. If a time law gives s(t), s has no spline.
 
     Attributes
     ----------
     t_end : float
-        s.
+        End time, s.
     knots : ndarray
-        In normalised time.
+        Knots in normalised time.
     degree : int
     control_points : (c, N + d) ndarray
-        Control points of each curve: first s along a path without a time law, then each redundant joint in chain order.
+        Control points of each curve. Along a path without a time law, s comes first, then each redundant joint in chain
+        order.
     time_law : TimeLaw or None
         Time law of s(t), if it is given.
     """
@@ -75,12 +76,12 @@ class Motion(PhaseSpline):
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
 
-        At a knot, these are the values just after it.
+        At a knot, the values just after the knot are returned.
         """
         t_norm = t / self.t_end
         within = t_norm.clip(self.knots[0], self.knots[-1])
         spline = Spline(self.knots, self.control_points.T, self.degree)
-        # Rounding must not decide the side of a knot, because the highest derivative jumps there.
+        # Rounding must not decide on which side of a knot a time lies, because the highest derivative jumps there.
         orders = spline.derivatives(within, ORDERS - 1, _ROUNDING)
         if self.time_law is not None:
             law_orders = sample_law(self.time_law, t_norm)
@@ -98,22 +99,22 @@ class Motion(PhaseSpline):
         Parameters
         ----------
         values : (1 + k, c) ndarray
-            Values and derivatives, by order, per second.
+            Values and derivatives per second, one order after the other.
         curves : sequence of int
-            Indices of these c curves among the curves that have control points.
+            Indices of the c curves among those that have control points.
         """
         orders = np.arange(len(values))[:, None]
         _, basis = local_basis(self.knots, self.degree, np.zeros(1))
         matrix = basis[: len(values), 0, : len(values)]
         points = self.control_points.copy()
-        # Basis functions add up to 1, so derivatives of zero give points that are equal to the last digit.
+        # Basis functions add up to 1. If derivatives are zero, points are therefore equal to the last digit.
         slopes = np.concatenate([0.0 * values[:1], (values * self.t_end**orders)[1:]])
         first = values[0] + np.linalg.solve(matrix, slopes)
         points[curves, : len(values)] = first.T
         return replace(self, control_points=points)
 
     def as_spline(self) -> PhaseSpline:
-        """Return all curves as splines; with a time law, over more knots, so that s follows it to rounding error.
+        """Return all curves as splines. If s has a time law, knots are added until s follows it to rounding error.
 
         Raises
         ------

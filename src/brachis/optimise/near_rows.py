@@ -1,12 +1,12 @@
 """Solve a program with only the rows that are close to their bounds.
 
-In a motion that is nearly as fast as possible, one or two limits are active at a time, and most others are far from
-their bounds. A solver's effort grows with the number of rows. So the solver gets only the rows close to their bounds,
-and all rows are checked at its solution. Violated rows are added, and the solver continues from there.
+In a motion that is nearly as fast as possible, one or two limits are active at a time. Most other limits are far from
+their bounds. A solver's effort grows with the number of rows. So the solver gets only the rows close to their bounds.
+All rows are checked at its solution. Violated rows are added, and the solver continues from this solution.
 
 An interior-point method moves away from the bounds at first. It therefore needs whole values: if a value, such as a
-joint's torque, comes close to a bound anywhere, all of its rows along the path are included. Any method needs whole
-values where few rows are active.
+joint's torque, comes close to a bound anywhere, all of its rows along the path are included. If few rows are active,
+any method needs whole values.
 """
 
 from __future__ import annotations
@@ -28,34 +28,34 @@ from brachis.optimise.backends import (
 from brachis.optimise.backends.monitor import row_slack
 
 _NEAR = 0.2
-"""Distance from its bound up to which a row counts as near, as a fraction of the limit."""
+"""Distance from a row's bound, as a fraction of the limit, up to which the row counts as near."""
 _AT_BOUND = 0.05
-"""Distance from its bound up to which a row is taken to hold the motion back."""
+"""Distance from a row's bound, as a fraction of the limit, up to which the row counts as holding the motion back."""
 _ROWS_A_VARIABLE = 2.0
 """Minimum number of rows per variable that hold the motion back. With fewer, as in a slower motion, the end time would
 collapse."""
 _ROWS_IF_CURVED = 1.0
-"""The same number where part of the Hessian is known, because curvature keeps steps short."""
+"""Minimum number of these rows if part of the Hessian is known. Fewer suffice, because curvature shortens steps."""
 _LEAST_KEPT = 0.2
-"""Fraction of the rows, the nearest ones, that is kept at any distance. With too few rows the end time collapses."""
+"""Fraction of rows, beginning with the nearest, that is always kept. With too few rows the end time collapses."""
 _MOST_KEPT = 0.6
-"""Fraction of the rows. If more than this are near, leaving out the others gains nothing."""
+"""Largest fraction of near rows with which it is worthwhile to leave out the other rows."""
 _FIRST_VIOLATION = 0.5
-"""Largest violation with which a starting point still counts as a fast motion."""
+"""Largest violation with which a starting point counts as a fast motion."""
 _LAST_VIOLATION = 0.5
-"""Violation of the left-out rows above which the solution is a different motion. Then all rows are needed."""
+"""Violation of omitted rows above which the solution counts as a different motion, so that all rows are needed."""
 _NEAR_ANYWHERE = 0.3
-"""A value counts as near if it comes this close to its bound anywhere. Of 13 solves over the path, all but one ended
-with no other value violated, in 0.4 of the time. With 0.5, and with single rows near their bounds, they took 0.9 of the
-time."""
+"""A value counts as near if somewhere it comes this close to its bound, as a fraction of the limit. In 12 of 13 solves
+over the path, no other value was violated at the end. The solves took 0.4 of the time; with 0.5, or with single near
+rows, they took 0.9 of the time."""
 _ROUNDS = 4
-"""Maximum number of solves with more and more rows."""
+"""Maximum number of solves, each with more rows."""
 _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 """Statuses after which no further solve is tried."""
 
 
 class NearRows:
-    """A program without some of its rows; a `NonlinearProgram`.
+    """A program without some of its rows. It is a `NonlinearProgram` itself.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class NearRows:
         return self._program.rows(x)[self._numbers]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Return the entries of the Jacobian in the rows that are kept."""
+        """Return the entries of the Jacobian that belong to the rows that are kept."""
         return self._program.jacobian(x)[self._entries]
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
@@ -111,7 +111,7 @@ class HasValues(NonlinearProgram, Protocol):
 
     @property
     def value_numbers(self) -> np.ndarray:
-        """Number of the value in each row, (c,), the same at all places."""
+        """Number of the value to which each row belongs, (c,). It is the same at all places."""
 
 
 def solve_near_rows(
@@ -122,7 +122,7 @@ def solve_near_rows(
     is_answer: bool = False,
     kept_rows: Sequence[int] = (),
 ) -> SolverReport:
-    """Solve a program from a point, with only the rows near their bounds where these are enough.
+    """Solve a program from a point, with only the rows near their bounds if these rows are enough.
 
     Parameters
     ----------
@@ -131,10 +131,10 @@ def solve_near_rows(
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
     is_answer : bool, optional
-        Whether the point is the solution of a solve over different knots or points. If too few rows are near, only
-        whole values are then left out.
+        Whether the point is a solution over different knots or collocation points. If so, and if too few rows are near,
+        whole values are left out instead of single rows.
     kept_rows : sequence of int, optional
-        Numbers of rows that are kept at any distance from their bounds.
+        Indices of rows that are kept at any distance from their bounds.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def solve_near_rows(
         reports.append(report)
         slack = row_slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), numbers)
-        # With all rows the solve would run out of time or iterations too.
+        # With all rows, the solve would run out of time or iterations too.
         is_over = report.status in _FINAL
         if is_over or (report.status.usable and not len(missing)):
             return _complete(program, numbers, reports)
@@ -181,7 +181,7 @@ def solve_near_values(
     Parameters
     ----------
     program : HasValues
-        Its ``value_numbers``, (c,), give the value to which each row belongs.
+        Program whose ``value_numbers``, (c,), give the value to which each row belongs.
     x : (v,) ndarray
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
@@ -211,7 +211,7 @@ def solve_near_values(
 def _complete(
     program: NonlinearProgram, numbers: np.ndarray, reports: Sequence[SolverReport]
 ) -> SolverReport:
-    """Combine the reports of several solves; the last solve had the rows with these numbers."""
+    """Combine the reports of several solves. The rows of the last solve have the indices `numbers`."""
     last = reports[-1]
     multipliers = np.zeros(len(program.lower))
     multipliers[numbers] = last.multipliers

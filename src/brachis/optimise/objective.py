@@ -1,4 +1,4 @@
-"""The objective to minimise: the end time, or the accelerations of the joints."""
+"""The objective to minimise: the end time or the accelerations of the joints."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from brachis.limits import Partials
 from brachis.optimise.phase import Phase
 
 _CALM = 1e-4
-"""Weight of the redundant joints' squared accelerations where the time is given, s per rad^2 or m^2.
+"""Weight of the redundant joints' squared accelerations if the time is given, s per rad^2 or m^2.
 
-The accelerations are scaled by the duration of a knot interval. So joints may move fast where intervals are short, but
-do not swing between two collocation points that are far apart. The end times of ten lines at 0.02 to 0.5 m/s were the
-same to within 1e-4 with weights of 1e-5 and 1e-3.
+The accelerations are scaled by the duration of a knot interval. Joints may therefore move fast where intervals are
+short, but do not swing between two collocation points that are far apart. For ten lines at 0.02 to 0.5 m/s, weights of
+1e-5 and 1e-3 gave the same end times to within 1e-4.
 """
 
 
 class Objective(Protocol):
-    """A function of the phases' motions.
+    """A function of the motions of the phases. It is a sum of one share per phase.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Objective(Protocol):
         """Return the gradient of the share, (v,)."""
 
     def is_curved(self, phase: Phase) -> bool:
-        """Tell whether the share contains a sum of squares."""
+        """Tell whether the share of a phase contains a sum of squares."""
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Return the Gauss-Newton part of the share's Hessian, (v, v)."""
@@ -48,14 +48,14 @@ class Objective(Protocol):
 class EndTime:
     """The end time t_E, s: the sum of the durations.
 
-    Where the duration of a phase is given, many motions are equally fast, but solvers need a unique optimum. So the
+    If the duration of a phase is given, many motions are equally fast, but solvers need a unique optimum. Therefore the
     mean square of the redundant joints' accelerations is added with a small weight.
     """
 
     longest: float = np.inf
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Return the duration of a phase and the pause after it, s; if the duration is given, add the accelerations."""
+        """Return the time of a phase and the pause after it, s, plus weighted accelerations if the time is given."""
         duration = float(x[0]) + phase.pause
         if phase.time_law is None:
             return duration
@@ -92,14 +92,14 @@ class EndTime:
 
 @dataclass(frozen=True, eq=False)
 class LeastAcceleration:
-    """Mean over a phase's time of the sum over the joints of (weights_i qddot_i)^2, by the trapezoidal rule.
+    """Mean of the sum of (weights_i qddot_i)^2 over the joints, taken over the time of a phase (trapezoidal rule).
 
     Attributes
     ----------
     weights : (n,) ndarray
-        Weight of each joint, the reciprocal of an acceleration.
+        Weight of each joint, as the reciprocal of an acceleration.
     longest : (phases,) ndarray
-        See `Objective`.
+        Upper bounds on the phases' durations, s.
     """
 
     weights: np.ndarray
@@ -116,7 +116,7 @@ class LeastAcceleration:
         return phase.gradient(Partials(qddot=slopes[:, None]), x)
 
     def is_curved(self, _phase: Phase) -> bool:
-        """Return True: the share is a sum of squares."""
+        """Return True, because the share is a sum of squares."""
         return True
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:

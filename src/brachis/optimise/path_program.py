@@ -1,14 +1,14 @@
-"""The NLP over the path: its variables are speeds at stations of the path, and redundant curves as splines of s.
+"""The NLP over the path. Its variables are speeds at stations of the path, and redundant curves as splines of s.
 
-Places of the path are fixed, unlike in the program over time, so that corners that are passed within milliseconds have
-their own stations. X = sdot^2 is linear in s between two stations. So u = d2s/dt2 is constant there, as in the phase
-plane. At any place between them
+Unlike in the program over time, the places of the path are fixed. Corners that are passed within milliseconds therefore
+have their own stations. Between two stations, X = sdot^2 is linear in s and u = d2s/dt2 is constant, as in the phase
+plane. At any place between stations
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
 Limits are imposed midway between the stations and at both ends.
 
-The result is a joint path. Its timing is recomputed on a finer grid.
+The result is a joint path. Its timing is then recomputed on a finer grid.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
 _SLOWEST = 1e-3
-"""Smallest sdot^2 between the ends, as a fraction of its initial value."""
+"""Minimum of sdot^2 at stations other than the ends, as a fraction of its initial value."""
 _STOPPED = 1e-8
-"""Fraction of the median sdot^2 below which the tool is taken to be at rest at a station."""
+"""Fraction of the median sdot^2 below which the tool counts as being at rest at a station."""
 _SHORTEST = tolerances.PATH
 _NOTHING = 1e-24
-"""Replaces zero as a divisor."""
+"""Number that replaces a divisor of zero."""
 _SAMPLES = 20
-"""Number of places in every spline interval at which the initial splines are fitted to the curves."""
+"""Number of places in each spline interval at which the initial splines are fitted to the curves."""
 _SMALL = 2e-5
-"""Violation up to which a limit on postures is not narrowed."""
+"""Violation of a limit on postures up to which the limit is not narrowed."""
 _RAMP = 2.0
-"""Number of places over which the narrowing grows from zero, next to a given end posture."""
+"""Number of places next to a given end posture over which the narrowing increases from zero."""
 _MORE = 1.2
-"""Factor on a violation by which limits are narrowed."""
+"""Factor on a violation, which gives the amount by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
-"""Number of stations that are added in every short piece of a path."""
+"""Number of stations that are added in each short piece of a path."""
 _Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
 """The motion at the places where limits are imposed, and the limits there."""
 
@@ -61,7 +61,7 @@ def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
 
 
 def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
-    """Return states at rest along curves, (S, c); raise UnreachableError where the joint map has no posture."""
+    """Return states at rest along curves, (S, c); raise UnreachableError if the joint map has no posture."""
     q = phase.joint_map.postures(curves)
     if not np.isfinite(q).all():
         raise UnreachableError("the joint path leaves the joint map")
@@ -78,19 +78,19 @@ class PathPhase:
     phase_timing : PhaseTiming
         Timing from which the solve starts.
     intervals, stations : int
-        Numbers of intervals of the splines and between the stations. Each kind has equal lengths in time.
+        Number of intervals of the splines, and number of intervals between stations. Both are equally spaced in time.
 
     Attributes
     ----------
     curves_count : int
         Number of redundant curves.
     breaks : (M + 1,) ndarray
-        Ends of the intervals of the splines, as path coordinates.
+        Path coordinates of the ends of the splines' intervals.
     ends : tuple of float
         Path coordinates of both ends.
     start, x_lower, x_upper : (v,) ndarray
-        Initial values and bounds of the variables: X at the stations, in units of its initial values, and the control
-        points.
+        Initial values and bounds of the variables. These are X at the stations, in units of its initial values, and the
+        control points.
     jacobian_rows, jacobian_columns : (nnz,) int ndarray
     """
 
@@ -114,7 +114,7 @@ class PathPhase:
         even_s = np.interp(evenly, t, s)
         self._s = _with_pieces(even_s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
-        # Places where limits are imposed: the interval between stations, and the fraction of it that lies ahead.
+        # Places where limits are imposed: their intervals between stations, and how much of these lies after the place.
         inner = np.full(len(self._steps), 0.5)
         self._number = np.pad(np.arange(len(inner)), 1, mode="edge")
         self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
@@ -141,7 +141,7 @@ class PathPhase:
         ends = [(limit.lower, limit.upper) for limit in self._limits]
         lower_and_upper = np.concatenate(ends, axis=1)
         self._bounds = np.repeat(lower_and_upper[:, None], len(self._places), axis=1)
-        # Splines over time deviate slightly from a joint path.
+        # Splines over time deviate slightly from a joint path, so limits on postures are narrowed.
         for values, limit in self._posture_limits():
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
@@ -149,7 +149,7 @@ class PathPhase:
         self._evaluate = LastCall(self._evaluate_anew)
 
     def _set_pattern(self, columns: np.ndarray) -> None:
-        """Set the pattern of the Jacobian; `columns`, (L, 4), are the control points that matter at each place."""
+        """Set the pattern of the Jacobian. `columns`, (L, 4), are the control points with an effect at each place."""
         places, values = self._bounds.shape[1:]
         curves = np.arange(self.curves_count)
         of_curves = (len(self._s) + curves * self._count)[:, None, None] + columns
@@ -165,7 +165,7 @@ class PathPhase:
         self.jacobian_rows = rows[point].ravel()
 
     def _set_constants(self) -> None:
-        """Set s, s' and s'' at the places, and the slopes of X and u with respect to X at the stations beside them."""
+        """Set s, s' and s'' at the places, and the slopes of X and u by X at the stations on both sides."""
         s = self._places[:, None]
         self._of_s = np.array([s, np.ones_like(s), np.zeros_like(s)])
         units = self._units[np.array([self._number, self._number + 1])][:, :, None]
@@ -174,7 +174,7 @@ class PathPhase:
         self._by_step = units * np.array([-1.0 / steps, 1.0 / steps])
 
     def _set_variables(self, squares: np.ndarray, points: np.ndarray) -> None:
-        """Set the initial variables and their bounds: X at both ends, and given values, are fixed."""
+        """Set the initial variables and their bounds. X at both ends and values that are given are fixed."""
         count = len(self._s)
         self.start = np.concatenate([squares / self._units, points.ravel()])
         is_fixed = np.zeros(len(self.start), dtype=bool)
@@ -194,7 +194,7 @@ class PathPhase:
         self.x_upper = np.where(is_fixed, self.start, np.inf)
 
     def _begin_within_limits(self) -> None:
-        """Start from the fastest timing of the splines over these stations, if there is one."""
+        """Start from the fastest timing of the splines over these stations, if the limits allow a timing."""
         phase = self.phase
         squares, _ = self._split(self.start)
         course = self.course(self.start, self._s)
@@ -227,7 +227,7 @@ class PathPhase:
         return x[:count] * self._units, points
 
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return curves with two derivatives in s, (3, L, c), and X and u, (L, 1), where the limits apply."""
+        """Return curves with two derivatives by s, (3, L, c), and X and u, (L, 1), where limits are imposed."""
         squares, points = self._split(x)
         redundant = self._basis.curves(points)[:3]
         curves = np.concatenate([self._of_s, redundant], axis=2)
@@ -238,7 +238,7 @@ class PathPhase:
         return curves, square, u[:, None]
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Evaluate joint motion and limits at all places; raise UnreachableError where the joint map has no posture."""
+        """Evaluate joint motion and limits at all places; raise UnreachableError if the joint map has no posture."""
         return self._evaluate(x)[1]
 
     def _evaluate_anew(self, x: np.ndarray) -> _Evaluated:
@@ -250,7 +250,7 @@ class PathPhase:
         return motion, self._evaluator.evaluate(*orders, t=t)
 
     def narrow(self, x: np.ndarray) -> float:
-        """Narrow those limits on postures, along the whole path, that are exceeded between the places.
+        """Narrow, along the whole path, those limits on postures that are exceeded between the places.
 
         Returns
         -------
@@ -267,7 +267,7 @@ class PathPhase:
         return worst
 
     def _posture_limits(self) -> Iterator[tuple[slice, Limit]]:
-        """Yield the limits that depend on postures alone, each with the columns of its values."""
+        """Yield the limits that depend only on postures, each with the columns of its values."""
         first = 0
         for limit in self._limits:
             columns = slice(first, first + len(limit.lower))
@@ -276,7 +276,7 @@ class PathPhase:
                 yield columns, limit
 
     def _narrow(self, columns: slice, by: np.ndarray | float) -> None:
-        """Move both bounds of some values inwards by an amount, (c,); next to an end with a given posture, by less."""
+        """Move both bounds of some values inwards by an amount, (c,), and by less next to a given end posture."""
         number = np.arange(float(len(self._places)))
         ends = self.phase.boundary.start, self.phase.boundary.end
         share = np.ones_like(number)
@@ -293,12 +293,12 @@ class PathPhase:
 
     @property
     def upper(self) -> np.ndarray:
-        """Upper bounds, (c,)."""
+        """Upper bounds of the values of all limits at all places, (c,)."""
         return self._bounds[1].ravel()
 
     @property
     def value_numbers(self) -> np.ndarray:
-        """Number of the limit value in each row, (c,); it is the same at all places."""
+        """Number of the limit value to which each row belongs, (c,). It is the same at all places."""
         places, values = self._bounds.shape[1:]
         return np.tile(np.arange(values), places)
 
@@ -308,7 +308,7 @@ class PathPhase:
         return float((2.0 * self._steps / (rates[1:] + rates[:-1])).sum())
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Return the gradient of the time, (v,); it is zero with respect to the given X at both ends."""
+        """Return the gradient of the time, (v,). It is zero with respect to X at both ends, which is given."""
         rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         by_sum = -2.0 * self._steps / (rates[1:] + rates[:-1]) ** 2
         by_rate = np.pad(by_sum, (1, 0)) + np.pad(by_sum, (0, 1))
@@ -324,7 +324,7 @@ class PathPhase:
         """Compute the entries of the Jacobian on its pattern, (nnz,)."""
         ((_, y_ds, y_dds), square, u), evaluation = self._evaluate(x)
         rate = np.sqrt(square)
-        # Where X vanishes, it is given.
+        # X vanishes only where it is given.
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
         by_squares = np.zeros((2, 3, *y_ds.shape))
         by_squares[:, 1] = self._by_square * (half * y_ds)
@@ -340,13 +340,13 @@ class PathPhase:
         return self.course(x, spread(self.breaks, _SAMPLES)).y
 
     def course(self, x: np.ndarray, s: np.ndarray) -> Course:
-        """Return the curves at path coordinates s, (S,)."""
+        """Return the curves and their derivatives at path coordinates s, (S,)."""
         orders = self._basis_at(s).curves(self._split(x)[1])
         return Course.over_path(s, orders[:3])
 
 
 def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
-    """Add stations to the given ones, (P,), in short pieces of the path, such as rounded corners."""
+    """Return stations, (P,), with further ones added in short pieces of the path, such as rounded corners."""
     breaks = cut(breaks, s[0], s[-1])
     inner = spread(breaks, _STATIONS_A_PIECE)
     is_short = np.repeat(np.diff(breaks), _STATIONS_A_PIECE) < 4.0 * np.diff(s).max()
@@ -355,13 +355,13 @@ def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
 
 
 class PathProgram(PhaseSequence[PathPhase]):
-    """The NLP over the path of all phases; a `NonlinearProgram` for the solvers.
+    """The NLP over the path of all phases, as a `NonlinearProgram` for the solvers.
 
     Parameters
     ----------
     phases : sequence of PathPhase
     links : sequence of Link
-        Links of values only, because phases meet at rest.
+        Links between phases. They link only values, because phases meet at rest.
     """
 
     def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
@@ -394,7 +394,7 @@ class PathProgram(PhaseSequence[PathPhase]):
         self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
 
     def _number_values(self) -> np.ndarray:
-        """Give every limit value of a phase, and every join, a number; return the number for each row, (c,)."""
+        """Give each limit value of a phase, and each join, a number; return the number for each row, (c,)."""
         numbers = []
         first = 0
         for phase in self.phases:
@@ -432,10 +432,10 @@ class PathProgram(PhaseSequence[PathPhase]):
         )
 
     def curvature(self, _x: np.ndarray) -> None:
-        """Return None: no part of the Hessian is known."""
+        """Return None, because no part of the Hessian is known."""
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Compute the values of the rows, (c,); raise UnreachableError where the joint map has no posture."""
+        """Compute the values of the rows, (c,); raise UnreachableError if the joint map has no posture."""
         before, after = x[self._pairs].T
         rows = [phase.rows(x_of_phase) for phase, x_of_phase in self.split(x)]
         return np.concatenate([*rows, before - after])

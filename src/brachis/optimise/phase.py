@@ -1,7 +1,7 @@
-"""One phase of a motion: spline curves y that are mapped to joints and meet the limits at collocation points.
+"""One phase of a motion: spline curves y, mapped to joints, that meet the limits at collocation points.
 
 A phase has rows and variables x = (T, c_1, ..., c_c [, h]): its duration, the free control points of its curves, and
-interval lengths if the knots are free; see `layout`. Where a time law gives s(t), T is given too, and s has no control
+the interval lengths if the knots are free; see `layout`. If a time law gives s(t), T is given too, and s has no control
 points. With basis matrices B, B', ... in normalised time,
 
     dy/dc = B,  dydot/dc = B' / T,  dyddot/dc = B'' / T^2,  dydot/dT = -ydot / T,  dyddot/dT = -2 yddot / T
@@ -37,12 +37,12 @@ from brachis.optimise.layout import RowLayout, VariableLayout
 from brachis.optimise.motion import Motion, per_second, sample_law
 
 _EACH_ORDER = np.arange(ORDERS)
-"""Orders of derivatives."""
+"""Orders of derivatives: 0, 1, 2 and 3."""
 _is_checked = attrgetter("is_checked_at_points")
 
 
 class Phase:
-    """A phase, evaluated as functions of its variables x; see the module.
+    """A phase, evaluated through functions of its variables x; see the docstring of the module.
 
     Parameters
     ----------
@@ -50,15 +50,15 @@ class Phase:
     limits : sequence of Limit
         Limits of robot, process and scene.
     grid : FixedGrid
-        Knots and collocation points; with a `FreeGrid` the knots are variables.
+        Knots and collocation points. In a `FreeGrid` the knots are variables.
     boundary : Boundary
     margin : float or None, optional
-        Smallest branch margin, if the joint map has one. It is added to the limits as a safeguard. With None nothing is
-        added.
+        Minimum branch margin, if the joint map has margins. It is added to the limits as a safeguard. With None, no
+        safeguard is added.
     pause : float, optional
         Time that the arm waits at rest after the phase, s.
     layout : VariableLayout, optional
-        Layout of another phase with the same grid and boundary; by default a new one is built.
+        Layout of another phase with the same grid and boundary. By default a new layout is built.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Phase:
         self._slopes: tuple[Evaluation, np.ndarray] | None = None
 
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
-        """Return the same phase over another grid, and with new boundary conditions if they are given."""
+        """Return the same phase over another grid, with new boundary conditions if any are given."""
         splines = None
         if boundary is None and grid.knots is self.grid.knots:
             splines = self.splines
@@ -135,7 +135,7 @@ class Phase:
         return Phase(*arguments, margin=None, pause=self.pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
-        """Return the same phase over its current knots, with collocation points `t_norm`; x keeps its meaning."""
+        """Return the same phase with new collocation points `t_norm`. The knots and the meaning of x are unchanged."""
         return self.with_knots(self.knots, t_norm)
 
     def with_knots(self, knots: np.ndarray, t_norm: np.ndarray) -> Phase:
@@ -148,8 +148,8 @@ class Phase:
     def with_free_knots(self, shortest: float) -> Phase:
         """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals.
 
-        Where s(t) is given, the knots stay fixed: s at a collocation point would depend on all interval lengths before
-        it, and no time would be gained.
+        If s(t) is given, the knots stay fixed: s at a collocation point would depend on the lengths of all intervals
+        before it, and no time would be gained.
         """
         if self.time_law is not None:
             return self
@@ -157,24 +157,24 @@ class Phase:
         return self.with_grid(FreeGrid(self.knots, self.degree, self.t_norm, shortest))
 
     def fix_knots(self, x: np.ndarray) -> Phase:
-        """Return the phase with its knots fixed at their positions for x."""
+        """Return the same phase with its knots fixed at their positions for x."""
         return self.with_grid(self.grid.fix(self._h(x)))
 
     def with_limits(self, limits: Sequence[Limit]) -> Phase:
-        """Return the same phase with new limits, which include the safeguards; x keeps its meaning."""
+        """Return the same phase with new limits, safeguards included. The meaning of x is unchanged."""
         arguments = (self.joint_map, limits, self.grid, self.boundary)
         return Phase(*arguments, margin=None, pause=self.pause, layout=self._layout)
 
     def limits_near(self, curves: np.ndarray) -> list[Limit]:
-        """Return the limits, reduced to what matters close to given curves, (S, c); see `Limit.restrict_to`."""
+        """Return the limits, reduced to values that matter close to given curves, (S, c); see `Limit.restrict_to`."""
         q = self.joint_map.postures(curves)
         restricted = [limit.restrict_to(q) for limit in self.limits]
         return [limit for limit in restricted if limit is not None]
 
     def restrict_to(self, curves: np.ndarray, *, is_followed: bool = False) -> Phase:
-        """Return the same phase with `limits_near` curves, (S, c).
+        """Return the same phase with those limits that `limits_near` returns for curves, (S, c).
 
-        If splines are laid along the motion later and postures are free, limits on these are narrowed by their inset.
+        If splines will be laid along the motion and postures are free, limits on postures are narrowed by their inset.
         """
         limits = self.limits_near(curves)
         if is_followed and self.joint_map.r:
@@ -186,7 +186,7 @@ class Phase:
         return self.with_limits(limits)
 
     def with_margin(self, margin: float) -> Phase:
-        """Return the same phase with a different smallest branch margin; x keeps its meaning."""
+        """Return the same phase with a different minimum branch margin. The meaning of x is unchanged."""
         limits = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
         return self.with_limits(
             [*limits, *build_branch_margins(self.joint_map, margin)]
@@ -194,12 +194,12 @@ class Phase:
 
     @property
     def jacobian_rows(self) -> np.ndarray:
-        """Rows of the entries of the rows' Jacobian, (nnz,); each place occurs once."""
+        """Row of each entry of the rows' Jacobian, (nnz,). Each place occurs once."""
         return self._rows.pattern[0]
 
     @property
     def jacobian_columns(self) -> np.ndarray:
-        """Columns of the entries of the rows' Jacobian, (nnz,)."""
+        """Column of each entry of the rows' Jacobian, (nnz,)."""
         return self._rows.pattern[1]
 
     @property
@@ -211,23 +211,23 @@ class Phase:
 
     @property
     def lengths(self) -> slice:
-        """Positions of the variables that are interval lengths; empty where the knots are fixed."""
+        """Positions of the variables that are interval lengths; empty if the knots are fixed."""
         return self._layout.lengths
 
     @property
     def jumps(self) -> np.ndarray:
-        """Knots, in normalised time, at which the highest derivative that a limit depends on jumps."""
+        """Knots, in normalised time, at which the highest derivative needed by a limit jumps."""
         order = max((limit.order for limit in self.limits), default=0)
         return self.breaks[1:-1] if self.degree <= order else np.empty(0)
 
     def _h(self, x: np.ndarray) -> np.ndarray:
-        """Return the interval lengths that are variables; empty where the knots are fixed."""
+        """Return the interval lengths that are variables; empty if the knots are fixed."""
         return x[self._layout.lengths]
 
     def motion(self, x: np.ndarray) -> Motion:
         """Return the curves that belong to x."""
         h = self._h(x)
-        # If the lengths do not add up to exactly 1, the motion is longer or shorter by the same factor.
+        # If the lengths do not add up to exactly 1, the duration is scaled by their sum.
         t_end = float(x[0] * self.grid.t_norm_at(h)[-1])
         points = self._control_points(x)
         knots = self.grid.knots_at(h)
@@ -245,7 +245,7 @@ class Phase:
     ) -> np.ndarray:
         """Return value and derivatives of all curves at the collocation points, (4, K, c), per unit of normalised time.
 
-        With `is_slope` the control points are slopes, and the slope of a curve with a time law is zero.
+        If `is_slope`, the control points are slopes, and the slope of a curve with a time law is zero.
         """
         h = self._h(x)
         orders = self.grid.basis(h).curves(control_points)
@@ -258,7 +258,7 @@ class Phase:
     def scale_time(
         self, x: np.ndarray, factor: float, held: tuple[int, int] = (0, 0)
     ) -> np.ndarray:
-        """Return the same motion, longer by a factor; a given duration does not change.
+        """Return the same motion, longer by a factor. A given duration does not change.
 
         Parameters
         ----------
@@ -288,14 +288,14 @@ class Phase:
         return self.variables_from(replace(motion, control_points=points))
 
     def variables_from(self, motion: Motion) -> np.ndarray:
-        """Return the point x closest to given curves over the same knots, or over as many knots if these are free."""
+        """Return the point x closest to curves over the same knots, or over as many knots if the knots are free."""
         pairs = zip(self.splines, motion.control_points, strict=True)
         free = [spline.free_from(points, motion.t_end) for spline, points in pairs]
         h = self.grid.lengths_of(motion.knots)
         return np.concatenate([[motion.t_end], *free, h])
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Evaluate joint motion and limits at the collocation points; the result is cached until x changes.
+        """Evaluate joint motion and limits at the collocation points. The result is cached until x changes.
 
         Raises
         ------
@@ -326,7 +326,7 @@ class Phase:
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
     def has(self, limit: Limit) -> bool:
-        """Tell whether a limit is one of the phase's limits, as the same object."""
+        """Tell whether a limit object is one of the phase's limits."""
         return any(candidate is limit for candidate in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
@@ -341,15 +341,15 @@ class Phase:
         return self.grid.mean_weights(self._h(x))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
-        """Return the violations of the limits at every collocation point, (K, c); negative where a limit is met.
+        """Return the violations of the limits at every collocation point, (K, c); negative if a limit is met.
 
-        Limits on the whole motion are left out, and so are safeguards, which are numerical and not physical. Raises
-        UnreachableError as `evaluate` does.
+        Limits on the whole motion are left out. Safeguards are left out too, because they are not physical limits.
+        Raises UnreachableError as `evaluate` does.
         """
         return self.evaluate(x).violation(_is_checked)
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-        """Return violations at given normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
+        """Return violations at normalised times, (K,). The nearest collocation point determines full turns."""
         motion = self.motion(x)
         known = self.state(x)
         at = self.grid.t_norm_at(self._h(x))
@@ -362,10 +362,10 @@ class Phase:
         return evaluation.violation(_is_checked)
 
     def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
-        """Return ratios of values to their limits, (K, c), for limits at points that a longer time relieves.
+        """Return ratios of values to their limits, (K, c), for limits that a longer time relieves; see `Limit.ratio`.
 
-        See `Limit.ratio`. Means are left out, because they are the same at all points. Raises UnreachableError as
-        `evaluate` does.
+        Limits on means are left out, because a mean is the same at all points. Raises UnreachableError as `evaluate`
+        does.
         """
         ratios = [np.empty((len(self.t_norm), 0))]
         for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
@@ -378,7 +378,7 @@ class Phase:
         return float(np.abs(self.time_scaling_ratios(x)).max(initial=0.0))
 
     def posture_violation(self, motion: JointStates) -> float:
-        """Return the largest violation, along a motion, of the limits on postures alone; 0 if there are none."""
+        """Return the largest violation, along a motion, of limits that depend only on postures; 0 if there are none."""
         limits = [limit for limit in self.limits if limit.is_of_postures]
         violations = [limit.violation(limit.values(motion)).max() for limit in limits]
         return float(max(violations, default=0.0))
@@ -393,7 +393,7 @@ class Phase:
         return np.concatenate([slopes.ravel(), *entries])
 
     def limit_slopes(self, x: np.ndarray) -> np.ndarray:
-        """Return slopes of all limits' values in the variables, (z, c); cached, and raises, as `evaluate`."""
+        """Return slopes of all limits' values by the variables, (z, c); cache, and raise errors, as `evaluate` does."""
         evaluation = self.evaluate(x)
         if self._slopes is None or self._slopes[0] is not evaluation:
             slopes, entries = evaluation.differentiate(self._variable_slopes(x))
@@ -406,23 +406,23 @@ class Phase:
         Parameters
         ----------
         partials : Partials
-            Partials of the terms with respect to the joints, with one term per point: (K, 1, n).
+            Partials of the terms of the sum with respect to the joints, (K, 1, n): one term per point.
         x : (v,) ndarray
         """
         return self.gradient_by_curves(self.evaluate(x).chain(partials), x)
 
     def gradient_by_curves(self, slopes: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return the gradient, (v,), of a sum over the points from its slopes in y, ydot, ..., (orders, K, 1, c)."""
+        """Return the gradient, (v,), of a sum over the points from its slopes by y, ydot, ..., (orders, K, 1, c)."""
         entries = self.slopes_by_variables(slopes, x)
         return self.sum_up(entries)[0]
 
     def end_pattern(self, point: int) -> np.ndarray:
-        """Return the variables, (z,), that matter for the curves at the first (0) or last (-1) collocation point."""
+        """Return the variables, (z,), that affect the curves at the first (0) or last (-1) collocation point."""
         return self._layout.variable[self._at_end(point)]
 
     def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
         """Return slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
-        # Each value is one curve, or one of its derivatives, at this end.
+        # Each value is a curve, or a derivative of a curve, at this end.
         curves = len(self.boundary.start)
         values = ORDERS * curves
         by_curves = np.zeros((ORDERS, len(self.t_norm), values, curves))
@@ -431,7 +431,7 @@ class Phase:
         return slopes.T.reshape(ORDERS, curves, -1)
 
     def _at_end(self, point: int) -> np.ndarray:
-        """Return the indices of the entries at the first or last collocation point, except that of a given T."""
+        """Return the indices of entries at the first or last collocation point, leaving out T if it is given."""
         number = range(len(self.t_norm))[point]
         is_free = (self._layout.variable > 0) | (self.time_law is None)
         return np.flatnonzero((self._layout.point == number) & is_free)
@@ -439,7 +439,7 @@ class Phase:
     def sum_up(
         self, slopes: np.ndarray, weights: np.ndarray | float = 1.0
     ) -> np.ndarray:
-        """Add up slopes, (z, c), over the collocation points, with weights, (K,); return (c, v)."""
+        """Return the sum, (c, v), of slopes, (z, c), over the collocation points with weights (K,)."""
         factors = np.broadcast_to(weights, len(self.t_norm))[self._layout.point]
         terms = slopes * factors[:, None]
         variable = self._layout.variable
@@ -448,7 +448,7 @@ class Phase:
         )
 
     def sum_outer_products(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Add up g g^T, (v, v), over the slopes g of all values at all points, (z, c); weights (K, c) or (K, 1)."""
+        """Return the sum, (v, v), of g g^T over slopes g, (z, c), of values at points; weights (K, c) or (K, 1)."""
         columns = slopes.shape[1]
         rows = np.zeros((len(self.t_norm), columns, self.variables))
         point = self._layout.point[:, None]
@@ -458,7 +458,7 @@ class Phase:
         return (rows * weights[:, :, None]).reshape(flat.shape).T @ flat
 
     def slopes_by_variables(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Turn slopes in y, ydot, ..., (orders, K, c, 1 + r), into slopes in the phase's variables, (z, c)."""
+        """Convert slopes by y, ydot, ..., (orders, K, c, 1 + r), into slopes by the phase's variables, (z, c)."""
         entries = self._variable_slopes(x).find_entries(by)
         return self._add_lengths(entries, by, x)
 
@@ -470,7 +470,7 @@ class Phase:
     def _add_lengths(
         self, entries: np.ndarray, by: np.ndarray, x: np.ndarray
     ) -> np.ndarray:
-        """Append slopes with respect to h, if the knots are free, to the other slopes; see `slopes_by_variables`."""
+        """Append slopes by h to the other slopes if the knots are free; see `slopes_by_variables`."""
         orders = len(by)
         if not len(self.grid.point):
             return entries
@@ -493,7 +493,7 @@ class Phase:
         return np.array(moving) + slower
 
     def _basis(self, x: np.ndarray) -> np.ndarray:
-        """Return slopes of the curves and their time derivatives in the variables between T and h, (4, z)."""
+        """Return slopes of the curves and their time derivatives by the variables between T and h, (4, z)."""
         basis = self.grid.basis(self._h(x))
         if self._entries is None or self._entries[0] is not basis:
             self._entries = (basis, self._layout.sparsity.entries(basis.values))

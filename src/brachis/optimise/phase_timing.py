@@ -1,4 +1,4 @@
-"""The fastest timing of the joint path of a phase, which the phase plane (`timing`) finds within milliseconds."""
+"""The fastest timing of the joint path of a phase. The phase plane (`timing`) finds it within milliseconds."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from brachis.optimise.program import Program
 from brachis.timing import Course, TimedCourse, Timing, divide_turns
 
 PLACES = 4000
-"""Minimum number of places at which a joint path is timed. With half as many, splines were up to 0.4 % slower."""
+"""Minimum number of places at which a joint path is timed. With half as many, splines are up to 0.4 % slower."""
 _PLACES_A_PIECE = 24
-"""Number of places in every piece of a path, unless there are very many pieces."""
+"""Number of places in each piece of a path, unless there are very many pieces."""
 _MOST_PLACES = 40_000
 """Approximate maximum number of places in all pieces together."""
 _ROUGH_AGREEMENT = 1e-3
-"""Relative change of the time with which a rough timing ends."""
+"""Relative change of the time at which a rough timing ends."""
 _LEAST_PLACES = 12
 """Minimum number of places in each knot interval."""
 _FEW_PLACES = 2
-"""The same number for a rough timing."""
+"""Minimum number of places in each knot interval for a rough timing."""
 _LOSS_OF_SWITCHES = 0.1
-"""Time that all switches within steps between stations may cost together, in mean steps: 0.0025 % with 4000 places.
-Without this bound, motions with drives that bring a slide to its speed within microseconds lost 0.01 %, and their ramps
-could not be told from rest."""
+"""Time that all switches within steps between stations together may cost, in mean steps. With 4000 places this is
+0.0025 % of the time. Without this bound, motions in which drives bring a slide to its speed within microseconds were
+0.01 % slower, and their ramps could not be told from rest."""
 _SHARE_OF_STEP = 0.1
-"""Fraction of its share of this time that a step may cost after it is divided."""
+"""Time that a step may cost after it is divided, as a fraction of its share of this time."""
 _MOST_PARTS = 64
 """Maximum number of parts into which a step is divided at once."""
 _TIMINGS = 7
-"""Maximum number of times that a joint path is timed: six divisions resolve ramps as short as 1e-9 of the time."""
+"""Maximum number of times that a joint path is timed. Six divisions resolve ramps as short as 1e-9 of the time."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class PhaseTiming:
     ----------
     course : TimedCourse
     rates : tuple of float
-        Rates of the path's length at both ends, 1/s.
+        Rates of the joint path's length at both ends, 1/s.
     timing : Timing or None
-        The timing; None if the limits allow no timing, not even that of the motion itself, because of rounding.
+        The timing; None if the limits allow none. Because of rounding, they may reject even that of the motion itself.
     fixed_duration : float or None
-        Duration if it is given, s.
+        Duration of the phase if it is given, s.
     """
 
     course: TimedCourse
@@ -61,7 +61,7 @@ class PhaseTiming:
 
     @property
     def t_end(self) -> float:
-        """Duration, s; infinite without a timing."""
+        """Duration of the phase, s; infinite without a timing."""
         if self.timing is None:
             return np.inf
         return self.timing.t_end if self.fixed_duration is None else self.fixed_duration
@@ -70,10 +70,10 @@ class PhaseTiming:
     def of(
         cls, phase: Phase, x: np.ndarray, *, is_rough: bool = False
     ) -> PhaseTiming | None:
-        """Time the joint path of a phase; return None if its speed is given or the path cannot be evaluated.
+        """Time the joint path of a phase. Return None if its speed is given or the path cannot be evaluated.
 
-        A rough timing is done once, without resolving ramps, and at fewer places per interval if there are many
-        intervals.
+        If `is_rough`, the path is timed only once. Ramps are not resolved, and if there are many intervals, the path is
+        timed at fewer places in each.
         """
         if phase.time_law is not None:
             return None
@@ -120,9 +120,9 @@ class PhaseTiming:
         ends : tuple of float
             Path coordinates of both ends.
         places : int, optional
-            Minimum number of places at which the path is timed; a third of it if `is_rough`.
+            Minimum number of places at which the path is timed; a third of this number if `is_rough`.
         is_rough : bool, optional
-            Whether the path is timed only once, at evenly spread places, which gives the time to within 1 %.
+            Whether the path is timed only once, at evenly spread places. This gives the time to within 1 %.
         """
         path = phase.joint_map.path
         assert path is not None
@@ -146,7 +146,7 @@ class PhaseTiming:
         duration = None if law is None else law.duration
         if timing is None or is_rough:
             return cls(course, by_length, timing, duration)
-        # Stations at equal time steps of this timing.
+        # Place stations at equal time steps of this timing.
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
         passed = np.maximum.accumulate(y[:, 0])
@@ -180,19 +180,19 @@ class PhaseTiming:
 def _resolve_ramps(
     time_at: Callable[[np.ndarray], PhaseTiming], stations: np.ndarray
 ) -> PhaseTiming:
-    """Time a joint path at stations, (P,), and at further ones where the timing switches within a step."""
+    """Time a joint path at stations, (P,), and at further stations where the timing switches within a step."""
     for _ in range(_TIMINGS - 1):
         phase_timing = time_at(stations)
         finer = _divide_switches(phase_timing)
         if finer is None:
             return phase_timing
         stations = finer
-        del phase_timing  # two of them need too much memory
+        del phase_timing  # two timings at a time need too much memory
     return time_at(stations)
 
 
 def _divide_switches(phase_timing: PhaseTiming) -> np.ndarray | None:
-    """Divide the steps in which switches of a timing cost too much; return None if there is nothing to divide."""
+    """Divide the steps in which switches of a timing cost too much time; return None if there are no such steps."""
     timing = phase_timing.timing
     if timing is None:
         return None
@@ -210,7 +210,7 @@ def _divide_switches(phase_timing: PhaseTiming) -> np.ndarray | None:
 def _lay_finely(
     phase: Phase, course_at: Callable[[np.ndarray], Course], p: np.ndarray
 ) -> Course:
-    """Build a course over stations, (P,), with further stations between them where the joint path turns."""
+    """Build a course over stations, (P,), and over further stations where the joint path turns."""
     state = course_at(p).state(phase.joint_map)
     return course_at(divide_turns(p, state.qdot))
 

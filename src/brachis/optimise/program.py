@@ -1,10 +1,10 @@
-"""The nonlinear program: the best motion in phases. The objective is the end time by default.
+"""The nonlinear program for the best motion in phases. By default the objective is the end time.
 
     minimise    objective(x), for example t_E = sum of the phases' durations
     over        x = the variables of the first phase, then of the second, ...
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
-The rows are those of the phases, one phase after the other, then means over the whole motion, then the rows of the
+First come the rows of the phases, one phase after the other, then the means over the whole motion, then the rows of the
 links. Most motions have one phase and no links; see `phase`. The objective is a sum over the phases.
 """
 
@@ -31,17 +31,18 @@ from brachis.optimise.phase import Phase
 
 @dataclass(frozen=True)
 class Link:
-    """A condition that some curves have equal values and derivatives where one phase ends and another begins.
+    """The condition that some curves have equal values and derivatives where one phase ends and another begins.
 
-    Each value or derivative has a row that must be 0: the difference between the two phases, times the duration of a
-    knot interval to the power of the derivative's order. With the same joint map on both sides, equal curves mean equal
-    motions.
+    Each value or derivative has a row that must be 0. The row is the difference between the two phases, times the
+    duration of a knot interval to the power of the derivative's order. If the joint map is the same on both sides,
+    equal curves mean equal motions.
 
     Attributes
     ----------
     before, after : int
         Numbers of the phase that ends and of the phase that begins.
     curves : tuple of int
+        Indices of the curves that are linked.
     orders : tuple of int
         Orders of the derivatives that are equal: 0 for the values, 1 for the first time derivatives, ...
     """
@@ -53,16 +54,16 @@ class Link:
 
     @property
     def size(self) -> int:
-        """Number of rows."""
+        """Number of rows of the link."""
         return len(self.curves) * len(self.orders)
 
     def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Return the factors on the rows of every order, (orders, 1)."""
+        """Return the factors on the rows of each order, (orders, 1)."""
         interval = x[0] * (1.0 - phase.breaks[-2])
         return interval ** np.array(self.orders)[:, None]
 
     def rows(self, phase_points: PhasePoints) -> np.ndarray:
-        """Compute the values of the rows, by order and curve; `phase_points` are all phases with their variables."""
+        """Compute the values of the rows, by order and curve. `phase_points` are all phases with their variables."""
         chosen = np.ix_(self.orders, self.curves)
         last = _curves_at(*phase_points[self.before], -1)[chosen]
         first = _curves_at(*phase_points[self.after], 0)[chosen]
@@ -78,7 +79,7 @@ class Link:
         phases : sequence of Phase
             All phases of the program.
         first : sequence of int
-            Index at which the variables of each phase begin.
+            Index of the first variable of each phase.
         """
         last = phases[self.before].end_pattern(-1) + first[self.before]
         begin = phases[self.after].end_pattern(0) + first[self.after]
@@ -122,7 +123,7 @@ _Phase = TypeVar("_Phase", bound=_HasVariables)
 
 
 class PhaseSequence(Generic[_Phase]):
-    """Phases one after the other, and the variables of all of them.
+    """Successive phases, and the variables of all of them.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ class PhaseSequence(Generic[_Phase]):
     x_lower, x_upper : (v,) ndarray
         Bounds of the variables.
     first_variables : list of int
-        Index of the first variable of every phase.
+        Index of the first variable of each phase.
     """
 
     def __init__(self, phases: Iterable[_Phase]) -> None:
@@ -146,7 +147,7 @@ class PhaseSequence(Generic[_Phase]):
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
 
     def split(self, x: np.ndarray) -> list[tuple[_Phase, np.ndarray]]:
-        """Return every phase with its part of x."""
+        """Return each phase with its part of x."""
         pairs = zip(self.phases, self._blocks, strict=True)
         return [(phase, x[block]) for phase, block in pairs]
 
@@ -164,7 +165,7 @@ class PhaseSequence(Generic[_Phase]):
 
 
 class Program(PhaseSequence[Phase], Summary):
-    """The NLP as functions of x, in the form that solvers use.
+    """The NLP as functions of x, in the form in which solvers use it.
 
     Parameters
     ----------
@@ -179,7 +180,7 @@ class Program(PhaseSequence[Phase], Summary):
     links : tuple of Link
     minimised : Objective
     means : Means
-        Means of the values that are limited as means over the motion.
+        Means, over the motion, of the values whose means are limited.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -220,7 +221,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @cached_property
     def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the entries of the Jacobian, computed on demand: many programs never need them."""
+        """Rows and columns of the entries of the Jacobian, computed on demand because many programs never need them."""
         firsts = self.first_variables
         patterns = [
             (phase.jacobian_rows, phase.jacobian_columns + first)
@@ -236,12 +237,12 @@ class Program(PhaseSequence[Phase], Summary):
 
     @property
     def jacobian_rows(self) -> np.ndarray:
-        """Rows of the entries of the Jacobian, (nnz,); each place occurs once."""
+        """Row of each entry of the Jacobian, (nnz,). Each place occurs once."""
         return self._pattern[0]
 
     @property
     def jacobian_columns(self) -> np.ndarray:
-        """Columns of the entries of the Jacobian, (nnz,)."""
+        """Column of each entry of the Jacobian, (nnz,)."""
         return self._pattern[1]
 
     @property
@@ -291,7 +292,7 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def scale_time(self, x: np.ndarray, factor: float) -> np.ndarray:
-        """Return the same motion with the duration of every phase longer by a factor, except given durations."""
+        """Return the same motion with all durations, except given ones, longer by a factor."""
         return np.concatenate(
             [
                 phase.scale_time(x_of_phase, factor, self.held_orders(number))
@@ -300,7 +301,7 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def held_orders(self, number: int) -> tuple[int, int]:
-        """Return the highest derivatives that links to phases of given duration fix at the start and end of a phase."""
+        """Return the highest order of derivative at each end of a phase that a link to a phase of given time fixes."""
         first = 0
         last = 0
         for link in self.links:
@@ -311,7 +312,7 @@ class Program(PhaseSequence[Phase], Summary):
         return first, last
 
     def objective(self, x: np.ndarray) -> float:
-        """Return the value to minimise; raise UnreachableError as `states` does, if it depends on the joints."""
+        """Return the value to minimise. If it depends on the joints, raise UnreachableError as `states` does."""
         return float(
             sum(
                 self.minimised.value(phase, x_of_phase)
@@ -329,7 +330,7 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def with_objective(self, objective: Objective) -> Program:
-        """Return the same program with another objective."""
+        """Return the same program with a different objective."""
         return Program(self.phases, self.links, objective)
 
     def states(self, x: np.ndarray) -> list[JointState]:
@@ -359,11 +360,11 @@ class Program(PhaseSequence[Phase], Summary):
         return np.concatenate(entries)
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
-        """Return the Hessian part that comes from squares in the objective and in means; None if there are none."""
+        """Return the part of the Hessian due to squares in the objective and in means; None if there are no squares."""
         is_curved = any(map(self.minimised.is_curved, self.phases))
         if not (is_curved or len(self.means)):
             return None
-        # Squared accelerations fall with the fourth power of the time T, so dT/d(mean) = -T/4 where the mean is 1.
+        # Squared accelerations fall with the fourth power of the time T, so dT/d(mean) = -T/4 if the mean is 1.
         guess = np.zeros(len(self.lower))
         if len(self.means):
             guess[self._mean_rows] = -0.25 * self.end_time(x) / len(self.means)
@@ -388,9 +389,9 @@ class Program(PhaseSequence[Phase], Summary):
         return tuple(limits.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Return the indices of the rows of a limit, (K, c), at the collocation points of all phases that have it.
+        """Return the indices of the rows of a limit, (K, c), at the collocation points of all phases with this limit.
 
-        For a limit on means it is a single row of indices, (1, c).
+        For a limit on means, the result is a single row of indices, (1, c).
         """
         if limit.guarantee.is_mean:
             limits = self.means.limits
@@ -406,7 +407,7 @@ class Program(PhaseSequence[Phase], Summary):
 
     @cached_property
     def value_numbers(self) -> np.ndarray:
-        """Number of the limit value in each row, (c,), the same at all points of a phase; other rows have their own."""
+        """Number of the limit value in each row, (c,), the same at all points of a phase. Other rows have their own."""
         numbers = np.arange(len(self.lower))
         for phase, first in zip(self.phases, self._first_rows, strict=False):
             for limit in phase.limits:
@@ -436,7 +437,7 @@ class Program(PhaseSequence[Phase], Summary):
         return np.concatenate([phase.variables_from(motion) for phase, motion in pairs])
 
     def with_phases(self, phases: Iterable[Phase]) -> Program:
-        """Return the program with its phases replaced, and all else unchanged."""
+        """Return the same program with different phases."""
         return Program(phases, self.links, self.minimised)
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
@@ -451,18 +452,18 @@ class Program(PhaseSequence[Phase], Summary):
         )
 
     def fix_knots(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
-        """Return the program with its knots fixed at their positions for x, and its point with the same motion."""
+        """Return the program with its knots fixed at their positions for x, and the point that is the same motion."""
         fixed = self.with_phases(
             phase.fix_knots(x_of_phase) for phase, x_of_phase in self.split(x)
         )
         return fixed, fixed.variables_from(self.motions(x))
 
     def with_margin(self, margin: float) -> Program:
-        """Return the same program with a different smallest branch margin; x keeps its meaning."""
+        """Return the same program with a different minimum branch margin. The meaning of x is unchanged."""
         return self.with_phases(phase.with_margin(margin) for phase in self.phases)
 
     def relax(self, limit: Limit, bound: Bound, amount: float) -> Program:
-        """Return the same program with one figure of a limit relaxed by `amount`, in the unit of the figure."""
+        """Return the same program with one bound of a limit relaxed by `amount`, in the unit of the bound."""
         relaxed = limit.relax(bound, amount)
         return self.with_phases(
             phase.with_limits(

@@ -2,13 +2,13 @@
 
 After a solve the limits are evaluated on a much denser grid. Where a limit is violated between collocation points,
 points are added around the worst place of each interval. The problem is then solved again from its current solution,
-until the worst violation is within the tolerance. A remaining violation about as large as the tolerance is removed by a
-slightly longer t_E. Once the rounds are used up, t_E may become up to one per cent longer; once the time is up, up to
-twice as long.
+until the worst violation is within the tolerance. If a violation about as large as the tolerance remains, t_E is made
+slightly longer to remove it. When the rounds are used up, t_E may become up to one per cent longer. When the time is
+up, it may become up to twice as long.
 
-Where a joint with Coulomb friction reverses, its torque rises by twice the friction, within the width of the friction
-law. A width of 1e-5 rad/s is passed in microseconds, which no grid resolves. Between grid points the velocity of a
-joint is therefore approximated by the cubic that its velocities and accelerations define.
+Where a joint with Coulomb friction reverses, its torque rises by twice the friction within the width of the friction
+law. The joint passes a width of 1e-5 rad/s in microseconds, which no grid resolves. Between grid points, the velocity
+of a joint is therefore approximated by the cubic that fits its velocities and accelerations at these points.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from brachis.robot import Friction
 from brachis.task import RefinementSettings
 
 _LEVELS = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
-"""Velocities that are checked, in widths of the friction law. At 7, all but 2e-6 of the friction has built up."""
+"""Velocities that are checked, in widths of the friction law. At 7, all but 2e-6 of the friction acts."""
 _NEAR_REVERSALS = 10.0
-"""An extremum of the velocity is checked as well if it lies within this many widths of zero."""
+"""Largest velocity, in widths of the friction law, at which an extremum of the velocity is checked too."""
 
 
 def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.ndarray:
@@ -48,7 +48,7 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
     Returns
     -------
     (Z,) ndarray
-        Times found, ascending, s.
+        Times at which a velocity passes a checked level, or has an extremum close to zero, ascending, s.
     """
     rubbing = np.flatnonzero(friction.coulomb > 0.0)
     if not len(rubbing):
@@ -76,7 +76,7 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
 
 
 def _root(c: np.ndarray) -> np.ndarray:
-    """Find the zeros, (F,), of polynomials in Bernstein form on [0, 1], (m + 1, F), whose ends differ in sign."""
+    """Find the zeros, (F,), of polynomials in Bernstein form, (m + 1, F), with opposite signs at 0 and 1."""
 
     def is_before(u: np.ndarray) -> np.ndarray:
         """Tell at which places, (F,), the polynomials have the same sign as at their beginning."""
@@ -91,15 +91,15 @@ def _root(c: np.ndarray) -> np.ndarray:
 _NEAR = 0.005
 """Distance from a limit, as a fraction of it, within which a violation may hide between grid points."""
 _SAME_TIME = 1e-9
-"""Normalised times that differ by less belong to the same knot or grid point, on either side of it."""
+"""Difference of two normalised times below which both belong to the same knot or grid point, on either side."""
 _EVERYWHERE = slice(5, None, 10)
-"""Times of the dense grid that add one point between neighbouring collocation points."""
+"""Slice of the dense grid that selects one time between every two neighbouring collocation points."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
-"""Offsets of points around an abrupt change, in steps of the dense grid."""
+"""Offsets of points added around an abrupt change, in steps of the dense grid."""
 
 
 def dense_grid(phase: Phase, density: int) -> np.ndarray:
-    """Spread times evenly over every knot interval, `density` per collocation point."""
+    """Return times spread evenly over each knot interval, `density` per collocation point."""
     breaks = phase.breaks
     behind = np.searchsorted(phase.t_norm, breaks + _SAME_TIME)
     grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
@@ -109,9 +109,9 @@ def dense_grid(phase: Phase, density: int) -> np.ndarray:
 def violations(
     dense: Program, x: np.ndarray, goal: float
 ) -> tuple[float, list[np.ndarray]]:
-    """Return the largest violation, and the normalised times at which collocation points are missing in each phase.
+    """Return the largest violation, and the normalised times at which each phase lacks collocation points.
 
-    Around every grid peak that comes close to a limit, finer and finer grids locate the true peak.
+    Around each peak on the grid that comes close to a limit, the true peak is located with finer and finer grids.
     """
     checks = [
         _check_phase(phase, x_of_phase, goal) for phase, x_of_phase in dense.split(x)
@@ -121,7 +121,7 @@ def violations(
     if np.isfinite(violation):
         of_means = dense.means.violation(dense.split(x))
         violation = max(violation, of_means)
-        if of_means > goal:  # too few points everywhere
+        if of_means > goal:  # there are too few points everywhere
             extra = [phase.t_norm[_EVERYWHERE] for phase in dense.phases]
             pairs = zip(missing, extra, strict=True)
             missing = [np.union1d(*pair) for pair in pairs]
@@ -129,14 +129,14 @@ def violations(
 
 
 def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
-    """Return the largest violation of a phase, and where points are missing."""
+    """Return the largest violation of a phase, and the normalised times at which collocation points are missing."""
     t_norm = dense.t_norm
     try:
         table = dense.violation(x)
         largest = float(table.max())
         peaks = _suspects(t_norm, table, dense.knots, goal - _NEAR)
         if largest > 20.0 * goal:
-            # The peaks on the grid are good enough until they are nearly within the limits.
+            # Peaks on the grid are accurate enough until they are nearly within the limits.
             at = np.searchsorted(t_norm, peaks - _SAME_TIME).clip(max=len(t_norm) - 1)
             missing = _around(peaks[table.max(axis=1)[at] > goal], t_norm)
         else:
@@ -154,11 +154,11 @@ def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.nd
 
 
 def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List normalised times between grid points that are always checked.
+    """List the normalised times, between grid points, that are always checked.
 
-    These are times spread over every piece of a path with several pieces, because a blend of a few millimetres may lie
-    between grid points. They are also the times at which a joint with Coulomb friction reverses, or nearly so, and at
-    which a limit changes abruptly.
+    If a path has several pieces, these are times spread over every piece, because a blend of a few millimetres may lie
+    between grid points. The times at which a joint with Coulomb friction reverses or nearly reverses, and at which a
+    limit changes abruptly, are also listed.
     """
     motion = dense.motion(x)
     path = dense.joint_map.path
@@ -182,7 +182,7 @@ def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
 def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarray:
     """Spread normalised times around the abrupt changes near which points are missing.
 
-    The time of a change moves with every solve: single points would follow it for many rounds.
+    The time of a change moves with every solve, so single points would have to be added in many rounds.
     """
     at = _at_breaks(dense, x)
     if not (len(at) and len(missing)):
@@ -193,7 +193,7 @@ def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarr
 
 
 def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Find the distance between grid times around each of `times`; at a knot, the larger distance of its two sides."""
+    """Find the grid step around each of `times`; at a knot, the larger of the steps on both sides."""
     gaps = np.diff(t_norm)
     sides = [
         np.searchsorted(t_norm, times + by) - 1 for by in (-_SAME_TIME, _SAME_TIME)
@@ -203,24 +203,24 @@ def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """List times at the centres and one grid step before and after them: a peak moves when it is pressed down."""
+    """List times at the centres and one grid step before and after, because a peak moves when it is pressed down."""
     steps = _spacing(t_norm, centres)[:, None] * np.array([-1.0, 0.0, 1.0])
     return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
 
 
 def _find_lost(phase: Phase, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """Tell at which normalised times the joint map has no posture, (K,)."""
+    """Tell for each normalised time, (K,), whether the joint map has no posture."""
     motion = phase.motion(x)
     postures = phase.joint_map.postures(motion.at(t_norm * motion.t_end)[0])
     return ~np.isfinite(postures).all(axis=1)
 
 
 def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List the middle of every stretch of the dense grid on which the branch has no posture."""
+    """List the middle of each stretch of the dense grid on which the branch has no posture."""
     is_lost = _find_lost(dense, x, dense.t_norm)
     edges = np.flatnonzero(np.diff(np.pad(is_lost, 1).astype(int)))
     if not len(edges):
-        # Reachable, but singular, or too far apart to count turns: add points everywhere.
+        # All points are reachable, but singular or too far apart to count turns. Add points everywhere.
         return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
 
@@ -228,10 +228,10 @@ def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
 def _suspects(
     t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float
 ) -> np.ndarray:
-    """List times around which a violation may hide: grid peaks close to a limit, and both sides of knots close to one.
+    """List times around which a violation may hide: grid peaks, and both sides of knots, if they are close to a limit.
 
-    A peak between grid points is higher than its neighbours by an eighth of their second difference; four times as much
-    is allowed for. The motion's higher derivatives jump at knots, so a peak next to a knot may not show on the grid.
+    A peak between grid points is higher than its neighbours by an eighth of their second difference. Four times this
+    amount is added. The motion's higher derivatives jump at knots, so a peak next to a knot may not show on the grid.
     """
     padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
     bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
@@ -248,7 +248,7 @@ def _suspects(
 def _zoom(
     dense: Phase, x: np.ndarray, centres: np.ndarray, goal: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the true peaks near the centres on finer and finer grids; return their normalised times and violations."""
+    """Find the true peaks close to the centres with finer and finer grids; return their times and violations."""
     heights: np.ndarray = np.empty(len(centres))
     reach = _spacing(dense.t_norm, centres)
     steps = np.linspace(-1.0, 1.0, 9)
@@ -267,7 +267,7 @@ def _zoom(
 
 
 def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
-    """Add extra collocation points to those of a phase, leaving out points whose rows would equal existing ones."""
+    """Add extra collocation points to those of a phase, except points whose rows would equal existing rows."""
     t_norm = phase.t_norm
     before = np.clip(np.searchsorted(t_norm, extra), 1, len(t_norm) - 1) - 1
     side = np.searchsorted(phase.jumps, extra, side="right")
@@ -278,33 +278,33 @@ def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
 
 
 _LONGEST = 0.01
-"""Fraction by which a motion may get slower if nothing else brings it within the limits."""
+"""Maximum fraction by which a motion is slowed down if nothing else brings it within the limits."""
 _CLOSE = 1.01
-"""Ratio of a long enough time to a time that is too short, below which no shorter time is searched for."""
+"""Ratio of a sufficient time to an insufficient one below which no shorter time is searched for."""
 _LONGEST_IF_LATE = 1.0
-"""The same fraction once the time is up: a slower motion within the limits is better than none."""
+"""The same fraction once the time is up, when a slower motion within the limits is better than none."""
 _RELIEF = 4.0
-"""A violation falls by at most about this many times the fraction by which the motion gets slower."""
+"""Approximate maximum of the decrease of a violation, divided by the fraction by which the motion gets slower."""
 _GOAL = 0.5
 """Fraction of the tolerance at which refinement aims, because the verification uses a different grid."""
 
 
 @dataclass(frozen=True)
 class RefinementOptions:
-    """Options of the refinement: when it is finished, and how much effort it may take.
+    """Options of the refinement: the violations at which it ends, and its maximum effort.
 
     Attributes
     ----------
     tolerance : float
-        Largest violation of a limit, as a fraction of it.
+        Largest permitted violation of a limit, as a fraction of the limit.
     density : int
-        Grid points per collocation point of the first solve.
+        Number of grid points per collocation point of the first solve.
     max_rounds : int
-        Maximum number of solves after the first one; with 0 the first solution is left as it is.
+        Maximum number of solves after the first one. With 0, the first solution is not changed.
     deadline : Deadline
-        No solve is started after this deadline.
+        Deadline after which no solve is started.
     longest : float
-        End time above which the motion is not lengthened, s.
+        Maximum end time to which the motion is lengthened, s.
     """
 
     tolerance: float = 1e-4
@@ -327,8 +327,8 @@ def refine(
 ) -> SolvedProgram:
     """Add collocation points to a solved program until the limits are met on the dense grid.
 
-    Unlike `improve`, this does not search for a better motion. The motion gets slower from round to round, until it
-    meets the limits.
+    Unlike `improve`, this function does not search for a faster motion. The motion gets slower from round to round,
+    until it meets the limits.
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ def refine(
     Returns
     -------
     SolvedProgram
-        The program with all collocation points. Its reports are the first one and one for every round.
+        The program with all collocation points. Its reports are `first` and one report for each round.
     """
     if not first.status.usable:
         return SolvedProgram(program, (first,), violation=np.inf)
@@ -368,7 +368,7 @@ def refine(
         if is_same or options.deadline.passed:
             break
         report = solve(finer, answer)
-        # A solve that ended early may still give a motion about as fast as the one before.
+        # Even a solve that ended early may give a motion about as fast as the one before.
         is_as_fast = report.objective <= reports[-1].objective * (1.0 + _LONGEST)
         if not (report.status.usable or (report.feasible and is_as_fast)):
             break
@@ -390,11 +390,11 @@ def _lengthen(
     options: RefinementOptions,
     by: float,
 ) -> tuple[float, float]:
-    """Find the factor on the time, up to 1 + `by`, that brings the violation to the goal; return both.
+    """Find the factor on the time, up to 1 + `by`, that reduces the violation to the goal; return factor and violation.
 
-    A time longer by some fraction lowers velocities by this fraction, and torques that only accelerate by twice as
-    much. Torques that contain gravity or friction fall by less, and nothing falls where the time is given. So factors
-    are tried, and the best one is kept.
+    If the time is longer by a small fraction, velocities are lower by this fraction, and purely accelerating torques by
+    twice as much. Torques that contain gravity or friction decrease by less. If the time is given, nothing decreases.
+    Several factors are therefore tried, and the best one is kept.
     """
     goal = options.tolerance * _GOAL
     max_factor = min(1.0 + by, options.longest / dense.end_time(x))
@@ -414,7 +414,7 @@ def _lengthen(
             best = (factor, violation)
         if violation > 0.99 * before:
             break
-    # Jerks fall with the third power of the time, so a smaller factor may be enough.
+    # Jerks decrease with the third power of the time, so a smaller factor may be enough.
     while best[1] <= goal and best[0] > _CLOSE * too_short:
         factor = np.sqrt(best[0] * too_short)
         violation, _ = violations(dense, dense.scale_time(x, factor), goal)

@@ -1,4 +1,4 @@
-"""The search for joint paths over the path, and programs that start from the fastest timing of a joint path."""
+"""The search for joint paths with the program over the path, and programs that start from their fastest timing."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from brachis.timing import is_left_out
 SOLVER = "phase plane"
 """Solver name in reports of programs that are solved by timing alone."""
 _CREDIBLE = 0.01
-"""Fraction of the time by which a solution over the path may differ from its timing."""
+"""Maximum difference between a solution over the path and its timing, as a fraction of the time."""
 _MOST_INTERVALS = 256
-"""Maximum number of intervals of all redundant curves together: with four curves of 128 intervals a solve takes half a
-minute and gains 0.2 %."""
+"""Maximum number of intervals of all redundant curves together. With four curves of 128 intervals, a solve takes half a
+minute and gains only 0.2 %."""
 _LEAST_INTERVALS = 4
 """Minimum number of intervals of a redundant curve in a phase, however short the phase."""
 _PLACES_AN_INTERVAL = 3.5
-"""Number of places per interval at which the limits are imposed along the path."""
+"""Number of places along the path, per interval, at which limits are imposed."""
 _NARROWED = 4
 """Maximum number of times that limits on postures are narrowed."""
 ROUGH_MARGIN = 0.02
-"""Smallest branch margin in a rough search. Finer searches that start from its joint paths may come closer to the
-boundary."""
+"""Minimum branch margin in a rough search. Finer searches that start from the joint paths found may come closer to the
+branch boundary."""
 _FEWEST = 12
-"""Minimum number of intervals of a phase at the beginning of a search over time, if its timing needs that many."""
+"""Minimum number of intervals of a phase at the beginning of a search over time, if its timing needs so many."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +51,19 @@ class PathEffort:
     Attributes
     ----------
     intervals : tuple of int
-        Numbers of intervals of the redundant curves over the whole path, tried one after the other. The phases share
-        them in proportion to their times.
+        Numbers of intervals of the redundant curves over the whole path, tried one after the other. Each number is
+        divided among the phases in proportion to their times.
     places : int
         Number of places at which joint paths are timed.
     margin : float
-        Smallest branch margin that is allowed.
+        Minimum branch margin.
     options : SolverOptions
-        Options of every solve. Limits may be exceeded slightly, because the timing is recomputed.
+        Options of each solve. Limits may be exceeded slightly, because the timing is recomputed.
     is_rough_before, is_rough_after : bool, optional
-        Whether joint paths are timed roughly before and after they are improved. For a joint path that is not improved,
-        the second setting applies. A rough timing does not show gains or losses below 1 %.
+        Whether joint paths are timed only roughly before they are improved, and after. For a joint path that is not
+        improved, `is_rough_after` applies. A rough timing does not show gains or losses below 1 %.
     posture_violation : float, optional
-        Violation of limits on postures that is accepted.
+        Largest accepted violation of limits on postures.
     """
 
     intervals: tuple[int, ...]
@@ -92,7 +92,7 @@ COARSE = PathEffort(
     ),
     posture_violation=5e-3,
 )
-"""Effort for choosing the joint paths that get a rough search."""
+"""Effort for choosing the joint paths for which a rough search is made."""
 ROUGH = PathEffort(
     intervals=(16,),
     places=800,
@@ -108,7 +108,7 @@ ROUGH = PathEffort(
         widening=1.5e-5,
     ),
 )
-"""Effort for ranking joint paths; these stay clear of branch boundaries."""
+"""Effort for ranking joint paths. The joint paths keep a margin from branch boundaries."""
 FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     places=PLACES,
@@ -126,7 +126,7 @@ FINE = PathEffort(
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
-    """Report x unchanged: more collocation points do not improve a timing, but a longer time meets the limits."""
+    """Report x unchanged. More collocation points do not improve a timing, but limits can be met with more time."""
     return _report(program, x, SolveStatus.STALLED, np.inf, 0.0)
 
 
@@ -137,7 +137,7 @@ def _report(
     violation: float,
     seconds: float,
 ) -> SolverReport:
-    """Report a motion that no solver has changed."""
+    """Report a motion that was not changed by a solver."""
     return SolverReport(
         solver=SOLVER,
         status=status,
@@ -159,7 +159,7 @@ def begin_with_timing(
     points: int,
     x: np.ndarray | None = None,
 ) -> tuple[Program, np.ndarray] | None:
-    """Lay splines along the timings of all phases, over few knots that are dense only where the timings need it.
+    """Lay splines along the timings of all phases over few knots. Knots are dense only where the timings need them.
 
     Phases with a given time keep their knots.
 
@@ -169,20 +169,20 @@ def begin_with_timing(
         Program over any knots.
     timings : sequence of PhaseTiming or None
     lost : float
-        Fraction of the time that the intervals may cost together.
+        Fraction of the time that the intervals together may cost.
     intervals : int
         Approximate number of intervals of all phases together.
     points : int
         Number of collocation points per interval.
     x : (v,) ndarray, optional
-        Point of the program, from which phases with a given time start. It is not needed if there are none.
+        Point of the program from which phases with a given time start. Not needed if there are no such phases.
 
     Returns
     -------
     program : Program
     x : (v,) ndarray
-        Motion slowed down until the limits are met at the collocation points. None is returned in place of both where
-        the limits allow no timing.
+        Motion, slowed down until the limits are met at the collocation points. None is returned in place of both if the
+        limits allow no timing.
     """
     total = least_time(timings)
     phases = []
@@ -215,7 +215,7 @@ def is_timing_all(program: Program) -> bool:
 
 @dataclass(frozen=True)
 class BetterPaths:
-    """Result of the search over the path.
+    """Result of the search for joint paths with the program over the path.
 
     Attributes
     ----------
@@ -227,10 +227,10 @@ class BetterPaths:
     violation : float
         Largest violation of a limit on postures.
     is_credible : bool
-        Whether the solutions are about as fast as their timings. If the tool stands still on its path while the joints
-        move, curves over the path cannot describe the motion.
+        Whether the solutions are about as fast as their timings. They are not if the tool stands still on its path
+        while the joints move, because curves over the path cannot describe such a motion.
     is_held_back : bool
-        Whether a branch margin is so close to its bound that it holds the motion back.
+        Whether a branch margin holds the motion back because it is close to its bound.
     """
 
     curves: tuple[np.ndarray, ...]
@@ -246,7 +246,7 @@ class BetterPaths:
         return least_time(self.timings)
 
     def rank(self, slack: float) -> tuple[float, float]:
-        """Return a sort key, smaller for better paths: the violation of posture limits above `slack`, then the time."""
+        """Return a sort key, smaller for better paths. Violations of posture limits above `slack` precede the time."""
         return max(self.violation, slack), self.t_end
 
 
@@ -267,7 +267,7 @@ def improve_joint_paths(
         Curves of every phase: s, ascending, and the redundant curves.
     solve : SolverSession
     tolerance : float
-        The number of spline intervals is increased as long as this gains at least this fraction of the time.
+        Minimum gain, as a fraction of the time, with which the number of spline intervals is increased further.
     effort : PathEffort
 
     Returns
@@ -321,7 +321,7 @@ def _better(
     intervals: int,
     best: BetterPaths,
 ) -> BetterPaths:
-    """Solve over the path from the best joint paths so far, and keep the faster ones."""
+    """Solve over the path from the best joint paths so far, and return the better joint paths."""
     phases = []
     for phase, phase_timing in zip(program.phases, best.timings, strict=True):
         share = phase_timing.t_end / best.t_end
@@ -347,7 +347,7 @@ def _better(
         return replace(best, reports=reports, is_credible=False)
     paths = BetterPaths(over_path.curves(report.x), timings, reports, violation)
     missed = 1.0 - report.objective / paths.t_end
-    # The phase plane does not show whether the limits allow a given speed.
+    # If the speed is given, the phase plane does not show whether the limits allow it.
     has_laws = any(timing.fixed_duration is not None for timing in timings)
     has_timed_laws = has_laws and np.isfinite(paths.t_end)
     is_beyond = has_timed_laws and report.violation > _CREDIBLE
@@ -387,7 +387,7 @@ def lay_splines(
     points : int
         Number of collocation points per interval.
     deadline : Deadline, optional
-        See `follow`.
+        After this deadline no further mesh is tried, and no limit is narrowed further.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 """Splines that follow a timing: the choice of their knots and control points.
 
 In the fastest timing accelerations jump, but splines can only ramp. Knots are therefore close together where
-accelerations jump, and far apart where they are nearly linear. The control points of the splines' rates are means of
-the curves' rates, sharpened where these change smoothly. As a result, no spline accelerates much more than its curve
-does close by.
+accelerations jump, and far apart where accelerations are nearly linear. The control points of the splines' rates are
+means of the curves' rates, which are sharpened where the rates change smoothly. As a result, no spline accelerates much
+more than its curve does close by.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from brachis.timing.joint_path import halfway
 _FIRST_INTERVALS = 8
 """Minimum number of intervals before halving."""
 _PLACES_AN_INTERVAL = 250
-"""Number of places of the path for each interval before halving."""
+"""Number of places of the joint path per interval before halving."""
 _LONGER = 4.5
 """Maximum ratio between the lengths of neighbouring intervals."""
 _SWITCH = 0.2
-"""Smallest change of the accelerations, as a fraction of them, that counts as a switch from one limit to another."""
+"""Relative change of the accelerations above which the change counts as a switch from one limit to another."""
 _FEW = 5
-"""Number of times within an interval that are needed to tell whether the timing is smooth there. With 8 an arc of
-degree 5 was 0.1 % slower; with 3 there were a third more intervals for the same end time."""
+"""Number of instants within an interval that are needed to tell whether the timing is smooth there. With 8, the motion
+along an arc, with degree 5, was 0.1 % slower. With 3, a third more intervals were needed for the same end time."""
 _POINT = 1e-12
 """Half length below which a chord is treated as a point, as a fraction of the time."""
 _ANCHORED = 100
@@ -41,10 +41,10 @@ def breaks_for(
 ) -> np.ndarray:
     """Choose knots for splines that follow a timing.
 
-    Intervals are halved, beginning with the one that costs the most time. An interval of length h costs h times the
-    deviation of the accelerations from a straight line within it, as a fraction of the limits. A jump of d2p/dt2 costs
-    less: with a ramp in its place the motion falls behind by the jump's height times h^2 / 24. No interval is shorter
-    than the mean step of the timing, because the limits are imposed once per step.
+    Intervals are halved, beginning with the interval that costs the most time. The cost of an interval of length h is h
+    times the deviation of the accelerations from a straight line within it, as a fraction of the limits. A jump of
+    d2p/dt2 costs less: if a ramp replaces it, the motion falls behind by the jump's height times h^2 / 24. No interval
+    is shorter than the mean step of the timing, because the limits are imposed once per step.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def breaks_for(
     tolerance : float
         Fraction of the time that all intervals together may cost.
     max_intervals : int
-        Number of intervals at which halving ends. Intervals beside much shorter ones are halved after that.
+        Number of intervals at which halving stops. After that, only intervals beside much shorter ones are halved.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def breaks_for(
     t = 0.5 * (timing.times[1:] + timing.times[:-1]) / timing.t_end
     sizes = np.abs(values).max(axis=1)
     jumps = np.abs(np.diff(values, axis=0)).max(axis=1)
-    # A smaller step comes from the limits themselves, and a ramp there would exceed them.
+    # A smaller change comes from the limits themselves, and a ramp in its place would exceed them.
     is_switch = jumps > _SWITCH * np.maximum(sizes[1:], sizes[:-1])
     jumps = np.where(is_switch, jumps, 0.0)
     ramps = timing.t_end / 24.0 * np.abs(np.diff(acceleration))
@@ -87,7 +87,7 @@ def breaks_for(
 
 
 def even_out(breaks: np.ndarray) -> np.ndarray:
-    """Halve the intervals between breaks, (N + 1,), that are much longer than their neighbours."""
+    """Halve those intervals between breaks, (N + 1,), that are much longer than their neighbours."""
     while True:
         steps = np.diff(breaks)
         beside = np.pad(steps, 1, constant_values=1.0)
@@ -107,10 +107,10 @@ def control_points_along(
 ) -> np.ndarray:
     """Compute control points, (c, N + d), of splines whose rates have means of the curves' rates as control points.
 
-    A control point of the rate belongs to d - 1 knots. Its mean is the slope of the chord over the largest interval
-    that is symmetric around the mean of these knots and lies between the first and the last of them. So accelerations
-    stay within the range of those close by, whatever the knots. For the delays, s, before and after the timing, the
-    curves keep their rates at its ends.
+    A control point of the rate belongs to d - 1 knots. Its mean is the slope of a chord. The chord spans the largest
+    interval that is symmetric around the mean of these knots and lies between the first and the last of them. With any
+    knots, accelerations therefore stay within the range of the curves' accelerations close by. During the delays, s,
+    before and after the timing, the curves keep the rates that they have at its ends.
     """
     t_end = timing.t_end + sum(delays)
     windows = sliding_window_view(knots[2:-2], degree - 1)
@@ -123,7 +123,7 @@ def control_points_along(
     y = course.curves(timing, ends.ravel())[0].reshape(len(ends), 2, -1)
     means = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths)[:, None]
     means[is_point] = course.curves(timing, ends[is_point, 0])[1]
-    # Second moments of the means, and of control points relative to their curve.
+    # Add the second moments of the means and of control points relative to their curve.
     beside = half**2 / 6.0 + windows.var(axis=1) / (2.0 * max(degree - 2, 1))
     rates = _sharpen(means, places, half, beside)
     first = course.curves(timing, np.array([-delays[0]]))[0]
@@ -135,14 +135,14 @@ def control_points_along(
 def _sharpen(
     means: np.ndarray, places: np.ndarray, half: np.ndarray, beside: np.ndarray
 ) -> np.ndarray:
-    """Turn means of a curve, (w, c), over `half`, (w,), to both sides, into control points of a spline along the curve.
+    """Convert means of a curve, (w, c), over `half`, (w,), on both sides into control points of a spline along it.
 
-    A mean and its control point differ by the curve's second derivative times `beside`, (w,). The smallest second
-    derivative close by is used, and zero where it changes its sign, so that nothing oscillates beside a jump.
+    A mean and its control point differ by the curve's second derivative times `beside`, (w,). To avoid oscillations
+    beside a jump, the smallest second derivative close by is used, and zero where the second derivative changes sign.
     """
     widths = np.diff(places)[:, None]
     slopes = np.diff(means, axis=0) / widths
-    # Places at which the slopes of these means are the curve's slopes.
+    # Find the places at which the slopes of these means are the curve's slopes.
     taken = halfway(places) + np.diff(half**2) / (6.0 * widths[:, 0])
     bends = np.diff(slopes, axis=0) / np.diff(taken)[:, None]
     near = sliding_window_view(np.pad(bends, ((1, 1), (0, 0))), 3, axis=0)
@@ -164,7 +164,7 @@ def splines_along(
     t_end = timing.t_end + sum(delays)
     points = control_points_along(course, timing, knots, degree, delays)
     places = greville(knots, degree)
-    # Means of rates miss the curves by a small error that grows along the motion.
+    # Splines from means of rates miss the curves by a small error that grows along the motion.
     count = 1 + (len(places) - degree) // _ANCHORED
     anchors = np.linspace(0.0, 1.0, count + 1)
     inner = np.clip(anchors * t_end - delays[0], 0.0, timing.t_end)

@@ -1,4 +1,4 @@
-"""The nonlinear program of a task on a robot, with a phase for every leg of the path, in coordinates of a joint map.
+"""The nonlinear program of a task on a robot, with a phase for each leg of the path, in coordinates of a joint map.
 
 Where the arm stops, the phases on both sides are at rest in the same posture, which is free. Where the tool's speed is
 given on one side, s and its derivatives are known there. Links make the redundant joints continue with the same number
@@ -23,22 +23,22 @@ from brachis.optimise.program import Link, Program
 from brachis.problem.problem import Problem
 
 _FOR_SPEEDS = 12
-"""Number of intervals of the first mesh of every phase if a speed is given. With 20, plans took two to three times as
+"""Number of intervals of each phase in the first mesh if a speed is given. With 20, plans took two to three times as
 long."""
 _END_INTERVAL = 0.2
-"""Longest interval, s, next to an end of a phase with a given time. There the joints enter from, or leave for, a motion
-that is as fast as possible. With 0.1 the end times of ten lines were the same; with 0.4 some plans took twice as long,
-and with even intervals one of the ten failed."""
+"""Maximum length, s, of the first and last intervals of a phase with a given time. In these intervals, the joints come
+from or go over to a motion that is as fast as possible. With 0.1 the end times of ten lines were the same. With 0.4
+some plans took twice as long, and with even intervals one of the ten plans failed."""
 
 
 def program_of(problem: Problem, joint_maps: Sequence[JointMap]) -> Program:
-    """Set up the NLP of a decomposition over even knot intervals, with shorter ones at the ends of a given speed.
+    """Set up the NLP of a decomposition over even knot intervals, which are shorter at the ends of a given speed.
 
     Parameters
     ----------
     problem : Problem
     joint_maps : sequence of JointMap
-        One joint map for each leg, starting at, or close to, the posture at the leg's beginning.
+        One joint map for each leg. Its start is at, or close to, the posture at the beginning of the leg.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def program_over(
     Raises
     ------
     UnreachableError
-        The motion is to be periodic, but the coordinates do not close with the path.
+        The motion has to be periodic, but its coordinates at the start and the end of the path differ.
     """
     is_periodic = problem.task.boundary.periodic
     first = joint_maps[0]
@@ -98,7 +98,7 @@ def program_over(
 def maps_by_leg(
     problem: Problem, joint_map: JointMap, starts: np.ndarray
 ) -> list[JointMap]:
-    """Divide a map of the whole path into maps of the legs, from the postures, (legs, n), at which the legs begin."""
+    """Divide a map of the whole path into maps of the legs, which begin in given postures, (legs, n)."""
     if len(problem.legs) == 1:
         return [joint_map]
     pairs = zip(problem.leg_paths, starts, strict=True)
@@ -137,7 +137,7 @@ def _is_at_rest(problem: Problem, number: int, side: int) -> bool:
 
 
 def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
-    """Return the given time derivatives of s at the beginning (side 0) or end (-1) of a leg; empty if free."""
+    """Return the given time derivatives of s at the beginning (side 0) or end (-1) of a leg; empty if not given."""
     if _is_at_rest(problem, number, side):
         return np.zeros(problem.task.spline.vanishing)
     beside = problem.leg_beside(number, side)
@@ -153,13 +153,13 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
 
 
 def derivatives_in_motion(problem: Problem) -> int:
-    """Return how many derivatives continue between phases in motion: up to the jerk if a limit depends on it."""
+    """Return the number of continuous derivatives between phases in motion: with the jerk if a limit needs it."""
     order = max((limit.order for limit in problem.limits), default=2)
     return min(order, problem.task.spline.degree - 1)
 
 
 def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
-    """Join the phases, and in a periodic motion the last one to the first."""
+    """Yield links between successive phases, and in a periodic motion also from the last phase to the first."""
     last = len(joint_maps) - 1
     redundant = tuple(range(1, 1 + joint_maps[0].r))
     in_motion = tuple(range(1 + derivatives_in_motion(problem)))
@@ -169,7 +169,7 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
     if not problem.task.boundary.periodic or not (last or has_law):
         return
     if redundant:
-        # A given start posture fixes both ends.
+        # If the start posture is given, it fixes both ends.
         orders = in_motion if problem.start is None else in_motion[1:]
         yield Link(last, 0, redundant, orders)
     if not has_law:
@@ -177,9 +177,9 @@ def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
 
 
 def breaks_of(problem: Problem) -> np.ndarray:
-    """Return the ends, (N + 1,), of a phase's uniform intervals; for "auto", those of the first mesh."""
+    """Return the ends, (N + 1,), of a phase's uniform intervals; for "auto", those in the first mesh."""
     count = problem.task.spline.intervals
     if count == "auto":
-        # The distance up to a given speed may be short, and over few intervals no motion reaches that speed.
+        # The distance to reach a given speed may be short. With few intervals, no motion reaches the speed.
         count = _FOR_SPEEDS if any(problem.time_laws) else COARSE_INTERVALS
     return np.linspace(0.0, 1.0, count + 1)

@@ -23,7 +23,7 @@ class Course:
     Attributes
     ----------
     p : (P,) ndarray
-        Path parameter, for example the time of a known motion, s.
+        Path parameter; for example, the time of a known motion, s.
     y, y_dp, y_ddp : (P, c) ndarray
     """
 
@@ -40,12 +40,12 @@ class Course:
 
     @classmethod
     def over_path(cls, s: np.ndarray, other_curves: Iterable[np.ndarray]) -> Course:
-        """Combine path coordinates, (P,), with other curves and their two derivatives in s, (3, P, c - 1)."""
+        """Combine path coordinates, (P,), with the other curves and their two derivatives by s, (3, P, c - 1)."""
         s_orders = (s, np.ones_like(s), np.zeros_like(s))  # s, ds/ds, d2s/ds2
         return cls(s, *map(np.column_stack, zip(s_orders, other_curves, strict=True)))
 
     def state(self, joint_map: JointMap) -> JointState:
-        """Return joint states at the stations, with p as the time; raise UnreachableError where there is no posture."""
+        """Return joint states at the stations, with p as the time. Raise UnreachableError if there is no posture."""
         still = np.zeros_like(self.y)
         t = self.p - self.p[0]
         return joint_map.state(self.y, self.y_dp, self.y_ddp, still, t=t)
@@ -61,14 +61,14 @@ class TimedCourse:
         Joint map of the curves.
     limits : sequence of Limit
     rate : (P,) ndarray, optional
-        Estimate of the rate of the course's parameter at its stations, 1/s.
+        Estimate of the rate dp/dt of the course's parameter at the stations, 1/s.
 
     Attributes
     ----------
     path : JointPath
         The joint path, with its length as the parameter, at the stations at which the joints move.
     places : (P',) ndarray
-        Values of the course's parameter at these stations.
+        Values of the course's parameter p at these stations.
     speeds : (P,) ndarray
         Derivative of the path's length with respect to the course's parameter, at all stations of the course.
 
@@ -96,8 +96,8 @@ class TimedCourse:
             by_length = speeds * np.interp(places, course.p, rate)
         self._plane = PhasePlane(limits, self.path, by_length)
         y_dp = interpolate_columns(places, course.p, course.y_dp)
-        # Where the joints stand still, use the slopes of the next station at which they move, or of the last such
-        # station.
+        # Where the joints stand still, use the slopes at the next station at which they move. After the last such
+        # station, use its slopes.
         moving = np.flatnonzero(speeds > 0.0)
         behind = np.searchsorted(moving, np.arange(len(speeds)))
         beside = moving[behind.clip(max=len(moving) - 1)]
@@ -110,12 +110,12 @@ class TimedCourse:
         narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
         agreement: float = AGREEMENT,
     ) -> Timing | None:
-        """Find the fastest timing with given rates of the path's length at both ends, 1/s; see `PhasePlane`."""
+        """Find the fastest timing with given rates of the joint path's length at both ends, 1/s; see `PhasePlane`."""
         self._plane.narrow(narrower)
         return self._plane.solve(rates, agreement)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return curves and their rates, (K, c), at times, (K,), s: cubic between stations, linear beyond the ends."""
+        """Return curves and their rates, (K, c), at times, (K,), s; cubic between stations, linear beyond the ends."""
         beyond = t - np.clip(t, 0.0, timing.t_end)
         t = t - beyond
         i = np.searchsorted(timing.times, t, side="right") - 1

@@ -1,4 +1,4 @@
-"""The timing gap: how much faster a motion's own joint path could be travelled."""
+"""The timing gap: how much faster the joint path of a motion could be travelled."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _LEAST_PLACES = 4
 _MOST_PLACES = 40_000
 """Approximate maximum number of places in all knot intervals together."""
 WORTH_A_WARNING = 0.02
-"""Gap above which a plan gives a warning."""
+"""Timing gap above which a plan gives a warning."""
 _STILL = 1e-9
-"""Fraction of the largest speed below which a phase is taken to begin or end at rest."""
+"""Fraction of the largest speed below which a phase counts as beginning or ending at rest."""
 _SHARE = 0.8
-"""Fraction of the lost time that lies in the s-interval that the message names."""
+"""Fraction of the lost time that is lost within the s-interval named in the message."""
 _EVERYWHERE = 0.7
-"""Length of an s-interval from which it is not named, because the time is lost along the whole path."""
+"""Length above which an s-interval is not named, because the time is lost along the whole path."""
 
 
 class SlowTimingWarning(BrachisWarning):
     """Another timing of the same joint path is much faster than the plan.
 
-    The message says by how much, where on the path the time is lost, and what would help. It is also in
+    The message says how much faster, where on the path the time is lost, and what would help. The warning is also in
     ``result.warnings``, and the figures are in ``result.timing_gap``.
 
     Examples
@@ -62,16 +62,16 @@ class TimingGap(Summary):
     t_end : float
         End time of the motion, s.
     least_time : float
-        Shortest time for its joint path, s, with the same speeds at the ends of its phases, and accelerations that may
-        jump.
+        Shortest time for the same joint path, s. The speeds at the ends of the phases are those of the motion, and
+        accelerations may jump.
     places : int
-        Number of grid places for which the least time was computed.
+        Number of grid points with which the least time was computed.
     left_out : tuple of str
-        Kinds of the limits that the least time leaves out. If there are any, the least time is only a lower bound.
+        Types of limit that the least time leaves out. If there are any, the least time is only a lower bound.
     s_interval : tuple of float
-        Shortest interval of the path in which four fifths of the difference are lost.
+        Shortest interval of the path coordinate in which four fifths of the extra time are lost.
     advice : str
-        What may give a faster motion.
+        Advice on what may give a faster motion.
     """
 
     t_end: float
@@ -83,7 +83,7 @@ class TimingGap(Summary):
 
     @property
     def gap(self) -> float:
-        """Extra time that the motion takes, as a fraction of the least time."""
+        """Time that the motion takes in excess of the least time, as a fraction of the least time."""
         return self.t_end / self.least_time - 1.0
 
     def __str__(self) -> str:
@@ -99,7 +99,7 @@ class TimingGap(Summary):
         )
 
     def issues(self) -> tuple[Issue, ...]:
-        """Say where time is lost and what would help; return nothing if the gap is small, or is only a bound."""
+        """Say where time is lost and what would help. Return nothing if the gap is small or only a bound."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
         low, high = (round(s, 4) for s in self.s_interval)
@@ -108,8 +108,8 @@ class TimingGap(Summary):
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
         message = (
-            f"the same joint path can be passed in {self.least_time:.4g} s, which is {saved:.1f} % faster; the motion "
-            f"loses this time {where}; for a faster motion, {self.advice}"
+            f"the same joint path can be travelled in {self.least_time:.4g} s, which is {saved:.1f} % faster; the "
+            f"motion loses this time {where}; for a faster motion, {self.advice}"
         )
         motion_text = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
@@ -135,7 +135,7 @@ def find_timing_gap(
 ) -> TimingGap | None:
     """Compare a motion with the fastest timing of its own joint path.
 
-    Phases of given speed and pauses count with their own durations.
+    Pauses and phases of given speed keep their durations in the least time.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def _time_phase(
     count = max(PLACES, min(_LEAST_PLACES * intervals, _MOST_PLACES))
     ends = np.unique(np.clip(trajectory.times, phase.begin, phase.end))
     ends = ends[np.append(np.diff(ends) > _STILL * phase.duration, True)]
-    # Of very many nodes, use only some.
+    # If there are very many nodes, use only some of them.
     ends = np.append(ends[: -1 : -(-len(ends) // count)], ends[-1])
     steps = np.ceil(count * np.diff(ends) / phase.duration).astype(int)
     t = spread(ends, steps)

@@ -1,9 +1,9 @@
 """A joint path q(p) at stations, with its first and second derivatives with respect to the path parameter p.
 
 The parameter may be the path coordinate s, the time of a known motion, or the length of the joint path. The least time
-does not depend on this choice. With its length as the parameter, a path is regular where a motion along it starts from
-rest. With time as the parameter it is not, because there both s and q grow with powers of time, and their derivatives
-vanish.
+does not depend on this choice. If the length is the parameter, the path is regular even where a motion starts from
+rest. If time is the parameter, the path is not regular there: both s and q grow with powers of time, so their
+derivatives vanish.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from brachis.kernel import Spline
 from brachis.robot.dynamics import SharedTorques
 
 _STANDING = 1e-7
-"""Fraction of the largest speed below which a motion is taken to stand still."""
+"""Fraction of the largest speed below which the joints count as standing still."""
 
 
 _SHORTEST = 1e-13
 """Shortest step between stations, as a fraction of the path."""
 _TURN = 0.02
-"""Largest change of a unit tangent between stations, rad. Where a path turns, the motion may speed up or brake at
-once."""
+"""Maximum change of the unit tangent between stations, rad. Where a path turns, the motion may abruptly accelerate or
+brake."""
 _MOST_PARTS = 64
-"""Maximum number of parts of one step."""
+"""Maximum number of parts into which a step is divided."""
 _CORNER = 1.9
-"""Change of a unit tangent between two stations above which the tangent reverses, as at a cusp, and the arm stops. With
-coarse stations a path that passes a branch boundary changes by up to 1.5; a reversal is 2."""
+"""Change of the unit tangent between two stations above which the tangent counts as reversed, as at a cusp, and the arm
+stops. With coarse stations, the tangent of a path through a branch boundary changes by up to 1.5; a reversal is 2."""
 
 
 def halfway(values: np.ndarray) -> np.ndarray:
-    """Return means of neighbouring values, (P - 1, ...), from values at stations, (P, ...)."""
+    """Return the mean of every two neighbouring values, (P - 1, ...), of values at stations, (P, ...)."""
     return np.asarray(0.5 * (values[1:] + values[:-1]))
 
 
@@ -46,9 +46,9 @@ def to_stations(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 
 def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
-    """Divide the steps between stations p, (P,), in which a joint path turns, given its derivatives there, (P, n).
+    """Divide the steps between stations p, (P,), in which a joint path turns, given its derivatives dq/dp, (P, n).
 
-    Steps in which the speed changes by a large factor, as beside a cusp, are divided too.
+    Steps in which the speed changes by a large factor, for example beside a cusp, are divided too.
     """
     speed = np.linalg.norm(q_dp, axis=1)[:, None]
     tangent = np.divide(q_dp, speed, out=np.zeros_like(q_dp), where=speed > 0.0)
@@ -71,11 +71,11 @@ class JointPath:
     p : (P,) ndarray
         Path parameter, ascending.
     s : (P,) ndarray
-        Path coordinate of the tool; NaN without a path.
+        Path coordinate of the tool; NaN if the tool has no path.
     q, q_dp, q_ddp : (P, n) ndarray
         Postures, rad or m, and their derivatives with respect to p.
     stops : (k,) int ndarray
-        Indices of the stations at which dp/dt is zero: those just before and after a corner.
+        Indices of the stations at which dp/dt is zero. These are the stations just before and after a corner.
     """
 
     p: np.ndarray
@@ -97,8 +97,8 @@ class JointPath:
         Returns
         -------
         path : JointPath
-            The path without stations at which q does not change with p, except both ends, and with two stations at each
-            corner.
+            The path with two stations at each corner. Stations at which q does not change with p are left out, except
+            at the ends.
         places : (P',) ndarray
             Values of p at the stations of the new path.
         """
@@ -126,7 +126,7 @@ class JointPath:
         stops = sides + 1 + 2 * np.arange(len(corners))[:, None]
         places = self.p[index][numbers]
         speed = speed[numbers]
-        # The speed falls linearly to zero, and rises linearly again.
+        # At a corner the speed falls linearly to zero, and then rises linearly.
         ends = places[stops]
         shares = speed[stops] / speed[stops].sum(axis=1, keepdims=True)
         places[stops] = np.sum(ends * shares[:, ::-1], axis=1, keepdims=True)
@@ -136,7 +136,7 @@ class JointPath:
         step = np.diff(places)
         lengths = step * halfway(speed)
         lengths += step**2 / 12.0 * (along[:-1] - along[1:])
-        # Keep stations apart, even where a path hardly moves.
+        # Keep stations apart, even where the posture hardly changes.
         lengths = np.maximum(lengths, _SHORTEST * lengths.sum())
         length = np.append(0.0, np.cumsum(lengths))
         path = JointPath(
@@ -160,7 +160,7 @@ class JointPath:
 
 
 class Passage(SharedTorques):
-    """The motion at the stations of a joint path, in the form that limits evaluate.
+    """The motion at the stations of a joint path, in the form in which limits evaluate it.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class Passage(SharedTorques):
 
 @dataclass(frozen=True)
 class Timing:
-    """The times at which the stations of a joint path are passed.
+    """The times at which a motion passes the stations of a joint path.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ class Timing:
     acceleration : (P - 1,) ndarray
         Mean d2p/dt2 between the stations, 1/s^2.
     jerk : (P - 1,) ndarray
-        d3p/dt3 between the stations, 1/s^3, for smooth changes of the acceleration. Jumps of the acceleration are at
+        d3p/dt3 between the stations, 1/s^3, where the acceleration changes smoothly. The acceleration jumps only at
         stations.
     times : (P,) ndarray
         Times at the stations, beginning at 0, s.
@@ -212,7 +212,7 @@ class Timing:
         mean = halfway(rate)
         durations = steps / mean
         acceleration = np.diff(rate) / durations
-        # Take the smaller slope of the two sides, so that there is none beside a jump.
+        # Use the smaller slope of the two sides, to have no slope beside a jump.
         slopes = np.pad(np.diff(acceleration) / halfway(durations), 1)
         smaller = np.minimum(np.abs(slopes[1:]), np.abs(slopes[:-1]))
         max_jerk = np.abs(acceleration) / durations
@@ -227,7 +227,7 @@ class Timing:
 
     @property
     def t_end(self) -> float:
-        """Time for the whole path, s."""
+        """Time taken for the whole path, s."""
         return float(self.times[-1])
 
     @property

@@ -4,19 +4,20 @@ With u = d2p/dt2 and x = (dp/dt)^2, the motion along q(p) is
 
     qdot = q_dp sqrt(x),        qddot = q_dp u + q_ddp x,        dx/dp = 2 u.
 
-Every limit on velocities, accelerations and torques becomes a row in (u, x) midway between stations,
+Every limit on velocities, accelerations and torques becomes a row in (u, x), midway between stations:
 
     lower <= a u + b x + c <= upper,        a = v_a q_dp,   b = v_a q_ddp + v_v q_dp / (2 sqrt(x)),
 
-where v_v and v_a are the partial derivatives of its value with respect to qdot and qddot. For rigid-body torques and
-for accelerations the rows are exact. Friction, torque that falls with speed, power and the tool's acceleration are
-linearised at the last timing, until rows and values agree. A limit without acceleration bounds only x.
+where v_v and v_a are the partial derivatives of the limit's value with respect to qdot and qddot. The rows are exact
+for rigid-body torques and accelerations. Friction, torque that falls with speed, power and the tool's acceleration are
+linearised at the last timing, until rows and values agree. A limit independent of acceleration bounds only x.
 
 Between two stations u is constant and x is linear in p, and the rows are met midway between them. A backward pass from
-the end finds, at each station, the interval of x from which the next one can be reached. A forward pass then takes the
-largest u (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
+the end finds, at each station, the interval of x from which the next station can be reached. A forward pass then uses
+the largest possible u at each station (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
 
-Limits on the third derivative and on means have no such rows and are left out: the time is then a lower bound.
+Limits on the third derivative and on means have no such rows and are left out. If a task has any of these, the time is
+only a lower bound.
 """
 
 from __future__ import annotations
@@ -36,25 +37,25 @@ from brachis.timing.joint_path import JointPath, Passage, Timing, halfway, to_st
 _TINY = 1e-9
 """Magnitude of coefficients and slopes below which they are treated as zero."""
 _ROUNDING = 1e-6
-"""Fraction of (dp/dt)^2 at the ends by which rounding may exceed a limit."""
+"""Fraction by which (dp/dt)^2 at the ends may be outside its limits because of rounding."""
 _SLOWEST = 1e-3
 """Lowest rate at which rows are linearised, as a fraction of the median rate."""
 _STOPPED = 1e-6
-"""Lowest rate at the stations between the ends, as a fraction of the median rate."""
+"""Lowest rate at stations other than the ends, as a fraction of the median rate."""
 _ROUNDS = 20
 """Maximum number of linearisations."""
 _EXACT = 1e-9
-"""Largest difference between rows and values, as a fraction of the limit, that is due to rounding."""
+"""Difference between rows and values, as a fraction of the limit, that counts as rounding error."""
 _LOOKS_AT_END = 4
-"""Maximum number of linearisations for the largest rate at an end."""
+"""Maximum number of linearisations to find the largest rate at an end."""
 _CREDIBLE = 1e-2
 """Difference between rows and values, as a fraction of the limit, above which a timing is rejected."""
 AGREEMENT = 1e-6
-"""Relative change of the time with which linearisations end by default."""
+"""Relative change of the time at which linearisations end by default."""
 _AT_ONCE = 2048
-"""Number of steps whose bounds are found together: their rows stay in the processor's cache."""
+"""Number of steps whose bounds are computed together, so that their rows stay in the processor's cache."""
 _HELD_BACK = 0.8
-"""Largest fraction of a limit's remaining range at rest by which it may be narrowed."""
+"""Maximum narrowing of a limit, as a fraction of the range that remains at rest."""
 
 
 Narrower = np.ndarray | float
@@ -63,7 +64,7 @@ Narrower = np.ndarray | float
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """A limit as a block of rows: lower <= a u + b x <= upper at every place, or a largest x if a is missing.
+    """A limit as a block of rows: lower <= a u + b x <= upper at every place; without a, a maximum of x.
 
     Attributes
     ----------
@@ -71,11 +72,11 @@ class _Rows:
     by_u : (P, c) ndarray or None
         The coefficients a; None if the limit does not depend on acceleration.
     by_x : (P, c) ndarray
-        The coefficients b; without acceleration, the slope with respect to dp/dt.
+        The coefficients b; if the limit does not depend on acceleration, the slope with respect to dp/dt.
     constant : (P, c) ndarray
-        The value at u = x = 0.
+        Value of the limit at u = x = 0.
     lower, upper : (P, c) ndarray
-        Bounds of the rows; without acceleration, bounds on x.
+        Bounds of the rows; if the limit does not depend on acceleration, bounds on x.
     """
 
     limit: Limit
@@ -87,7 +88,7 @@ class _Rows:
 
     @classmethod
     def of(cls, limit: Limit, path: JointPath, motion: Passage) -> _Rows:
-        """Linearise a limit at a motion, without setting bounds."""
+        """Linearise a limit at a motion. The bounds are not set."""
         partials = limit.partials(motion)
         constant = limit.values(motion)
         rate = motion.rate[:, None]
@@ -104,7 +105,7 @@ class _Rows:
         return cls(limit, by_u, by_x, constant, constant, constant)
 
     def within(self, narrower: Narrower) -> _Rows:
-        """Return the rows with bounds narrower than those of the limit."""
+        """Return the rows with the bounds of the limit, narrowed."""
         below, above = np.broadcast_to(narrower, (2, *self.constant.shape))
         lower = self.limit.lower + below - self.constant
         upper = self.limit.upper - above - self.constant
@@ -118,17 +119,17 @@ class _Rows:
         return replace(self, lower=lower, upper=upper)
 
     def is_tangent_below(self, motion: Passage) -> bool:
-        """Tell whether rows from another motion stay valid: those of magnitudes of vectors, which are convex."""
+        """Tell whether rows from another motion stay valid, as for magnitudes of vectors, which are convex."""
         if self.by_u is None or np.isfinite(self.limit.lower).any():
             return False
         return bool((self._excess(motion) <= _TINY).all())
 
     def error(self, motion: Passage) -> float:
-        """Return the largest difference between the rows and the values along a motion."""
+        """Return the largest difference between the rows and the limit's values along a motion."""
         return float(np.abs(self._excess(motion)).max(initial=0.0))
 
     def _excess(self, motion: Passage) -> np.ndarray:
-        """Return by how much the rows exceed the limit's values along a motion, (P, c)."""
+        """Return the amounts, (P, c), by which the rows exceed the limit's values along a motion."""
         rate = motion.rate[:, None]
         if self.by_u is None:
             values = self.by_x * rate
@@ -146,8 +147,8 @@ class PhasePlane:
     path : JointPath
         Joint path with at least three stations.
     rate : (P,) ndarray, optional
-        Estimate of dp/dt at the stations, 1/s, at which the limits are first linearised. By default it is constant, and
-        the path takes 1 s.
+        Estimate of dp/dt at the stations, 1/s. The limits are first linearised at this rate. By default the rate is
+        constant, and the path takes 1 s.
     """
 
     def __init__(
@@ -214,7 +215,7 @@ class PhasePlane:
     def _set_bounds(
         self, rows: Sequence[_Rows], changed: np.ndarray | None = None
     ) -> None:
-        """Find the bounds on u and x from rows; they are kept where no adjacent step is `changed`, (P - 1,) bool."""
+        """Find the bounds on u and x from rows; keep them where no adjacent step is `changed`, (P - 1,) bool."""
         self._sloped = [block for block in rows if block.by_u is not None]
         ordered = self._sloped + [block for block in rows if block.by_u is None]
         labels = [str(label) for block in ordered for label in block.limit.labels]
@@ -234,7 +235,7 @@ class PhasePlane:
         self._ceiling[self.path.stops] = 0.0
 
     def _stack(self, steps: slice) -> tuple[np.ndarray, ...]:
-        """Stack a, b and the bounds of rows with acceleration side by side for some steps, (S, c) each."""
+        """Stack a, b and the bounds of rows that depend on u side by side for some steps, (S, c) each."""
         blank = [np.empty((len(self._steps[steps]), 0))]
         return tuple(
             np.hstack(
@@ -244,19 +245,19 @@ class PhasePlane:
         )
 
     def _set_part(self, begin: int, end: int) -> None:
-        """Find the bounds in steps and at the stations where these begin; the last step includes the last station."""
+        """Find the bounds in steps and at the stations where these steps begin. The last step includes its end."""
         first = max(begin - 1, 0)
         steps = self._steps[first:end, None]
         a, b, low, high = self._stack(slice(first, end))
         chunk = slice(begin, end)
         inside = slice(begin - first, None)
-        # Midway, x is x + step u, seen from the station before; x at the next station is x + 2 step u.
+        # From x at a station, x midway to the next one is x + step u, and x at the next station is x + 2 step u.
         lines = _as_lines(a + steps * b, b, low, high)
         self._next[:, chunk] = 2.0 * steps[inside] * np.array(lines)[:, inside]
         self._next[0, chunk] += 1.0
         floor, ceiling = kernel.bounds_of_pairs(*lines, _TINY)
         self._floor[chunk] = floor[inside]
-        # The rows at the stations themselves keep u from oscillating between neighbouring steps.
+        # Rows at the stations themselves prevent u from oscillating between neighbouring steps.
         lines = _as_lines(*(to_stations(term, steps) for term in (a, b, low, high)))
         at_stations = kernel.bounds_of_pairs(*lines, _TINY)[1]
         last = end + 1 if end == len(self._steps) else end
@@ -267,7 +268,7 @@ class PhasePlane:
         self._ceiling[stations] = np.min(ceilings, axis=0)
 
     def _set_levels(self) -> None:
-        """Find the largest x at the stations, (P, c), from limits without acceleration."""
+        """Find the largest x at the stations, (P, c), from limits that do not depend on acceleration."""
         levels = [np.empty((len(self.path.p), 0))]
         for block in self._level_rows:
             narrower: Narrower = 0.0
@@ -287,8 +288,8 @@ class PhasePlane:
         Parameters
         ----------
         narrower : mapping of Limit to (P - 1, c) ndarray
-            Amounts; shape (2, P - 1, c) for separate lower and upper bounds. Negative numbers move bounds outwards.
-            Limits that are missing keep their bounds.
+            Amounts by which to narrow each limit; with the shape (2, P - 1, c), separately for lower and upper bounds.
+            Negative numbers move bounds outwards. Limits that are not in the mapping keep their bounds.
         """
         if not (narrower or self._narrower):
             return
@@ -315,7 +316,7 @@ class PhasePlane:
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Largest fraction of a limit that a unit of each joint's acceleration uses on most of the path, (n,)."""
+        """Largest fraction of a limit that one unit of each joint's acceleration uses up on most of the path, (n,)."""
         weights = [np.zeros(self.path.q.shape[1])]
         for limit in self._limits:
             by_qddot = limit.partials(self._motion).qddot
@@ -329,7 +330,7 @@ class PhasePlane:
         """Find the fastest timing with dp/dt given at both ends, 1/s; return None if the joint path cannot be followed.
 
         An infinite rate leaves dp/dt free at that end, which gives the fastest timing of all. Linearisations end when
-        the time changes, or the rows differ from the limits, by no more than a fraction `agreement`.
+        the time changes by no more than a fraction `agreement`, or the rows differ from the limits by no more.
         """
         best: Timing | None = None
         error = np.inf
@@ -337,7 +338,7 @@ class PhasePlane:
         for _ in range(_ROUNDS):
             rate = self.fastest(rates)
             if rate is None:
-                # Rows linearised at a motion that is too fast may allow no motion.
+                # Rows that were linearised at too fast a motion may allow no motion at all.
                 if not self._is_curved:
                     return None
                 factor *= 0.5 if best is None else 0.8
@@ -365,7 +366,7 @@ class PhasePlane:
         return Passage(self._middles, rate, timing.acceleration)
 
     def _slow_down(self, motion: Passage, factor: float) -> Passage:
-        """Return a motion slower by a factor below 1."""
+        """Return a motion slowed down by a factor below 1."""
         acceleration = factor**2 * motion.acceleration
         return Passage(self._middles, factor * motion.rate, acceleration)
 
@@ -383,7 +384,7 @@ class PhasePlane:
         floor = self._floor
         ceiling = self._ceiling
         if math.isinf(last):
-            # One more step, from any x to any other x, leaves x at the end free.
+            # An added step that allows any change of x leaves x at the end free.
             last = 0.0
             floor = np.append(floor, 0.0)
             step = np.array([1.0, -np.inf, np.inf])[:, None, None]
@@ -391,7 +392,7 @@ class PhasePlane:
             rows = np.concatenate([rows, added], axis=1)
         elif last > ceiling[-1] * (1.0 + _ROUNDING):
             return None
-        # The intervals of x from which the end can be reached.
+        # Find the intervals of x from which the end can be reached.
         levels = (floor, ceiling[: len(floor)])
         reach = kernel.go_backwards(
             tuple(rows), levels, last, flat=_TINY, rounding=_ROUNDING
@@ -407,7 +408,7 @@ class PhasePlane:
         squares = kernel.go_forwards(factor, next_upper, (low, high), first)
         if not squares.max() > 0.0:
             return None
-        # The motion does not stop on the way; a stop at a station is an artefact of the grid's width.
+        # The motion does not stop on the way: a stop at a station is an artefact of the grid spacing.
         slowest = (_STOPPED * np.median(np.sqrt(squares))) ** 2
         squares[1:-1] = np.maximum(squares[1:-1], slowest)
         return np.sqrt(squares)
@@ -415,7 +416,7 @@ class PhasePlane:
     def speed_factor(
         self, rate: np.ndarray, acceleration: np.ndarray
     ) -> tuple[float, float, str]:
-        """Find the factor by which a motion may be faster, or has to be slower.
+        """Find the largest factor on the speed of a motion that the limits allow.
 
         Parameters
         ----------
@@ -425,8 +426,7 @@ class PhasePlane:
         Returns
         -------
         tuple of float, float and str
-            The largest factor on its speed; the place, as path coordinate, and the label of the limit that prevents a
-            larger one.
+            The largest factor; the path coordinate and the label of the limit that prevent a larger factor.
         """
         rate = np.sqrt(halfway(rate**2))
         acceleration = halfway(acceleration)
@@ -452,14 +452,14 @@ class PhasePlane:
         return np.sqrt(np.maximum(squares, 0.0))
 
     def active_limit(self, rate: np.ndarray) -> str:
-        """Name the limit that is active on most of the way of a fastest motion, with dp/dt (P,), 1/s."""
+        """Name the limit that is active on most of the path in a fastest motion with rates dp/dt, (P,), 1/s."""
         timing = Timing.of(self.path, rate)
         factors = self._factors(timing.middle_rate, timing.acceleration)
         columns = np.argmin(factors, axis=1)
         return self._labels[int(np.argmax(np.bincount(columns, self._steps)))]
 
     def largest_rate(self, end: int) -> tuple[float, str]:
-        """Find the largest dp/dt, 1/s, that the limits allow next to an end (0 or -1), and the limit that sets it."""
+        """Find the largest dp/dt, 1/s, allowed next to an end (0 or -1), and the limit that allows no more."""
         for _ in range(_LOOKS_AT_END):
             lines = _as_lines(*self._stack(slice(None)))
             slope, lower, upper = (line[end] for line in lines)
@@ -481,12 +481,12 @@ class PhasePlane:
 
 
 def _not_too_slow(rate: np.ndarray) -> np.ndarray:
-    """Return the rates, raised so that friction does not vanish."""
+    """Return rates that are raised where necessary, so that friction does not vanish."""
     return np.maximum(rate, _SLOWEST * np.median(rate))
 
 
 def is_left_out(limit: Limit) -> bool:
-    """Tell whether the phase plane leaves out a limit: limits on jerks, torque rates and means."""
+    """Tell whether the phase plane leaves out a limit, such as limits on jerks, torque rates and means."""
     return limit.order > 2 or limit.guarantee.is_mean
 
 
@@ -494,7 +494,7 @@ def _as_lines(
     a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Turn low <= a u + b x <= high, (P, c) each, into slope x + lower <= u <= slope x + upper."""
-    # A coefficient of zero would give a vertical line; a tiny one gives bounds so far out that they do no harm.
+    # A coefficient of zero would give a vertical line. A tiny one gives bounds so far away that they have no effect.
     a = np.where(np.abs(a) < _TINY, _TINY, a)
     ends = low / a, high / a
     return -b / a, np.minimum(*ends), np.maximum(*ends)

@@ -1,4 +1,4 @@
-"""Solver backends: each has a file and a line in `SOLVERS`. Their libraries are imported when used."""
+"""Solver backends. Each has a file and a line in `SOLVERS`. The libraries of backends are imported when used."""
 
 from importlib.util import find_spec
 
@@ -35,12 +35,12 @@ SOLVERS = {
     backend.NAME: Solver(backend.NAME, backend.run, backend in (ipopt, uno_interior))
     for backend in (uno, ipopt, uno_interior)
 }
-"""Backends by name, in the order in which ``auto`` tries them; it uses only one of the two interior-point methods."""
+"""Backends by name, in the order in which ``auto`` tries them. It tries only one of the two interior-point methods."""
 NAMES = ("auto", *SOLVERS)
 
 
 def solvers_for(name: str) -> tuple[Solver, ...]:
-    """Return the backends to try for a name, in order: one backend, or for ``auto`` one for each method.
+    """Return the backends to try for a name, in order. For ``auto`` there is one for each method, otherwise just one.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
     ------
     UnknownNameError
     NotInstalledError
-        The name is ``ipopt``, and its package, which has wheels for one platform only, is not installed.
+        The name is ``ipopt``, but its package is not installed. There are wheels for one platform only.
     """
     if name == "auto":
         return SOLVERS["uno"], _interior()
@@ -70,9 +70,9 @@ def _interior() -> Solver:
 
 
 def solver_for_large(name: str) -> Solver | None:
-    """Return the solver that ``auto`` tries first for large, sparse programs; None for the name of a single solver.
+    """Return the solver that ``auto`` tries first for large, sparse programs; None if a single solver is named.
 
-    The effort of an interior-point method grows with the number of entries of the Jacobian, that of an active-set
-    method at least with the square of the number of variables.
+    The effort of an interior-point method grows with the number of entries of the Jacobian. That of an active-set
+    method grows at least with the square of the number of variables.
     """
     return _interior() if name == "auto" else None

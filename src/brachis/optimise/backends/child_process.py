@@ -1,9 +1,9 @@
-"""A solver: a backend that gets only safe numbers, runs one solve at a time, and solves large programs in a process.
+"""A solver: a backend with safe inputs and one solve at a time. Large programs are solved in a separate process.
 
 A backend checks the time only between its iterations and evaluations. An active-set method may spend minutes in a
 single quadratic subproblem of thousands of variables, without calling our code. Such solves run in a separate process,
-which can be ended. Solves with the option `apart` do too: where a speed is given, Uno's BQPD may pivot forever in a
-restoration.
+which can be ended. The same applies to solves with the option `apart`: if a speed is given, Uno's BQPD may pivot
+forever in a restoration.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ from brachis.optimise.backends.protocol import (
 )
 
 ENTRIES = 1_000_000
-"""Number of variables times rows above which a solve runs in a separate process. At this size an iteration takes Uno
-0.2 s, and 18 s at nine times this size.
+"""Number of variables times rows above which a solve runs in a separate process. An iteration of Uno takes 0.2 s at
+this size, and 18 s at nine times this size.
 
-If the time limit is below 10 s, smaller problems are solved in a process too, because one iteration may take all of the
-time.
+If the time limit is below 10 s, smaller problems are also solved in a separate process, because one iteration may take
+all of the time.
 """
 _GRACE = 0.25
-"""Seconds after its time limit at which a process is ended. A backend that checks the limit returns before that."""
+"""Seconds after the time limit at which a process is ended. A backend that checks the limit returns before then."""
 _SILENCE = 5.0
 """Seconds without an iteration after which the process of a small program is ended. An iteration takes hundredths of a
 second."""
 _LONGEST = 1e6
-"""Seconds without an iteration after which any process is ended, because the system cannot wait forever."""
+"""Seconds without an iteration after which any process is ended, because the system cannot wait indefinitely."""
 Run = Callable[[SolveMonitor, np.ndarray], SolverReport]
 """Type of a backend's function: ``run(monitor, x)`` solves the monitor's program from x and returns
 ``monitor.report(...)``."""
@@ -71,8 +71,8 @@ class Solver:
     run : callable
         ``run(monitor, x)`` solves the monitor's program from x; see `SolveMonitor`.
     is_interior : bool, optional
-        Whether it is an interior-point method. Such a method moves away from the bounds at first, so a start close to
-        the optimum does not help.
+        Whether the backend uses an interior-point method. Such a method moves away from the bounds at first, so a start
+        close to the optimum does not help.
     """
 
     name: str
@@ -88,14 +88,14 @@ class Solver:
     ) -> SolverReport:
         """Solve `program` from the starting point `x`.
 
-        If a large program is not solved in time, the report has the status `TIME_LIMIT`, and Uno's best feasible
-        iterate as its `x`, or the starting point if there is none. If a solve is ended because it sent nothing, the
-        status is `STALLED`.
+        If a large program is not solved in time, the report has the status `TIME_LIMIT`. Its `x` is Uno's best feasible
+        iterate, or the starting point if there is none. If a solve is ended because it sent nothing, the status is
+        `STALLED`.
 
         Raises
         ------
         KeyboardInterrupt
-            The user interrupted. It is raised once the backend has returned.
+            The user interrupted the solve. The error is raised once the backend has returned.
         """
         bounds = (program.lower, program.upper, program.x_lower, program.x_upper)
         refuse = partial(_report_point, self.name, program, x)
@@ -106,7 +106,7 @@ class Solver:
             return refuse(SolveStatus.EVALUATION_ERROR, message)
         with solve_lock:
             max_entries = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
-            # A daemonic process may not have children; the limit is then checked only between iterations.
+            # A daemonic process may not have children. In it, the time limit is checked only between iterations.
             alone = multiprocessing.current_process().daemon
             entries = len(x) * len(program.lower)
             if (options.apart or entries > max_entries) and not alone:
@@ -122,7 +122,7 @@ def _report_point(
     message: str,
     wall_time: float = 0.0,
 ) -> SolverReport:
-    """Report a solve without a solution; `x`, (v,), takes its place."""
+    """Report a solve without a solution. The point `x`, (v,), is reported in place of the solution."""
     values = (objective_at(program, x), residual(program, x))
     none = np.zeros(len(program.lower))
     return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
@@ -135,10 +135,10 @@ def subprocess_solve(
     options: SolverOptions,
     progress: Progress | None,
 ) -> SolverReport:
-    """Solve in a separate process: start it, pass on its progress, and end it."""
+    """Solve in a separate process: start the process, pass on its progress, and end it."""
     began = time.monotonic()
     until = began + options.time_limit
-    # A fork has the program at once, but only the system libraries of Linux support it safely.
+    # A forked process needs no copy of the program, but forking is safe only with the system libraries of Linux.
     method = "fork" if sys.platform.startswith("linux") else "spawn"
     context: Any = multiprocessing.get_context(method)
     receiver, sender = context.Pipe(duplex=False)
@@ -146,7 +146,7 @@ def subprocess_solve(
         target=_work, args=(sender, solver.run, program, x, options), daemon=True
     )
     try:
-        # The fork touches nothing that threads may hold.
+        # The forked process uses nothing that other threads may have locked.
         with interrupts.block_in_children(), warnings.catch_warnings():
             warnings.filterwarnings(
                 "ignore", message=".*multi-threaded", category=DeprecationWarning
@@ -182,13 +182,13 @@ def subprocess_solve(
 def _receive(
     receiver: Connection, until: float, silence: float, progress: Progress | None
 ) -> tuple[SolverReport | Exception | SolveStatus | None, np.ndarray | None]:
-    """Pass on the progress until the result arrives.
+    """Receive and pass on the progress until the result arrives.
 
     Returns
     -------
     answer : SolverReport, Exception, SolveStatus or None
-        The result; None if it does not arrive in time or at all; `SolveStatus.STALLED` if nothing arrives for
-        `silence`, s.
+        The result; None if no result arrives in time or the process has crashed; `SolveStatus.STALLED` if nothing
+        arrives for `silence`, s.
     best : (v,) ndarray or None
         The best feasible iterate that was received.
     """
@@ -216,7 +216,7 @@ def _work(
 ) -> None:
     """Solve within the separate process.
 
-    The system ends the process when its time is up, whatever it is doing, even if nothing waits for it any more.
+    The system ends the process when its time is up, whatever it is doing, even if the parent process no longer exists.
     """
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     if np.isfinite(options.time_limit):
@@ -225,7 +225,7 @@ def _work(
     sent: np.ndarray | None = None
 
     def progress(iteration: int, objective: float) -> None:
-        """Send an iteration to the parent process, with any better feasible iterate."""
+        """Send an iteration to the parent process. If there is a new best feasible iterate, send it too."""
         nonlocal sent
         best = None if monitor.best is None else monitor.best[1]
         sender.send((iteration, objective, None if best is sent else best))

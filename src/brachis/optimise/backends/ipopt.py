@@ -1,4 +1,4 @@
-"""IPOPT through the ipyopt wheel: an interior-point method, used as a second opinion where Uno fails.
+"""IPOPT, an interior-point method, through the ipyopt wheel. It is used as a second opinion if Uno fails.
 
 The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
 """
@@ -36,14 +36,14 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     def or_nan(
         function: Function, at_stop: float = np.nan
     ) -> Callable[[np.ndarray, np.ndarray], None]:
-        """Wrap a function so that it writes NaN where it has no value, and `at_stop` once the solve has to stop."""
+        """Wrap a function: write NaN where the function has no value, and `at_stop` once the solve has to stop."""
 
         def write(point: np.ndarray, out: np.ndarray) -> None:
             """Write the values at a point."""
             try:
                 out[:] = function(point)
             except UnreachableError:
-                # After NaN, IPOPT shortens the step.
+                # When it gets NaN, IPOPT shortens the step.
                 out[:] = at_stop if monitor.must_stop() else np.nan
 
         return write
@@ -57,7 +57,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         barrier: float,
         *_: float,
     ) -> bool:
-        """Tell whether to continue after an iteration."""
+        """Tell whether IPOPT may continue after an iteration."""
         return not monitor.ends_interior(objective, infeasibility, barrier)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             "constr_viol_tol": options.tolerance,
             "max_iter": options.max_iterations,
             "hessian_approximation": "limited-memory",
-            # Including the approximation in the linear system takes half the time of correcting its solution.
+            # Including the approximation in the linear system takes half as long as correcting the solution afterwards.
             "limited_memory_aug_solver": "extended",
             "mu_strategy": "adaptive",
             "bound_relax_factor": 0.0,

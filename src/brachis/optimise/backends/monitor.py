@@ -1,4 +1,4 @@
-"""The layer between a program and a backend: it counts, interrupts, measures the time, and judges the solution."""
+"""The layer between program and backend. It counts, measures time, handles interrupts, and judges the solution."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from brachis.optimise.backends.protocol import (
 )
 
 _LARGEST = 1e30
-"""Largest number passed to a backend. Backends multiply values, and the square of a larger number may overflow and
-crash the interpreter."""
+"""Largest number passed to a backend. Backends multiply numbers. The square of a larger number may overflow and crash
+the interpreter."""
 
 _SMALL_BARRIER = 1e-5
 """Largest barrier parameter at which iterates show whether the solve has settled."""
 _NEARLY_FEASIBLE = 1e-3
-"""Violation of rows up to which an iterate counts; ten times the tolerance applies instead if that is larger."""
+"""Violation of rows up to which an iterate counts. If ten times the tolerance is larger, it applies instead."""
 
 Function = Callable[[np.ndarray], float | np.ndarray]
 """A function of the variables of a program."""
 
 
 class SolveMonitor:
-    """Watches one solve.
+    """A monitor that watches one solve.
 
     A backend written in another language may lose Python exceptions. This includes a KeyboardInterrupt, which Python
-    would raise at the first line of any callback. The backend must therefore see no error other than UnreachableError.
-    The monitor is a context manager around the backend that stores such errors. The backend then has to stop, and
-    `report` raises the error.
+    would raise at the first line of any callback. The backend must therefore get no error except UnreachableError.
+    The monitor is a context manager around the call of the backend, and stores such errors. The backend then has to
+    stop, and `report` raises the error.
 
     Parameters
     ----------
@@ -76,18 +76,18 @@ class SolveMonitor:
         self._began = time.perf_counter()
 
     def __enter__(self) -> Self:
-        """Take over SIGINT if this thread is allowed to and the signal is not ignored."""
+        """Install a handler for SIGINT, if this thread is allowed to do so and the signal is not ignored."""
         ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         if threading.current_thread() is threading.main_thread():
             self._during = signal.SIG_IGN if ignored else self._keep_interrupt
             self._handler = signal.signal(signal.SIGINT, self._during)
             remembers = isinstance(self._handler, SigintHandler)
-            if remembers and self._handler.pending:  # not checked until now
+            if remembers and self._handler.pending:  # not checked before
                 self.failure = KeyboardInterrupt()
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Restore the handler of SIGINT."""
+        """Restore the previous handler for SIGINT."""
         if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
 
@@ -112,17 +112,17 @@ class SolveMonitor:
         return self.must_stop()
 
     def keep(self, x: np.ndarray, objective: float, infeasibility: float) -> None:
-        """Store an iterate if it is the best feasible one so far."""
+        """Store an iterate if it is the best feasible iterate so far."""
         is_feasible = infeasibility <= self._feasible_below
         if is_feasible and (self.best is None or objective < self.best[0]):
             self.best = objective, x
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
-        """Tell whether iterates have stopped getting better; the result is stored in `stagnated`.
+        """Tell whether iterates have stopped improving. Store the result in `stagnated`.
 
         If no limit affects a redundant joint, for example the roll of a tool, there is a set of equally fast motions. A
-        solver wanders within this set without ever meeting its optimality conditions. An iterate counts with its
-        objective times 1 + violation. The last one has to be feasible.
+        solver wanders within this set without ever meeting its optimality conditions. Iterates are compared by their
+        objective times 1 + violation. The last iterate has to be feasible.
         """
         needed = objective * (1.0 + infeasibility)
         counts = infeasibility <= max(_NEARLY_FEASIBLE, self._feasible_below)
@@ -140,17 +140,17 @@ class SolveMonitor:
     ) -> bool:
         """Tell whether an interior-point method has to stop after an iteration, or has settled.
 
-        With a large barrier parameter the motion is slower than at its start, which is no sign that the solve has
-        settled.
+        With a large barrier parameter, iterates are slower than the starting point. This does not mean that the solve
+        has settled.
         """
         stop = self.between_iterations(objective)
         violation = infeasibility if barrier <= _SMALL_BARRIER else np.inf
         return self.has_settled(objective, violation) or stop
 
     def must_stop(self) -> bool:
-        """Tell whether the user has interrupted or the time or the evaluations are used up."""
+        """Tell whether the user has interrupted the solve, or its time or its evaluations are used up."""
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
-        # A solver that needs more evaluations is stuck at a point out of reach.
+        # A solver that needs more evaluations than this is stuck at a point that cannot be evaluated.
         self.exhausted = self._evaluations > 10 * self.options.max_iterations
         return self.timed_out or self.exhausted or self.failure is not None
 
@@ -163,7 +163,7 @@ class SolveMonitor:
         return self._finite(self.program.gradient, x)
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Return the rows at x; raise UnreachableError if one is not finite, or once the solve has to stop."""
+        """Return the rows at x; raise UnreachableError if a row is not finite, or once the solve has to stop."""
         return self._evaluate(self.program.rows, x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -172,7 +172,7 @@ class SolveMonitor:
 
     def _evaluate(self, function: Function, x: np.ndarray) -> np.ndarray:
         if self._handler is not None:
-            # A backend may have installed its own handler since.
+            # The backend may have installed its own handler in the meantime.
             signal.signal(signal.SIGINT, self._during)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
@@ -196,7 +196,7 @@ class SolveMonitor:
         except UnreachableError:
             raise
         except (KeyboardInterrupt, Exception) as error:
-            # Compiled backends lose exceptions raised within them, for example by a user-defined limit.
+            # Compiled backends lose exceptions raised in callbacks, for example by a user-defined limit.
             self.failure = error
             raise UnreachableError("the solve has to stop") from error
         if not is_usable(values):
@@ -211,7 +211,7 @@ class SolveMonitor:
         multipliers: np.ndarray,
         message: str,
     ) -> SolverReport:
-        """Judge the solution by its residuals and report it.
+        """Report the solution, with a status that is based on its residuals.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class SolveMonitor:
 
 
 def is_usable(values: np.ndarray) -> bool:
-    """Tell whether all values are finite and small enough that their products are finite too; NaN is not."""
+    """Tell whether all values are finite, and small enough for their products to be finite too."""
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
 
@@ -266,7 +266,7 @@ def residual(program: NonlinearProgram, x: np.ndarray) -> float:
 
 
 def row_slack(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
-    """Return distances of rows from their nearer bound, (c,): negative if violated, -inf if x cannot be evaluated."""
+    """Return distances of rows from their nearer bounds, (c,); negative if violated, -inf if x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             rows = program.rows(x)

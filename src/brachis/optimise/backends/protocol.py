@@ -12,11 +12,11 @@ import numpy as np
 from brachis.common.summary import Summary
 
 FEASIBLE = 1e-5
-"""Violation of rows and bounds, dimensionless, that refinement can repair."""
+"""Largest violation of rows and bounds, dimensionless, that refinement can still remove."""
 
 
 class SolveStatus(enum.Enum):
-    """How a solve ended; the value is the advice to the user."""
+    """How a solve ended. The value is the text shown to the user, with advice."""
 
     OPTIMAL = "optimal: the first-order conditions are met"
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
@@ -31,7 +31,7 @@ class SolveStatus(enum.Enum):
 
     @property
     def usable(self) -> bool:
-        """Whether the solution satisfies the rows."""
+        """Whether a solve with this status gave a solution that satisfies the rows."""
         return self in (
             SolveStatus.OPTIMAL,
             SolveStatus.STAGNATED,
@@ -47,10 +47,10 @@ class Curvature:
     Attributes
     ----------
     hessian : callable
-        ``hessian(x, objective_multiplier, multipliers)`` returns the known part, (v, v), for multipliers of the
-        objective, 0 in a restoration, and of the rows, (c,).
+        ``hessian(x, objective_multiplier, multipliers)`` returns the known part, (v, v). The multiplier of the
+        objective is 0 in a restoration; the multipliers of the rows are (c,).
     multipliers : (c,) ndarray
-        A first guess. It is used until the solver's multipliers give the known part a significant size.
+        First guess of the multipliers. It is used until the known part is large enough with the solver's multipliers.
     """
 
     hessian: Callable[[np.ndarray, float, np.ndarray], np.ndarray]
@@ -58,18 +58,18 @@ class Curvature:
 
 
 class NonlinearProgram(Protocol):
-    """A sparse nonlinear program; `brachis.optimise.program.Program` is one."""
+    """Interface of a sparse nonlinear program, for example `brachis.optimise.program.Program`."""
 
     x_lower: np.ndarray
     x_upper: np.ndarray
 
     @property
     def jacobian_rows(self) -> np.ndarray:
-        """Rows of the entries of the Jacobian."""
+        """Row of each entry of the Jacobian."""
 
     @property
     def jacobian_columns(self) -> np.ndarray:
-        """Columns of the entries of the Jacobian."""
+        """Column of each entry of the Jacobian."""
 
     @property
     def lower(self) -> np.ndarray:
@@ -80,19 +80,19 @@ class NonlinearProgram(Protocol):
         """Upper bounds of the rows."""
 
     def objective(self, x: np.ndarray) -> float:
-        """Return the value to minimise; raise UnreachableError where it does not exist."""
+        """Return the value to minimise; raise UnreachableError where the value does not exist."""
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Return the gradient of the objective; raise UnreachableError as `objective` does."""
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Return the values of the rows; raise UnreachableError where they do not exist."""
+        """Return the values of the rows; raise UnreachableError where the values do not exist."""
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Return the entries of the Jacobian on its pattern; raise UnreachableError as `rows` does."""
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
-        """Return the known part of the Lagrangian's Hessian in a solve from x; None if no part is known."""
+        """Return the known part of the Lagrangian's Hessian, for a solve from x; None if no part is known."""
 
 
 @dataclass(frozen=True)
@@ -105,26 +105,26 @@ class SolverOptions:
         Tolerance on constraint violation and optimality, dimensionless.
     max_iterations : int
     time_limit : float
-        Time limit, s. With 0 no solve is started.
+        Time limit, s. With 0, no solve is started.
     progress : float
-        Smallest relative gain of the last iterates over the best earlier one; with less, a solve has stagnated. An
-        iterate counts with its objective times 1 + violation, provided that it violates rows by no more than 1e-3 or
-        ten tolerances.
+        Minimum relative gain of the last iterates over the best earlier iterate; with less, a solve has stagnated.
+        Iterates are compared by their objective times 1 + violation. Only those that violate rows by at most 1e-3, or
+        ten times the tolerance, are compared.
     patience : int
-        Number of iterates that count as the last ones.
+        Number of iterates that count as the last iterates.
     first_step : float
-        Factor on the initial radius of the trust region, for starts close to the solution. Used by Uno.
+        Factor on the initial radius of the trust region, below 1 for starts close to the solution. Used by Uno.
     widening : float
-        Largest widening of a row's bound, as a fraction of it; at most the tolerance. Used by Uno.
+        Maximum widening of a row's bound, as a fraction of the bound; no more than the tolerance. Used by Uno.
     anywhere : bool
-        Whether iterates far from stationarity count too. This suits solves that need only an approximate solution, but
-        not those in which the solver creeps. Used by Uno; IPOPT always counts all iterates.
+        Whether iterates far from stationarity are compared too. This is suitable if an approximate solution is enough,
+        but not if the solver creeps. Used by Uno; IPOPT always compares all iterates.
     apart : bool
-        Whether the solve runs in a separate process, which is ended if it sends nothing for a long time. This takes
-        about 0.07 s more.
+        Whether the solve runs in a separate process, which is ended if it sends nothing for a long time. The process
+        takes about 0.07 s to start.
     learnt : (v, v) ndarray, optional
-        `SolverReport.learnt` of an earlier solve with the same variables. Uno starts with it if part of the problem's
-        Hessian is known.
+        `SolverReport.learnt` of an earlier solve with the same variables. Uno starts with this matrix if part of the
+        problem's Hessian is known.
     """
 
     tolerance: float = 1e-6
@@ -147,21 +147,21 @@ class SolverReport(Summary):
     ----------
     solver : str
     status : SolveStatus
-        Status, judged by the residuals below and not only by the backend's own report.
+        Status, based on the residuals below and not only on the backend's own report.
     x : (v,) ndarray
     objective : float
         Objective, in s if it is the end time; infinite if `x` cannot be evaluated.
     violation : float
         Largest violation of rows and bounds, recomputed by brachis; infinite if `x` cannot be evaluated.
     multipliers : (c,) ndarray
-        Multipliers of the rows, with L = objective - multipliers . rows; zeros if the backend gives none.
+        Multipliers of the rows, with L = objective - multipliers . rows. Zeros if the backend gives no multipliers.
     iterations : int
     wall_time : float
-        s.
+        Wall time of the solve, s.
     message : str
         Message of the backend.
     learnt : (v, v) ndarray or None
-        Approximation of the Lagrangian's Hessian without its known part, if the backend built one.
+        Approximation of the Lagrangian's Hessian without the known part, if the backend built an approximation.
     """
 
     solver: str
@@ -182,4 +182,4 @@ class SolverReport(Summary):
 
 
 Progress = Callable[[int, float], None]
-"""Called between iterations with the iteration's number and the objective in seconds; may raise KeyboardInterrupt."""
+"""Function called between iterations with their number and the objective in s. It may raise KeyboardInterrupt."""

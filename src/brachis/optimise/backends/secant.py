@@ -1,18 +1,19 @@
-"""The Hessian of the Lagrangian of a program for which part of it is known.
+"""The Hessian of a program's Lagrangian, of which a part is known.
 
 A mean of squares over the motion is curved in as many directions as there are variables. An approximation from the last
-few steps captures too few of them. First derivatives give the Gauss-Newton part B, and a matrix A approximates the
-rest. Let the gradient of the Lagrangian change by y in a step s, and let B belong to the new point. A is first scaled
-by min(1, |s.(y - B s)| / |s.A s|), and then changed by a symmetric update of rank two, so that
+few steps captures too few of these directions. First derivatives give the Gauss-Newton part B, and a matrix A
+approximates the rest of the Hessian. Let the gradient of the Lagrangian change by y in a step s, and let B belong to
+the new point. A is first scaled by min(1, |s.(y - B s)| / |s.A s|). A symmetric update of rank two then changes A so
+that
 
     A s = y - B s.
 
 Scaling and update are those of J. E. Dennis, D. M. Gay and R. E. Welsch, An adaptive nonlinear least-squares algorithm,
-ACM Transactions on Mathematical Software 7, 1981. Their problems have residuals only, and they require a different A s;
-here other rows are curved as well.
+ACM Transactions on Mathematical Software 7, 1981. They require a different A s, because their problems have residuals
+only. Here, other rows are curved as well.
 
-Negative eigenvalues of A + B are made positive, so that subproblems are convex and steps along such directions are
-short.
+Negative eigenvalues of A + B are replaced by positive ones, so that subproblems are convex and steps along the
+corresponding directions are short.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 from brachis.optimise.backends.protocol import Curvature, NonlinearProgram
 
 _ENOUGH = 0.01
-"""Trace of B, as a fraction of its trace with the first guess, above which the solver's multipliers are used."""
+"""Trace of B, relative to the one with the guessed multipliers, above which the solver's multipliers are used."""
 _LEAST_COSINE = 1e-8
 """Cosine between s and y below which A is not updated, because the update divides by s.y."""
 
@@ -35,12 +36,12 @@ class SecantHessian:
     program : NonlinearProgram
     known : Curvature
     learnt : (v, v) ndarray, optional
-        Initial A; zero by default.
+        Initial matrix A; zero by default.
 
     Attributes
     ----------
     learnt : (v, v) ndarray
-        The matrix A.
+        The matrix A, as updated so far.
     """
 
     def __init__(
@@ -88,12 +89,12 @@ class SecantHessian:
             guess = self._known.hessian(x, 1.0, self._multipliers)
             self._least_trace = float(_ENOUGH * np.trace(guess))
         if np.trace(known) < self._least_trace:
-            # Without curvature, steps are too long: use the last multipliers that gave enough.
+            # Without curvature, steps would be too long: use the last multipliers that gave enough curvature.
             multipliers = self._multipliers
             factor = objective_multiplier or 1.0
             known = self._known.hessian(x, factor, multipliers)
             if objective_multiplier == 0.0:
-                # In a restoration, more curvature would keep steps short, and feasible points may be far away.
+                # In a restoration, more curvature would make steps short, but feasible points may be far away.
                 known *= self._least_trace / np.trace(known)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers
@@ -125,7 +126,7 @@ class SecantHessian:
         return np.bincount(columns, terms, len(self.learnt))
 
     def _update(self, s: np.ndarray, y: np.ndarray, known: np.ndarray) -> None:
-        """Update A after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module."""
+        """Update A after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module docstring."""
         s_y = s @ y
         if not s_y > _LEAST_COSINE * np.linalg.norm(s) * np.linalg.norm(y):
             return

@@ -1,7 +1,7 @@
-"""Uno (Vanaret and Leyffer): an active-set SQP method with a filter and a trust region, the default solver.
+"""Uno (Vanaret and Leyffer), the default solver: an active-set SQP method with a filter and a trust region.
 
-Bang-bang optima are vertices of the feasible set, which an active-set method reaches in a few steps. The Hessian is
-Uno's limited-memory approximation, or that of `secant` where part of it is known. Subproblems are solved by Uno's BQPD.
+Bang-bang optima are vertices of the feasible set. An active-set method reaches vertices in a few steps. The Hessian is
+Uno's limited-memory approximation, or that of `secant` if part of the Hessian is known. Uno's BQPD solves subproblems.
 https://github.com/cvanaret/Uno
 """
 
@@ -26,9 +26,10 @@ from brachis.optimise.backends.secant import SecantHessian
 NAME = "uno"
 
 _RESTARTS = ((1.0, False), (1.0, True), (0.2, True))
-"""Initial trust region radius, and whether the variables are scaled: for the first run, and after stalls or breakdowns.
+"""Initial trust region radius and whether variables are scaled, for the first run and after each stall or breakdown.
 
-Uno's default radius of 10 stalls on 1 of 8 random lines. Where nothing fails, scaled variables are a tenth slower.
+With Uno's default radius of 10, solves stall on 1 of 8 random lines. If nothing fails, scaled variables are a tenth
+slower.
 """
 _STATUS = {
     "FEASIBLE_KKT_POINT": SolveStatus.OPTIMAL,
@@ -46,13 +47,13 @@ _STOPPED = {
 
 
 _FAR = 0.5
-"""Violation of a limit, as a fraction of it, above which a restoration is far from feasible motions."""
+"""Violation of a limit, as a fraction of it, above which a restoration counts as far from feasible motions."""
 _LOST_AFTER = 15
-"""Iterations after which a restoration is abandoned,"""
+"""Number of iterations after which a restoration is abandoned if its violation has hardly decreased."""
 _LOST = 0.9
-"""if more than this fraction of the violation is left."""
+"""A restoration is abandoned if more than this fraction of the violation is left after `_LOST_AFTER` iterations."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""Multiples of this, modulo 1, are spread evenly."""
+"""Golden ratio: its multiples, modulo 1, are spread evenly."""
 
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
@@ -63,7 +64,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             units = _units(monitor.program, x) if scaled else np.ones(len(x))
             stall = _Stall(monitor, units)
             hessian = SecantHessian.of(monitor.program, x, learnt)
-            learnt = None  # it may have caused the failure
+            learnt = None  # this matrix may have caused the failure
             settings = {"TR_radius": radius * monitor.options.first_step}
             result = call_uno(monitor, x, units, settings, stall, hessian)
             x = units * np.array(result.primal_solution)
@@ -91,7 +92,7 @@ def report_result(
     x: np.ndarray,
     status: SolveStatus | None = None,
 ) -> SolverReport:
-    """Report Uno's result, with x, (v,), as the solution; `status` replaces Uno's own status."""
+    """Report Uno's result, with x, (v,), as the solution. If `status` is given, it replaces Uno's own status."""
     ending = result.optimization_status.name
     solution = result.solution_status.name
     if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
@@ -104,10 +105,10 @@ def report_result(
 
 @cache
 def _solve_first_program() -> None:
-    """Minimise x^2, once per process.
+    """Minimise x^2, once in each process.
 
-    Rounding within Uno depends on the first program that a process solves. Without this program, results would depend
-    on what was planned before.
+    Rounding errors in Uno depend on the first program that a process solves. Without this program, results would depend
+    on earlier plans.
     """
     import unopy
 
@@ -123,7 +124,7 @@ def _solve_first_program() -> None:
 
 
 def _backend(settings: dict[str, Any]) -> Any:
-    """Return Uno's solver with settings and without output."""
+    """Return Uno's solver with the given settings and without output."""
     import unopy
 
     backend = unopy.UnoSolver()
@@ -136,7 +137,7 @@ def _backend(settings: dict[str, Any]) -> Any:
 
 
 def _units(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
-    """Return units of the variables, (v,), in which the largest slopes of rows at x become their square roots.
+    """Return units of the variables, (v,). In them the largest slopes of rows at x become their square roots.
 
     Uno's subproblem solver breaks down if slopes differ by four orders of magnitude, as with 100 intervals in a short
     time.
@@ -150,11 +151,11 @@ class _Stall:
     """Uno's termination callback, which also stops solves that creep.
 
     Occasionally the first steps spoil the Hessian approximation. Steps then stay tiny for hundreds of iterations, far
-    from stationarity. Or a subproblem fails, and Uno stays in restoration at a feasible point forever, where its
-    stationarity measure means nothing. A new approximation, scaled variables and a smaller trust region solve both
-    problems.
+    from stationarity. In other cases a subproblem fails, and Uno stays forever in restoration at a feasible point,
+    where its stationarity measure is meaningless. A new approximation, scaled variables and a smaller trust region
+    solve both problems.
 
-    Nothing helps a restoration that creeps while a limit is far exceeded: no motion close to the start is feasible.
+    If a restoration creeps while a limit is far exceeded, nothing helps: no motion close to the start is feasible.
     """
 
     def __init__(self, monitor: SolveMonitor, units: np.ndarray) -> None:
@@ -199,7 +200,7 @@ def call_uno(
     terminate: Callable[..., bool],
     hessian: SecantHessian | None = None,
 ) -> Any:
-    """Call Uno, which is untyped, once from x, (v,); its variables are x in `units`."""
+    """Call Uno, which is untyped, once from x, (v,). Uno's variables are x / `units`."""
     import unopy
 
     _solve_first_program()
@@ -214,7 +215,7 @@ def call_uno(
     )
 
     def scale(function: Function, factors: np.ndarray | float) -> Callable[..., None]:
-        """Wrap a function so that it accepts scaled variables and writes its values times `factors`."""
+        """Wrap a function so that its variables are scaled and its values multiplied by `factors`."""
 
         def write(point: np.ndarray, out: np.ndarray) -> None:
             out[:] = factors * function(units * point)
@@ -256,12 +257,13 @@ def call_uno(
 def _spread_bounds(
     lower: np.ndarray, upper: np.ndarray, max_widening: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Widen bounds of rows, (c,), by up to a fraction `max_widening`, each by a different amount.
+    """Widen bounds of rows, (c,), each by a different amount, up to a fraction `max_widening`.
 
-    At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take an
-    active-set solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason.
-    Bounds of zero stay, because a condition on a sign is strict. Rows with equal bounds stay as well. Bounds above 1
-    are widened as if they were 1.
+    In the fastest motion, hundreds of neighbouring rows reach their bounds together. The subproblems are then
+    degenerate, and take an active-set solver seconds instead of hundredths of a second. Simplex codes perturb bounds
+    for the same reason.
+    Bounds of zero do not change, because a condition on a sign is strict. Rows with equal bounds do not change either.
+    Bounds above 1 are widened as if they were 1.
     """
     widening = max_widening * (np.arange(1, len(lower) + 1) * _GOLDEN % 1.0)
     widening[lower == upper] = 0.0
@@ -281,7 +283,7 @@ def _set_hessian(
     def write(
         point: np.ndarray, multiplier: float, multipliers: np.ndarray, out: np.ndarray
     ) -> None:
-        """Write the lower triangle in the scaled variables."""
+        """Write the lower triangle of the Hessian with respect to the scaled variables."""
         matrix = hessian(units * point, multiplier, np.array(multipliers))
         out[:] = factors * matrix[rows, columns]
 

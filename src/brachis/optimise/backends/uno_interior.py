@@ -1,7 +1,7 @@
 """Uno's interior-point method with MUMPS, which ``auto`` uses if IPOPT is not installed.
 
-IPOPT's Python package has wheels only for Linux on x86_64, while Uno's wheels include MUMPS on every platform. The
-Hessian is Uno's limited-memory approximation, similar to IPOPT's.
+IPOPT's Python package has wheels only for Linux on x86_64. Uno's wheels include MUMPS on every platform. The Hessian is
+Uno's limited-memory approximation, which is similar to IPOPT's.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from brachis.optimise.backends.uno import call_uno, report_result
 
 NAME = "uno_interior"
 _FIRST_GAP = 0.3
-"""Initial barrier parameter, summed over all rows, as a fraction of the objective.
+"""Sum of the initial barrier parameter over all rows, as a fraction of the objective.
 
-Programs over the path start within 1 % of their optimum. With Uno's default of 0.1 a solve first moves away from it,
-and 3 of 8 solves are not back after 100 iterations. With a third of the present value, 2 of 8 end up to 0.7 % slower.
+Programs over the path start within 1 % of their optimum. With Uno's default of 0.1 a solve first moves away from the
+optimum, and 3 of 8 solves do not return to it within 100 iterations. With a third of the present value, 2 of 8 motions
+are up to 0.7 % slower.
 """
 
 
@@ -32,7 +33,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         *_, objective_multiplier, _infeasibility, _stationarity, complementarity = state
         iterate = np.array(point[: len(x)])  # a restoration appends variables
         objective = objective_at(program, iterate)
-        violation = residual(program, iterate)  # Uno's own value is for scaled rows
+        violation = residual(program, iterate)  # Uno's own value refers to scaled rows
         if objective_multiplier == 0.0:
             complementarity = np.inf
         else:
