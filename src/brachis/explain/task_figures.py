@@ -1,9 +1,9 @@
 """The cost of figures of the task that are not bounds of rows in a program: process speeds and blends.
 
 At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is
-the change of L if such a figure changes and the free variables stay the same; durations that follow from a speed change
-with it. If the joint path follows from the path of the tool and only its timing is optimal, dt_E is the change of the
-least time along it.
+the change of L if such a figure changes and the free variables stay the same. Durations that follow from a given speed
+change with that speed. If the joint path follows from the path of the tool and only its timing is optimal, dt_E is the
+change of the least time along it.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ PROCESS_SPEED_KEY = "tool_limits.process_speed"
 def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
     """Return the Lagrangian as a function of a program and a point.
 
-    It has only the rows of limits and links, because the others change if the tool moves at an end. Limits without
-    active rows are left out: distances of bodies take long to compute.
+    It has only the rows of limits and links, because the other rows change if the tool moves at an end of the path.
+    Limits without active rows are left out, because distances between bodies take long to compute.
     """
     active = multipliers.active_set
     of_rows = multipliers.weights[: len(active.rows)]
@@ -134,12 +134,12 @@ class OptimalMotion:
 
     @cached_property
     def _unchanged(self) -> float:
-        """Value of the solution itself."""
+        """`value` at the solution of the unchanged problem, s."""
         return self.value(self.program, self.x)
 
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
-    """Prescribe as many derivatives as before: those of redundant joints stay zero if the tool now moves at an end."""
+    """Prescribe as many derivatives as before; for redundant joints they stay zero if the tool now moves at an end."""
     sides: dict[str, Any] = {}
     for side in ("start", "end"):
         pairs = zip(getattr(before, side), getattr(after, side), strict=True)
@@ -151,7 +151,7 @@ def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
 
 
 def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
-    """Carry a motion, (v,), over to a phase that travels the same leg at other path coordinates, or another speed."""
+    """Carry a motion, (v,), over to a phase that travels the same leg at other path coordinates or another speed."""
     carried = x.copy()
     if target.time_law is not None:
         carried[0] = target.time_law.duration
@@ -164,7 +164,7 @@ def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
 
 
 TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
-"""A figure of a task whose cost is not known yet, and a function from a value of it to the changed problem."""
+"""A figure of a task whose cost is not known yet, and a function that returns the problem with a new value of it."""
 
 
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
@@ -212,7 +212,7 @@ def _speeds(problem: Problem) -> Iterator[TaskFigure]:
 
 
 def _blends(problem: Problem) -> Iterator[TaskFigure]:
-    """List blends; those of the same size share one figure, and so do all blends along the points of one file."""
+    """List blends; blends of the same size share one figure, and so do all blends along the points of one file."""
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()
     places: dict[int | None, tuple[float, float]] = {}

@@ -7,7 +7,7 @@ such a curve has two values, as ratios to its torque at rest T_0, with T rounded
 
     (tau - T(qdot)) / T_0 <= 0,        (-tau - T(qdot)) / T_0 <= 0.
 
-The level first part of a curve is the plain torque limit.
+If the first part of a curve is level, it acts as a plain torque limit.
 
 The rounded curve is twice continuously differentiable and nowhere above the given curve. Let m_k be the slopes between
 the points of the curve, and w_k half the width of the rounding of the corner at speed v_k. As an even function of the
@@ -49,12 +49,12 @@ class RobotLimit(Limit):
     ----------
     robot : Robot
     figure : float
-        Largest magnitude of the figure, in the unit of the row.
+        Maximum magnitude of the figure, in the unit of the row.
     """
 
     longer_time = "relieves"
     subject: str
-    """What the figure belongs to, for labels."""
+    """Name of the part that has the figure, for labels."""
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._robot = robot
@@ -90,7 +90,7 @@ class TotalPowerLimit(RobotLimit):
 
 
 WIDTH = 0.002
-"""Half the width of a rounded corner, as a fraction of the shorter of the two pieces beside it."""
+"""Half the width of a rounded corner, as a fraction of the shorter of the two pieces next to the corner."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class RoundedCurve:
     corners : (k,) ndarray
         Speeds of the corners, rad/s or m/s.
     widths : (k,) ndarray
-        Half the widths of the rounded corners.
+        Half-widths of the rounded corners.
     bends : (k,) ndarray
         Changes of slope at the corners.
     """
@@ -118,8 +118,8 @@ class RoundedCurve:
     def below(cls, curve: TorqueSpeedCurve) -> RoundedCurve | None:
         """Round a curve; return None for a curve that does not fall.
 
-        Its last slope continues until no torque is left. If the curve begins with a level part, this part is left out,
-        and the next piece is extended to speed 0: the level itself is a plain torque limit.
+        The last slope of the curve continues until the torque is zero. If the curve begins with a level part, this part
+        is left out, and the next piece is extended to speed 0: the level part itself is a plain torque limit.
         """
         speed, torque = np.array(curve).T
         slope = np.diff(torque) / np.diff(speed)
@@ -144,7 +144,7 @@ class RoundedCurve:
         return cls(stall_torque, corners, widths[first:], np.diff(slope, prepend=0.0))
 
     def _distances(self, velocity: np.ndarray) -> np.ndarray:
-        """Return by how much velocities, (K,), and their negatives exceed those of the corners, (2, K, k)."""
+        """Return by how much velocities, (K,), and their negatives exceed the speeds of the corners, (2, K, k)."""
         return np.array([velocity, -velocity])[..., None] - self.corners
 
     def values(self, velocity: np.ndarray) -> np.ndarray:
@@ -163,7 +163,7 @@ class RoundedCurve:
 
 
 class TorqueSpeedLimit(Limit):
-    """Torques in both directions, relative to the joints' curves.
+    """Limits on torques in both directions, relative to the torque-speed curves of the joints.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class TorqueSpeedLimit(Limit):
         return np.repeat([function(*pair) for pair in pairs], 2, axis=0).T
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Compute the torques in excess of the curves at the joints' velocities, over the torques at rest, (K, c)."""
+        """Compute by how much torques exceed the curves at their velocities, divided by the torques at rest, (K, c)."""
         tau = motion.torque(self._robot)[:, self._joints]
         allowed = self._by_curve(RoundedCurve.values, motion)
         excess = self._signs * tau - allowed

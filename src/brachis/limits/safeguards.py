@@ -10,7 +10,7 @@ from brachis.kinematics import JointMap
 from brachis.limits.protocol import Guarantee, JointStates, Limit, Partials, Role
 
 MARGIN = 5e-3
-"""Least branch margin, dimensionless. Closer to the boundary, non-redundant joints move too fast for any collocation
+"""Minimum branch margin, dimensionless. Closer to the boundary, non-redundant joints move too fast for any collocation
 grid."""
 HELD_BACK = 1e-4
 """A branch margin that is closer than this to its bound is considered to hold the motion back."""
@@ -23,9 +23,10 @@ class BranchMargin(Limit):
     ----------
     joint_map : JointMap
     at_start : (c,) ndarray
-        Margins of the start posture. If half of one is smaller than `margin`, it is the least margin.
+        Branch margins of the start posture. If half of such a margin is smaller than `margin`, this half is the
+        minimum.
     margin : float
-        Least margin, dimensionless.
+        Minimum margin, dimensionless.
     """
 
     kind = "branch_margin"
@@ -60,6 +61,6 @@ class BranchMargin(Limit):
 def build_branch_margins(
     joint_map: JointMap, margin: float = MARGIN
 ) -> tuple[BranchMargin, ...]:
-    """Build the limit of a joint map; empty if the map has no margins."""
+    """Build the limit on the branch margins of a joint map; return () if the map has no margins."""
     at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

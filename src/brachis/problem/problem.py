@@ -48,15 +48,16 @@ class Problem(Summary):
     ----------
     task : Task
     robot : Robot
-        The robot, with a virtual roll joint if the tool may roll.
+        The robot, with a virtual joint for each direction in which the tool may deviate from the path.
     task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
-        Postures at the ends; None if free. They are the same if the motion is periodic. Otherwise the end is the
-        posture on the path that is closest to the given one, which may miss the path by the rounding of its digits.
+        Postures at the ends of the path; None for an end that is free. Both are the same if the motion is periodic.
+        Otherwise `end` is the posture on the path closest to the given one, which may be off the path by a rounding
+        error.
     limits : tuple of Limit
     legs : tuple of Leg
-        Parts of the path that are travelled in one go.
+        Parts of the path that are travelled without a break.
     time_laws : tuple of TimeLaw or None
         Time law of each leg; None if its speed is free.
     own_limits : tuple of LimitModel
@@ -78,7 +79,7 @@ class Problem(Summary):
     def of(
         cls, robot: Robot, task: Task, own_limits: Sequence[LimitModel] = ()
     ) -> Problem:
-        """Bind robot and task, and check the postures that the task gives.
+        """Bind a task to a robot, and check the postures that the task gives.
 
         Parameters
         ----------
@@ -128,7 +129,7 @@ class Problem(Summary):
 
     @property
     def given_postures(self) -> dict[str, np.ndarray]:
-        """Postures of ``start`` and ``end``, without those that are free."""
+        """Given postures, by the names ``start`` and ``end``; an end that is free is left out."""
         both = {"start": self.start, "end": self.end}
         return {name: posture for name, posture in both.items() if posture is not None}
 
@@ -156,7 +157,7 @@ class Problem(Summary):
 
     @property
     def dwell_time(self) -> float:
-        """Time for which the tool stands still between legs, s."""
+        """Total time for which the tool stands still between legs, s."""
         return sum(leg.dwell for leg in self.legs)
 
     @property
@@ -170,7 +171,7 @@ class Problem(Summary):
         return 0.0 if law is None else float(law.ends[end, 1])
 
     def _rate_between(self, before: int, after: int) -> float:
-        """Return ds/dt where a leg ends and another one begins, 1/s."""
+        """Return ds/dt where one leg ends and another begins, 1/s."""
         if self.legs[before].stops:
             return 0.0
         return self._law_rate(before, -1) or self._law_rate(after, 0)
@@ -191,7 +192,7 @@ class Problem(Summary):
 
 
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
-    """Return the posture at the end of the path closest to a given one, (n,), which may already be there."""
+    """Return the posture, (n,), at the end of the path that is closest to a given one, which may already be there."""
     place = path.sample(np.ones(1)).target
     if isinstance(task_map, JointSpace):
         return np.asarray(place[0])
@@ -228,7 +229,7 @@ class Decomposition(Summary):
 
     @property
     def clearance(self) -> float:
-        """Least branch margin of the start posture, or of the end posture if the start is free; zero if both are."""
+        """Smallest branch margin of the start posture, or of the end posture if the start is free; zero if both are."""
         posture = self.problem.end if self.problem.start is None else self.problem.start
         if posture is None:
             return 0.0
@@ -286,16 +287,16 @@ def decompositions_of(
     -------
     list of Decomposition
         With ``redundant_joints: auto``, the decomposition with the largest branch margin at the start posture comes
-        first. The list is empty if the robot has no closed form, or if the path is one of joints. If the task names the
-        joints, it has at least one item.
+        first. The list is empty if the robot has no closed form, or if the path is a prescribed joint path. If the task
+        names the redundant joints, the list has at least one item.
 
     Raises
     ------
     DecompositionError
         No closed form fits the robot and the task.
     StartError
-        A given posture is singular. Or a branch or named joints bind the motion to one branch, and a given posture is
-        on another.
+        A given posture is singular, or it is not on the branch to which the task's branch or redundant joints restrict
+        the motion.
     UnknownNameError
         The robot has no such joint, or the closed form no such branch.
     """
@@ -365,7 +366,7 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
             origin = "start posture" if stated_branch == "auto" else "task's branch"
             leave_out = "end" if stated_branch == "auto" else "branch"
             raise StartError(
-                f"the {name} posture is on another branch than the {origin}",
+                f"the {name} posture is on a different branch from the {origin}",
                 where=key,
                 found=labels[branch],
                 allowed=labels[branches[0]],

@@ -1,8 +1,8 @@
-"""Limits that are not built in: those of a user's program, and those of other packages.
+"""Limits that are not built in: limits from a user's program, and limits from other packages.
 
-A task names the kinds of other packages under ``custom_limits``. They are entry points of the group ``brachis.limits``.
-Each entry point is a callable that takes the parameters of the task as keywords, and returns an object whose
-``bind(robot)`` returns the limit for a robot (see `brachis.limits.Limit`).
+A task names kinds of limits from other packages under ``custom_limits``. These kinds are entry points of the group
+``brachis.limits``. Each entry point is a callable that takes the parameters of the task as keywords, and returns an
+object whose ``bind(robot)`` returns the limit for a robot (see `brachis.limits.Limit`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LimitModel(Protocol):
 def list_models(
     task: Task, own_limits: Sequence[LimitModel] = ()
 ) -> dict[str, LimitModel]:
-    """List the limits of a task's ``custom_limits`` and of a program by their places, such as ``own_limits[0]``.
+    """List the limits of a task's ``custom_limits`` and of a program; keys are their places, such as ``own_limits[0]``.
 
     Raises
     ------

@@ -53,7 +53,7 @@ class Friction(Summary):
         urdf: Mapping[str, np.ndarray],
         settings: FrictionSettings,
     ) -> Friction:
-        """Combine the values of a task with those of the URDF, for the joints of a chain.
+        """Combine the friction in a task with that in the URDF, for the joints of a chain.
 
         Parameters
         ----------

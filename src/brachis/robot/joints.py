@@ -1,4 +1,4 @@
-"""Joint positions as points of a joint space: remaining joints, differences of angles, turns by 2 pi.
+"""Calculations with joint positions: remaining joints, differences of angles, turns by 2 pi.
 
 Units of joint quantities depend on the unit of the joint's position: rad for revolute, m for prismatic joints.
 """
@@ -17,12 +17,12 @@ TURN = 2.0 * np.pi
 
 
 def complement(n: int, joints: Iterable[int]) -> list[int]:
-    """Return those of n joints that are not in `joints`, ascending."""
+    """Return the indices, from 0 to n - 1, that are not in `joints`, ascending."""
     return sorted(set(range(n)).difference(joints))
 
 
 def principal(angles: np.ndarray) -> np.ndarray:
-    """Return angles in [-pi, pi)."""
+    """Return the equivalent angles in [-pi, pi)."""
     return np.remainder(angles + np.pi, TURN) - np.pi
 
 

@@ -43,7 +43,7 @@ class Issue:
     where : str
         Key of the task, or joint or link of the robot.
     message : str
-        What it looks like.
+        What the figure looks like.
     found : str
         The figure, with its unit.
     usual : str
@@ -69,7 +69,7 @@ class Issue:
 
 
 def _join(stem: str, group: list[Issue]) -> Issue:
-    """Join several issues that have the same message and stand below one key."""
+    """Join several issues that have the same message and belong to one key."""
     if len(group) == 1:
         return group[0]
     figures = ", ".join(
@@ -82,7 +82,7 @@ def _join(stem: str, group: list[Issue]) -> Issue:
 def report_issues(
     issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
-    """Warn of issues, or refuse some or all of them. Return them, with one issue for all joints with the same message.
+    """Warn of issues, or refuse some or all of them. Return them; joints with the same message share one issue.
 
     Warnings refer to the caller of the function that calls this one. Otherwise see `refuse_issues`.
     """
@@ -95,13 +95,13 @@ def report_issues(
 def refuse_issues(
     issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
-    """Refuse some or all issues. Return them, with one issue for all joints with the same message.
+    """Refuse some or all issues. Return them; joints with the same message share one issue.
 
     Parameters
     ----------
     issues : tuple of Issue
     strict : bool or None
-        Whether issues are errors. None: only those of the start posture and of named postures are.
+        Whether issues are errors. If None, only issues of the start posture and of named postures are errors.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def link_lengths(robot: Robot) -> list[float]:
 
 
 def reach(robot: Robot) -> float:
-    """Return an upper bound on the distance of the tool frame from the first joint, m, for the slides' ranges."""
+    """Return an upper bound on the distance of the tool frame from the first joint, m, within the slides' ranges."""
     farthest = np.abs(robot.limits.both_ways("position")).max(axis=0)
     slides = [
         max(farthest[i], abs(urdf.lower or 0.0), abs(urdf.upper or 0.0))
@@ -207,7 +207,7 @@ def distances_from_base(
 
 
 _ROUNDED = 1e-3
-"""Tolerance for positions, m, and entries of rotation matrices: positions are given to the millimetre."""
+"""Tolerance for positions, m, and entries of rotation matrices; positions are often given to the millimetre."""
 
 
 def position_hint(value: float, lower: float, upper: float, unit: str) -> str | None:
@@ -223,7 +223,7 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
 
 
 def distance_hint(away: float, far: float) -> str | None:
-    """Return a hint if a path at a distance `away` from the first joint, m, looks like mm for the reach `far`, m."""
+    """Return a hint if a path at a distance `away` from the first joint, m, may be in mm, given the reach `far`, m."""
     # A path that is only slightly out of reach is not hundreds of times as far away.
     if 0.05 * far < away / 1000.0 < 3.0 * far:
         return (

@@ -86,7 +86,7 @@ def read_dynamics(
     tree : UrdfTree
         The URDF; its numbers have been checked.
     chain : sequence of str
-        Moving joints.
+        Moving joints of the chain.
     locked : mapping of str to float
         Positions of the other joints, rad or m.
     tool : str
@@ -212,7 +212,7 @@ def check_inertia(
 
 
 def _spread(lever: np.ndarray) -> np.ndarray:
-    """Return the inertia of a point of 1 kg at `lever`, (3,) m, about the origin, kg m^2."""
+    """Return the inertia of a 1 kg point mass at `lever`, (3,) m, about the origin, kg m^2."""
     return np.dot(lever, lever) * np.eye(3) - np.outer(lever, lever)
 
 

@@ -36,7 +36,7 @@ def write_urdf(model: pin.Model, geometry: pin.GeometryModel | None = None) -> s
     Raises
     ------
     UrdfError
-        A solid has a different shape.
+        A solid has a shape that cannot be written.
     """
     bodies = {
         frame.parentJoint: number

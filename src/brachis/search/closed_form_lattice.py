@@ -37,7 +37,7 @@ class Cells:
     first, last : (r,) int ndarray
         First and last cells at which a motion with a free start may begin.
     window : int
-        Number of cells to either side that are searched at the next station, with a single redundant joint.
+        Number of cells to either side that are searched at the next station, if a single joint is redundant.
     """
 
     origin: np.ndarray
@@ -55,9 +55,9 @@ class Cells:
     ) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
-        If joint paths begin at a given posture, (n,), it is the middle of a cell. Without one, the cells cover closed
-        ranges, one turn of an open revolute joint, and the part of an open prismatic joint close to the beginning of
-        the path.
+        If joint paths begin at a given posture, (n,), it is the middle of a cell. If no posture is given, the cells
+        cover closed ranges, one turn of an open revolute joint, and the part of an open prismatic joint close to the
+        beginning of the path.
         """
         problem = decomposition.problem
         joints = list(decomposition.redundant)
@@ -71,7 +71,7 @@ class Cells:
         else:
             origin = posture[joints]
         reach = np.where(turning, 0.5 * TURN, 2.0 + problem.path.length)
-        # Closed ranges are covered completely, up to 20 rad or m to either side: every cell takes memory.
+        # Closed ranges are covered completely, up to 20 rad or m to either side, because every cell takes memory.
         closed = np.isfinite(low) & np.isfinite(high)
         reach = np.where(closed, np.maximum(reach, 20.0), reach)
         first = np.ceil((np.maximum(low, origin - reach) - origin) / size).astype(int)
@@ -84,7 +84,7 @@ class Cells:
         return len(self.size)
 
     def positions(self, cells: np.ndarray) -> np.ndarray:
-        """Return the redundant joints, (K, r), rad or m, in the middle of cells (K, r)."""
+        """Return the positions of the redundant joints, (K, r), rad or m, in the middle of cells (K, r)."""
         return self.origin + cells * self.size
 
     def near(self, positions: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ class Cells:
         return rng.integers(self.first, self.last + 1, (count if self.r else 1, self.r))
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
-        """Return offsets to the cells that are tried at the next station, (O, r): all in the window, or a sample."""
+        """Return offsets to the cells that are tried at the next station, (O, r): the whole window, or a sample."""
         if self.r == 1:
             return np.arange(-self.window, self.window + 1)[:, None]
         still = np.zeros((1, self.r), dtype=int)
@@ -127,7 +127,7 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near_start(problem: Problem, joint: int) -> float:
-    """Return where a prismatic joint brings the tool closest to the path's beginning, other joints at zero, m."""
+    """Return the position, m, of a prismatic joint that brings the tool closest to the path's start, others at zero."""
     axes = list(problem.task_map.axes)
     q = np.zeros((2, problem.robot.n))
     q[1, joint] = 1.0
@@ -172,7 +172,7 @@ class ClosedFormLattice(Lattice):
         self._modulo = turning
         self._given_branch = decomposition.branches[0]
         self._cells = Cells.of(decomposition, self._cells_per_turn, self._origin)
-        # Branch margin that nodes keep: 0.02, or half that of the given posture if this is less.
+        # Minimum branch margin of nodes: 0.02, or half the margin of the given posture if this is less.
         self._clear = 0.02
         if self._origin is not None:
             margins = self._solver.branch_margins(

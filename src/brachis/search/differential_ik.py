@@ -27,7 +27,8 @@ class Strategy:
     threshold : float
         Branch margin below which `push` acts, dimensionless.
     drift : float
-        Constant motion along the first null-space direction, rad or m per unit s, which may lead to another valley.
+        Constant motion along the first null-space direction, rad or m per unit s, which may lead to a different local
+        optimum.
     centre : float
         Strength with which joints are pulled to the middle of their ranges.
     """
@@ -77,7 +78,7 @@ def differential_ik_path(
     Returns
     -------
     (steps, 1 + r) ndarray or None
-        Successive values of s and the redundant joints; None if the path cannot be followed, or not in time.
+        Successive values of s and the redundant joints; None if the path cannot be followed, or the time is up.
     """
     if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
@@ -113,7 +114,7 @@ def _follow(
     target: np.ndarray,
     step_s: float | None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Take one step to the next target; return the new posture and the null-space motion, or None if it is not met.
+    """Take one step to the next target; return the new posture and the null-space motion; None if out of reach.
 
     `step_s` is the step in s, or None to unfold on the spot.
     """

@@ -23,7 +23,7 @@ from brachis.trajectory import Trajectory
 Opening = Callable[[Problem, Deadline], Search]
 """A function that opens the search for a problem."""
 _WORTH_MOVING = 2.0
-"""Multiple of the spline tolerance that moving idle joints has to save: either plan may be slower by one tolerance."""
+"""Moving idle joints has to save this multiple of the spline tolerance, as either plan may be slow by one tolerance."""
 
 
 def search_motion(
@@ -34,7 +34,7 @@ def search_motion(
     deadline: Deadline,
     report: Listener,
 ) -> SearchOutcome:
-    """Search for the fastest motion, from a known one if given; raise the error that explains why none was found."""
+    """Search for the fastest motion, from a known motion if given; raise an error that explains why none was found."""
     search = open_search(problem, deadline)
     exact = None
     if known_motion is None and problem.task.tolerances != Tolerances():

@@ -2,9 +2,10 @@
 
 Speeds are given for parts of the path and for its ends. Without friction, if the limits allow a motion and the arm can
 hold its postures, the limits also allow the same motion at a lower speed: its (u, x) lies between that of the motion
-and rest (see `brachis.search.phase_plane`). So a speed can be too high for two reasons. It is too high by itself, along
-its part of the path or at its end, or an adjacent leg is too short to reach it or to brake from it. A redundant robot
-may have better joint paths than the known ones, so only what is far from possible is refused before a plan is tried.
+and rest (see `brachis.search.phase_plane`). So a speed can be too high for two reasons. Either it is too high by
+itself, along its part of the path or at its end, or an adjacent leg is too short to reach this speed or to brake from
+it. A redundant robot may have better joint paths than the known ones, so only what is far from possible is refused
+before a plan is tried.
 
 The phase plane accounts neither for limits on the jerk nor for friction. Friction helps to brake, so that with friction
 a part close to the path's end may be travelled faster.
@@ -33,12 +34,12 @@ from brachis.search.stations import spread_stations
 from brachis.timing import Timing
 
 _EXACT = 0.97
-"""If only a smaller fraction of a speed is possible in the phase plane, and this is exact, the speed is impossible."""
+"""If the phase plane is exact and allows only a smaller fraction of a speed than this, the speed is impossible."""
 _UNLIKELY = 0.4
-"""The same fraction for a redundant robot: below it, no other joint path makes up for what is missing."""
+"""The same fraction for a redundant robot: below it, no other joint path makes up the difference."""
 _REACHED = 0.92
-"""Fraction of the largest speed in the phase plane that is advised: splines over the first mesh do not reach all of
-it."""
+"""Fraction of the highest speed in the phase plane that is advised; splines over the first mesh do not reach that
+speed."""
 _LEAST = 1e-4
 """Fraction of a speed that is possible wherever the arm can hold its postures."""
 
@@ -51,7 +52,7 @@ def refuse_hopeless(guesses: Sequence[InitialGuess]) -> None:
     PlanningError
     """
     problem = guesses[0].problem
-    # Friction may help to hold the arm, and a motion between different speeds may be a fall: such plans are tried.
+    # Friction may help to hold the arm, and a motion between different speeds may be a fall, so such plans are tried.
     if not _has_friction(problem).any() and not any(problem.end_rates):
         failure = explain_holding(guesses, everywhere=True)
         if failure is not None:
@@ -79,7 +80,7 @@ class _Speed:
         Value, in `unit`.
     unit : str
     leg : int
-        Number of the leg whose speed it is, or at whose end it is given.
+        Number of the leg that has the speed, or at whose end the speed is given.
     side : int or None
         End of the leg at which the speed is given, 0 or -1; None if it is given all along the leg.
     """
@@ -151,7 +152,7 @@ class _SpeedCheck:
         self._solve = [cache(plane.solve) for plane in self.planes]
 
     def _find_cap(self, speed: _Speed) -> tuple[float, float, str]:
-        """Return the largest fraction of a speed by itself, and the path coordinate and limit that allow no more."""
+        """Return the largest possible fraction of a speed alone, and the place and the limit that allow no more."""
         plane = self.planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
@@ -202,7 +203,7 @@ class _SpeedCheck:
             shares[number] = share
             return self.is_possible(shares)
 
-        # With the other speeds, one that is too low may be as impossible as one that is too high.
+        # Between other speeds, a speed that is too low may be as impossible as one that is too high.
         tried = np.geomspace(1.0, least, 20).tolist()
         for above, share in itertools.pairwise(tried):
             if is_possible(share):

@@ -1,4 +1,4 @@
-"""The data of a plan's result: the trajectory, its verification, and how they were found; methods are in `result`."""
+"""The data of a plan's result: the trajectory, its verification, and how they were found. Methods are in `result`."""
 
 from __future__ import annotations
 

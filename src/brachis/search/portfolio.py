@@ -56,14 +56,14 @@ from brachis.search.stages import (
 from brachis.trajectory import Trajectory
 
 _LEAST_COST = 0.5
-"""Knots, and limits that the phase plane does not know, lengthen every motion. They cost a candidate at least this
-fraction of the smallest cost so far. With 10 intervals, joint paths of a planar arm lost 17 to 20 % of the time."""
+"""Knots, and limits that the phase plane does not cover, lengthen every motion. They cost a candidate at least this
+fraction of the smallest cost so far. With 10 intervals, motions of a planar arm became 17 to 20 % longer."""
 _RANKING_SHARE = 0.6
 """Fraction of the remaining time after which no joint path is improved while nothing is verified."""
 _RESERVE = 0.3
 """Fraction of the time that is reserved for a first motion while nothing is verified."""
 _LONGEST_RESERVE = 10.0
-"""Longest such reserve, s: for a weld, a first motion takes 3 s, and three times as long on a busy machine."""
+"""Maximum of this reserve, s: for a weld, a first motion takes 3 s, and three times as long on a busy machine."""
 _FIRST_SHARE = 0.6
 """Fraction of the remaining time in which a first motion is sought before anything else."""
 _LATER = 0.2
@@ -154,9 +154,9 @@ class Search:
             A motion that is tried first. If it leads to a verified motion, nothing else is tried.
         exact : FinishedCandidate, optional
             A verified plan of the same task without tolerances. It is the plan unless a faster one is found. The search
-            looks close to it first, and elsewhere only if it found nothing there or is exhaustive.
+            looks close to this plan first, and elsewhere only if it found nothing there or is exhaustive.
         max_batches : int, optional
-            Largest number of batches.
+            Maximum number of batches.
 
         Raises
         ------
@@ -458,7 +458,7 @@ class Search:
         return is_fast and not self._is_known(candidate)
 
     def _keep(self, candidate: FinishedCandidate) -> None:
-        """Make a candidate the best one; once it is verified, others have to beat it over the same knots."""
+        """Make a candidate the best one; once it is verified, other candidates have to beat it over the same knots."""
         self.best = candidate
         if self.is_satisfied:
             is_patient = self._problem.task.search.effort == "exhaustive"

@@ -20,11 +20,11 @@ from brachis.search.portfolio import Search
 from brachis.task import Task, load_task, task_with, with_keys
 
 _TIME = 20.0
-"""Time for all numbers of one error, s."""
+"""Maximum time for testing all numbers of one error, s."""
 _TRIALS = 10
-"""Largest number of trials of one number."""
+"""Maximum number of trials of one number."""
 _NEAR = 1.04
-"""The search ends when the smallest change that is enough is known up to this factor."""
+"""The search ends when the smallest change that is enough is known to within this factor."""
 
 
 def try_remedies(
@@ -46,7 +46,7 @@ def try_remedies(
     families, own_limits : sequence
         As for `brachis.plan`.
     deadline : Deadline
-        After it, the hint names what to change, but not by how much.
+        After this time, the hint names what to change, but not by how much.
     """
     if not error.remedies:
         return
@@ -113,7 +113,8 @@ def is_planned(
 
 
 IsEnough = Callable[[float, int | None], bool | None]
-"""Tells whether a number is enough, from a number of batches of the search (None: all); None if a plan may exist."""
+"""Function that tells whether a number is enough, from a number of search batches (None: all). None: a plan may
+exist."""
 
 
 def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str:

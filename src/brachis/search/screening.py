@@ -29,13 +29,13 @@ from brachis.search.stages import InitialGuess
 _NEAR_LEAST = 1.01
 """Factor on the least time up to which guesses count as equally fast."""
 _SAME_TIME = 0.02
-"""Largest relative difference between estimates of the same joint path."""
+"""Maximum relative difference between estimates of the same joint path."""
 _SAME_POSTURE = 0.15
-"""Largest distance between joints along the same joint path, rad or m."""
+"""Maximum difference of a joint position along joint paths that count as the same, rad or m."""
 _FEWEST = 2
 """Minimum number of guesses that are kept, however little of the time is free."""
 _MOST = 8
-"""Largest number of guesses that are improved for each one that is kept: four from a lattice, and four at random."""
+"""Maximum number of guesses that are improved for each guess that is kept: four from a lattice, and four at random."""
 _PLACES = np.linspace(0.0, 1.0, 49)
 """Path coordinates at which joint paths are compared."""
 
@@ -120,7 +120,7 @@ def _improve_in_parallel(
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until, for each one kept, `spare` end close to the least time: others are hardly faster."""
+    """Improve guesses until, for each one kept, `spare` end close to the least time: more are hardly faster."""
     work = run_in_processes(
         improve_quickly,
         guesses,
@@ -152,7 +152,7 @@ def improve_quickly(
     charts: int,
     _listener: Listener,
 ) -> InitialGuess:
-    """Improve a guess over the path. If that fails, an improved guess keeps its estimate, any other gets infinity."""
+    """Improve a guess over the path; if that fails, keep the estimate of an improved one, else set it to infinity."""
     if not guess.is_improved:
         guess = replace(guess, estimate=np.inf)
     if deadline.passed:

@@ -63,9 +63,9 @@ class InitialGuess(Summary):
         The solver that plans from it; empty while none is chosen.
     durations : tuple of float or None
         Duration of every leg, s, if the joint path's values are those of a motion: equally many for each leg, at even
-        times. None if they are not.
+        times. None otherwise.
     is_improved : bool
-        Whether the joint path is roughly a local optimum for the limits that the phase plane knows.
+        Whether the joint path is roughly a local optimum for the limits that the phase plane covers.
     """
 
     problem: Problem
@@ -132,7 +132,7 @@ class Candidate(Summary):
     status : str
         Outcome in plain words.
     begun : float
-        End time over the first knots, s; infinite if no others follow.
+        End time over the first knots, s; infinite if no other knots follow.
     adapted : float
         End time over all knots, before refinement, s; infinite if there was no such program.
     reports : tuple of SolverReport
@@ -197,7 +197,7 @@ class Candidate(Summary):
 
 @dataclass(frozen=True)
 class Marks:
-    """End times that a candidate has to beat, s; infinite while no motion is verified.
+    """End times, s, that a candidate has to beat; infinite while no motion is verified.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class Marks:
 
 
 def round_end_time(time: float) -> float:
-    """Round an end time, so that digits in which processes differ do not decide."""
+    """Round an end time, so that digits that differ between processes do not decide."""
     return float(f"{time:.6g}")
 
 
@@ -241,7 +241,7 @@ def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RankedCandidate(Candidate):
-    """A candidate whose joint path was improved over the path, if that is possible, and which may be finished.
+    """A candidate whose joint path has been improved over the path, if possible; it may be finished later.
 
     Attributes
     ----------
@@ -352,7 +352,7 @@ class FinishedCandidate(Candidate):
 
     @property
     def time_scaled(self) -> float:
-        """Factor by which the end time was lengthened in the last step."""
+        """Factor by which the end time was multiplied in the last step."""
         return self.refined.time_scaled
 
     @property

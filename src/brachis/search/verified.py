@@ -35,10 +35,10 @@ def refine_and_verify(
     solve: Solve,
     options: RefinementOptions,
 ) -> Candidate:
-    """Refine and verify; only verify if the time is up.
+    """Refine and verify a motion; if the time is up, only verify it.
 
     Close to a singularity, a peak may be narrower than the spacing of the refinement's grid. If only the verification
-    sees it, the motion is refined once more, on a denser grid.
+    detects such a peak, the motion is refined once more, on a denser grid.
 
     Parameters
     ----------
