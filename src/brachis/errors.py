@@ -52,7 +52,7 @@ class Remedy:
     current : float
         The value in the task.
     guess : float
-        A value that may be enough.
+        A value that may make a plan possible.
     unit : str
     is_known : bool
         Whether it is known that no smaller change than the guess can be enough.

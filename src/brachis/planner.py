@@ -95,7 +95,7 @@ def plan(
         in a fraction of the usual time. If the motion cannot be used, or leads to no verified plan, the search
         continues as usual, and ``result.not_completed`` says so.
     families : sequence of Family, optional
-        Closed forms to try before the built-in ones.
+        Families of closed-form inverse kinematics to try before the built-in ones.
     own_limits : sequence of LimitModel, optional
         Limits of your own in addition to those of the task: objects whose ``bind(robot)`` returns a
         `brachis.limits.Limit`. They are not saved with the motion. Limits from installed packages are named in the task
@@ -300,7 +300,7 @@ def transcribe(
         says. With ``intervals: auto``, a phase has 10 intervals, or 12 if its speed is given, whereas `plan` chooses
         the knots itself. With ``knots: free`` the lengths of the intervals are variables.
     family : str
-        Family of the closed form.
+        Name of the closed form's family.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Limits of drives that are not one number for each joint: the total power, and torques that fall with speed.
+"""Limits of drives that are not one number for each joint: the total power, and torque limits that fall with speed.
 
 |sum over the joints of tau qdot| <= P_total, as a ratio in [-1, 1].
 
@@ -75,7 +75,7 @@ class RobotLimit(Limit):
 
 
 class TotalPowerLimit(RobotLimit):
-    """The power that all joints together draw from a common supply, or return to it."""
+    """Limit on the power that all joints together draw from a common supply, or return to it."""
 
     kind = "total_power"
     subject = "all joints"

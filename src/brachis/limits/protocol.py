@@ -176,8 +176,8 @@ class Partials:
 class HasLatticeWeights(ABC):
     """Additional base class of limits by which the lattice measures joint steps between postures.
 
-    It suits limits that are linear in the joint accelerations or in the joint velocities while the arm is at rest, such
-    as torques. Other limits have no effect on the length of a step.
+    It is for limits that are linear in the joint accelerations or in the joint velocities while the arm is at rest,
+    such as torques. Other limits have no effect on the length of a step.
     """
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Branch margins >= eps: this keeps the motion on its branch and away from singular decompositions."""
+"""Lower bounds on branch margins, which keep the motion on its branch and away from singular decompositions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HELD_BACK = 1e-4
 
 
 class BranchMargin(Limit):
-    """Margins of the branch of a joint map.
+    """Limit that keeps a motion clear of the branch boundaries of a joint map.
 
     Parameters
     ----------

@@ -243,7 +243,7 @@ def _angles(task: Task) -> Iterator[Issue]:
 
 
 def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
-    """Yield all numbers below keys that end in ``_deg``, with their dotted keys."""
+    """Yield all numbers under keys that end in ``_deg``, with their dotted keys."""
     if isinstance(content, Mapping):
         for name, value in content.items():
             yield from _in_degrees(f"{key}.{name}" if key else name, value)
@@ -445,13 +445,13 @@ def _ranges(robot: Robot) -> Iterator[Issue]:
         strict=True,
     )
     for name, unit, lower, upper, known in columns:
-        # In degrees, few ranges are narrower than 120; few rails are longer than 30 m.
+        # Few ranges are narrower than 120 degrees, and few rails are longer than 30 m.
         usual = 120.0 if unit == "rad" else 50.0
         stated = (known.upper or 0.0) - (known.lower or 0.0)
         if stated > 0.0:
             least = 4.0 * math.pi if unit == "rad" else 5.0
             usual = min(usual, max(5.0 * stated, least))
-        # A larger figure stands for "no limit": in degrees, ranges end at 720.
+        # A larger figure stands for "no limit": ranges in degrees end at 720 at most.
         if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
             yield from issue_above(
                 f"robot.limits.position.{name}",
@@ -469,7 +469,7 @@ def _curves(robot: Robot) -> Iterator[Issue]:
     scale = robot.settings.limits.scale.torque
     usual_torque = LIMIT_KINDS["torque"].usual
     assert usual_torque is not None
-    # Without load, motors turn at up to twice the rated speed; a figure in rpm is 9.5 times that in rad/s.
+    # Without load, motors turn at up to twice the rated speed; a speed in rpm is 9.5 times the same speed in rad/s.
     rpm = {"rad": "rpm", "m": "mm per second"}
     usual_speed = UsualLimit(rpm, FASTEST, "velocity", 5.0, 5.0)
     behind_gear = "; at the joint, behind its gear"

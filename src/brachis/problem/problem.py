@@ -214,7 +214,7 @@ class Decomposition(Summary):
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branches : tuple of int
-        Indices into ``match.solver.branches``; only one if the start or end posture is given.
+        Indices into ``match.solver.branches``; there is only one if the start or end posture is given.
     """
 
     problem: Problem
@@ -281,7 +281,7 @@ def decompositions_of(
     ----------
     problem : Problem
     families : sequence of Family, optional
-        Closed forms to try before the built-in ones.
+        Families of closed-form inverse kinematics to try before the built-in ones.
 
     Returns
     -------
@@ -298,7 +298,7 @@ def decompositions_of(
         A given posture is singular, or it is not on the branch to which the task's branch or redundant joints restrict
         the motion.
     UnknownNameError
-        The robot has no such joint, or the closed form no such branch.
+        The robot has no joint, or the closed form has no branch, of the name that the task gives.
     """
     task = problem.task
     robot = problem.robot

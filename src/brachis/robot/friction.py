@@ -120,7 +120,7 @@ class Friction(Summary):
         return cls(**terms, v_eps=v_eps)
 
     def check_against(self, model: pin.Model, limits: np.ndarray) -> None:
-        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome: a joint could only creep.
+        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome, because the joint could only creep.
 
         Raises
         ------

@@ -138,7 +138,7 @@ class UrdfLimit:
 
 
 def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
-    """Check a user's limits, and state them joint by joint, so that limits of other joints can be added.
+    """Check a user's limits, and write them joint by joint, so that limits of other joints can be added.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def resolve_limits(
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
-    """Leave out the limits of joints that are held."""
+    """Return the limits without the limits of joints that are held."""
     changed: dict[str, Any] = {
         kind: {name: limit for name, limit in value.items() if name not in joints}
         for kind, value in vars(spec).items()
@@ -253,7 +253,7 @@ def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
 
 
 def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
-    """State the limits joint by joint, for the joints with these names; further joints are left out."""
+    """Write the limits joint by joint, for the joints with these names; other joints are left out."""
     spec: dict[str, Any] = {}
     for kind, row in LIMIT_KINDS.items():
         ends = limits.both_ways(kind).T[: len(names)].tolist()

@@ -327,7 +327,7 @@ def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[st
 
 
 def _clip_to_range(joint: Element, position: float) -> float:
-    """Return the position in the joint's range that is closest to a position."""
+    """Return the position in the joint's range that is closest to a given position."""
     if joint.get("type") == "continuous":
         return position
     lower = number_of(joint, "limit", "lower", -np.inf)

@@ -16,7 +16,7 @@ from brachis.task import Placement
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Body(Summary):
-    """The body that one joint of a chain moves: its child link and all links that are fixed to it.
+    """The body that one joint of a chain moves: the joint's child link and all links that are fixed to this link.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class UrdfDynamics(Summary):
         ``viscous``: damping, Nm s/rad or N s/m. ``coulomb``: friction, Nm or N. ``armature``: kg m^2 or kg, written
         only by `write_urdf`. Zero if not stated.
     links : dict of str to tuple of int and (4, 4) ndarray
-        For every link the number of the joint that moves it, counted from 1, and the link's placement in the joint's
+        For every link, the number of the joint that moves it, counted from 1, and the link's placement in the joint's
         frame. For a link that does not move: 0, and its placement in the root link.
     """
 

@@ -181,7 +181,7 @@ class ClosedFormLattice(Lattice):
             self._clear = min(0.02, 0.5 * margins.min(initial=np.inf))
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are in the cell of the given end, which the plan then reaches exactly."""
+        """Tell which nodes, (K,) bool, are in the cell of the given end posture, which the plan reaches exactly."""
         allowed = np.full(self._robot.n, LARGEST_STEP)
         allowed[self._redundant] = self._cells.size
         return np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1)

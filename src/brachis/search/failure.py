@@ -136,7 +136,7 @@ def _find_obstacles(
 
 
 def _unit_hint(problem: Problem) -> str | None:
-    """Say which figure of the path looks like a different unit; None if all are plausible."""
+    """Say which figure of the path may be in the wrong unit; None if all figures are plausible."""
     issues = [issue for issue in of_places(problem) if issue.where == "path"]
     texts = [
         f"{issue.message[:1].upper()}{issue.message[1:]}: {issue.found}"

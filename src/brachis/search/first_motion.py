@@ -106,7 +106,7 @@ def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
     Returns
     -------
     Candidate
-        A finished candidate if there is a motion.
+        A `FinishedCandidate` if a motion was found.
     """
     outcome = begin_candidate(guess, "no motion was found near the joint path")
     try:

@@ -128,7 +128,7 @@ def lattice_guesses(
     deadline: Deadline = NEVER,
     listener: Listener = ignore,
 ) -> list[InitialGuess] | DeadEnd:
-    """Take the shortest distinct joint paths from a decomposition's lattice; if it has none, from a finer one.
+    """Take the shortest distinct joint paths from a decomposition's lattice; if there is none, from a finer lattice.
 
     If several joints are redundant, more joint paths are examined, and the most promising ones are chosen.
 

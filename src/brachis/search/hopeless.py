@@ -211,14 +211,14 @@ class _SpeedCheck:
         return None
 
     def allows(self, share: float) -> bool:
-        """Tell whether this fraction of all speeds together is possible."""
+        """Tell whether this fraction is possible for all speeds together."""
         return self.is_possible(np.full(len(self.speeds), share))
 
 
 def _largest_share(
     is_possible: Callable[[float], bool], low: float, high: float
 ) -> float:
-    """Find the largest possible fraction between one that is possible and one that is not."""
+    """Find the largest possible fraction between a fraction that is possible and one that is not."""
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_possible(middle) else (low, middle)
@@ -287,7 +287,7 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         shares = lower or dict.fromkeys(shares, _REACHED * share)
 
         def reach(leg: int) -> float:
-            """Return the largest fraction of the speeds between which a leg can lead."""
+            """Return the largest fraction of its end speeds that a leg allows."""
             return _largest_share(
                 lambda trial: check.pass_leg(leg, trial * every) is not None, share, 1.0
             )

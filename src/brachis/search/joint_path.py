@@ -1,4 +1,4 @@
-"""Joint paths, the choice of distinct ones, and the reasons why a lattice has none."""
+"""Joint paths, the choice of distinct joint paths, and the reasons why a lattice has no joint path."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ from brachis.verify import Verification
 _KEPT_BACK = 0.1 * tolerances.END_TIME
 """Fraction of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
-"""A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
+"""A motion replaces the fastest one if its accelerations are lower by at least this fraction."""
 _MANY = 200
 """Number of variables above which an iteration of an active-set method takes tenths of a second, or seconds. No
 smoother motion that is as fast is then sought."""

@@ -30,7 +30,7 @@ from brachis.timing import JointPath, PhasePlane
 _STATIONS = 401
 """Number of stations along the joint path of a guess."""
 _NEAR = 1e-4
-"""Stations closer than this to an end of a leg, in s, are left out: differences would be inaccurate."""
+"""Stations closer than this to an end of a leg, in s, are left out, because differences would be inaccurate."""
 _ROUGH = 0.99
 """Fraction of a given speed that the limits must allow; derivatives of a joint path are only inaccurate differences."""
 

@@ -114,7 +114,7 @@ def finish_candidate(
     Returns
     -------
     Candidate
-        A finished candidate if there is a motion.
+        A `FinishedCandidate` if a motion was found.
     """
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)

@@ -76,7 +76,7 @@ def _count_worthwhile(count: int, guesses: Sequence[InitialGuess]) -> int:
 
 
 def _free_share(guesses: Sequence[InitialGuess]) -> float:
-    """Return the fraction of the least time that the task does not fix: no more can be gained."""
+    """Return the fraction of the least time that the task does not fix, which is the most that can be gained."""
     problem = guesses[0].problem
     durations = [law.duration for law in problem.time_laws if law is not None]
     fixed_time = sum(durations) + problem.dwell_time

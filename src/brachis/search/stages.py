@@ -1,4 +1,4 @@
-"""The stages of a search, with a frozen type each: initial guess, candidate, ranked candidate, finished candidate.
+"""The stages of a search, each with a frozen type: initial guess, candidate, ranked candidate, finished candidate.
 
 An `InitialGuess` is a joint path. Every attempt to plan from it is a `Candidate`, even if it fails. A candidate whose
 joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then verified, whether it
@@ -60,7 +60,7 @@ class InitialGuess(Summary):
     family : str
         Family of the closed form; ``chart`` or ``path of joints`` without one.
     solver : str
-        The solver that plans from it; empty while none is chosen.
+        The solver that plans from the guess; empty while no solver is chosen.
     durations : tuple of float or None
         Duration of every leg, s, if the joint path's values are those of a motion: equally many for each leg, at even
         times. None otherwise.
@@ -264,7 +264,7 @@ class RankedCandidate(Candidate):
 
     @property
     def family(self) -> str:
-        """Family of the closed form."""
+        """Name of the closed form's family."""
         return self.guess.family
 
 
@@ -295,7 +295,7 @@ class FinishedCandidate(Candidate):
     problem : Problem
         What was planned: the task, or a simpler one (see `widen_plan`).
     family : str
-        Family of the closed form.
+        Name of the closed form's family.
     refined : SolvedProgram
         The last program, and its solution.
     optimum : SolvedProgram

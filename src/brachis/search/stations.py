@@ -1,4 +1,4 @@
-"""Stations along a path, closer where it bends or the tool turns."""
+"""Stations along a path, which are closer together where the path bends or the tool turns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The program of a task with an initial guess, for a solver of the user's own."""
+"""The program of a task with an initial guess, for the user's own solver."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def verify(
     Returns
     -------
     Candidate
-        A finished candidate if there is a trajectory.
+        A `FinishedCandidate` if a trajectory was found.
     """
     problem = candidate.problem
     verification = None
