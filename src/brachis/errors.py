@@ -248,9 +248,9 @@ class UnknownNameError(InputError):
     Attributes
     ----------
     kind : str
-        What was looked for, for example ``"joint"``.
+        Kind of name that was looked up, for example ``"joint"``.
     name : str
-        The unknown name; the first one if there are several.
+        The unknown name, or the first of several.
     valid : tuple of str
         The names that exist.
     """

@@ -579,7 +579,7 @@ def test_points_in_mm_or_in_another_order_do_not_start_where_the_tool_is():
         ),
         (
             points[:, ::-1],
-            "It looks like the order y, x: the tool is there if they are read so",
+            "The numbers may be in the order y, x: read in this order, they are where the tool is",
         ),
     ):
         content = brachis.load_task(task(path=brachis.fit_path(given)))

@@ -39,7 +39,7 @@ class ActiveSet:
     signs : (a,) ndarray
         1 at a lower bound, -1 at an upper one.
     equalities : int
-        Number of rows and variables that are at both bounds, each with two slopes.
+        Number of rows and variables that are at both of their bounds; each has two slopes.
     """
 
     slopes: np.ndarray

@@ -1,4 +1,4 @@
-"""The time that the motion would save if the task demanded less: no wait, no stop, no rest, another end posture.
+"""The time that the motion would save if the task demanded less: no wait, no stop, no rest, or another end posture.
 
 The cost of a stop or of rest comes from timings of the same joint path. The cost of a posture comes from the optimum,
 to first order.
@@ -30,7 +30,7 @@ motions, the estimated savings were 40 to 129 % of the savings found by planning
 interval, the estimates were lower."""
 _RANGE_SHARE = 1e-3
 """Fraction of a joint's range by which a posture is changed. On 20 tasks, the estimated saving was up to 12 % off, with
-a median of 2 %. With a fraction of 1 % it was 4 to 23 % off on six tasks, and entirely wrong on one."""
+a median of 2 %. With a fraction of 1 %, it was 4 to 23 % off on six tasks, and entirely wrong on one task."""
 _SHARE_OF_SPEED = 0.1
 """Fraction by which the speed at an end of the path is raised; if the tool rests there, a fraction of the mean
 speed."""

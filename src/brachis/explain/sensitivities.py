@@ -28,7 +28,7 @@ from brachis.trajectory.sensitivities import (
 )
 
 LimitFigure = tuple[Label, str | None]
-"""A figure that a user could change: what is limited, and which end of its range."""
+"""A figure that a user could change: the label of the limited quantity, and the end of its range."""
 LimitBound = tuple[Limit, Bound]
 _RAISED = 1e-3
 """Fraction by which limits are raised."""
@@ -39,7 +39,7 @@ _LEAST_COST = 1e-9
 
 
 def figures_of(program: Program) -> dict[LimitFigure, list[LimitBound]]:
-    """List the figures of a program's limits, each with all its bounds: phases may have limit objects of their own."""
+    """List the figures of a program's limits, each with all its bounds; every phase may have its own limit objects."""
     figures: defaultdict[LimitFigure, list[LimitBound]] = defaultdict(list)
     for limit in program.limits:
         for bound in limit.bounds:

@@ -42,7 +42,8 @@ from brachis.trajectory.sensitivities import Sensitivity
 Value = Callable[[Program, np.ndarray], float]
 """A function of a program and a point, (v,), that changes by as much as t_E, s, if a figure of the task changes."""
 STEP_OF_TIMING = 1e-2
-"""Fraction by which figures are changed in timings, whose stations cause an error of about 1e-6 of the time."""
+"""Fraction by which figures are changed in timings; the stations of a timing cause an error of about 1e-6 of its
+time."""
 PROCESS_SPEED_KEY = "tool_limits.process_speed"
 """Key of the task that lists the process speeds that are not given by segments."""
 
@@ -181,7 +182,7 @@ def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
 
 
 def _speeds(problem: Problem) -> Iterator[TaskFigure]:
-    """List process speeds; parts of the path with the same speed share one figure."""
+    """List process speeds; parts of the path with equal speeds share one figure."""
     limits = problem.task.tool_limits
 
     def change(before: float, after: float) -> Problem:
@@ -229,7 +230,7 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
             groups[source if is_of_file else segment.blend].append(number)
 
     def change(numbers: list[int], before: float, after: float) -> Problem:
-        """Enlarge the blends after some segments in the ratio of two sizes, m."""
+        """Return the problem with the blends after some segments scaled by the ratio of two sizes, m."""
         path = list(segments)
         for number in numbers:
             size = (path[number].blend or 0.0) * after / before
@@ -251,7 +252,7 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:
-    """Return the problem of another task, with its path, and the process speeds and feed rates on it.
+    """Return the problem with another task, and with the path, process speeds and feed rates of this task.
 
     Raises
     ------

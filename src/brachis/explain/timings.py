@@ -23,7 +23,7 @@ def lay_course(
 ) -> TimedCourse | None:
     """Return the timed course of a motion, (v,), over some intervals of its phase.
 
-    It is None if the speed of the phase is given, or if the motion leaves the joint map.
+    Return None if the speed of the phase is given, or if the motion leaves the joint map.
     """
     if phase.time_law is not None:
         return None

@@ -231,7 +231,7 @@ def _check_members(limit: Limit) -> None:
 
 
 def _check_functions(limit: Limit, robot: Robot) -> None:
-    """Refuse values and partial derivatives that have the wrong type or shape, are not finite or contradict each other.
+    """Refuse values and partial derivatives of the wrong type or shape, and those that are not finite or do not agree.
 
     A limit may be undefined in some postures. Such postures are left out, provided that they are a minority.
     """

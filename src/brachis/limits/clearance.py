@@ -1,7 +1,7 @@
 """The distance between each pair of solids must be at least the clearance; the limit has one value for each pair.
 
-A pair that is far apart counts as `_FAR` above the clearance. With the unit vector u between the nearest points w_a and
-w_b,
+The distance of a pair that is far apart counts as `_FAR` above the clearance. With the unit vector u between the
+nearest points w_a and w_b,
 
     dd/dq = u . (J_b(w_b) - J_a(w_a)).
 """
@@ -21,9 +21,9 @@ from brachis.task import Task
 _FAR = 0.1
 """Distance above the clearance, m. If the solids of a pair are farther apart, their distance is not computed."""
 _DEVIATION = 2e-4
-"""Distance by which bodies deviate from a joint path when splines follow it, m."""
+"""Distance by which bodies deviate from their places on a joint path when splines follow it, m."""
 _NEARBY = 2.0
-"""Pairs that stay this many times `_FAR` apart in the initial motion are left out."""
+"""Pairs that stay farther apart than this multiple of `_FAR` in the initial motion are left out."""
 _STRIDE = 0.05
 """Maximum distance that solids move between two checks on a step of the lattice, m."""
 _MOST_STRIDES = 16

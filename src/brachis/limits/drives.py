@@ -1,9 +1,9 @@
 """Limits of drives that are not one number for each joint: the total power, and torque limits that fall with speed.
 
-|sum over the joints of tau qdot| <= P_total, as a ratio in [-1, 1].
+The total power obeys |sum over the joints of tau qdot| <= P_total, written as a ratio in [-1, 1].
 
 The limit |tau| <= T(|qdot|), with T piecewise linear and falling, is the same for driving and braking. Each joint with
-such a curve has two values, as ratios to its torque at rest T_0, with T rounded from below (`RoundedCurve`):
+such a curve has two values, which are ratios to its torque at rest T_0. T is rounded from below (`RoundedCurve`):
 
     (tau - T(qdot)) / T_0 <= 0,        (-tau - T(qdot)) / T_0 <= 0.
 
@@ -100,7 +100,7 @@ class RoundedCurve:
     Attributes
     ----------
     stall_torque : float
-        Value at velocity 0 if the corner there were not rounded.
+        Value that the curve would have at velocity 0 if the corner there were not rounded.
     corners : (k,) ndarray
         Speeds of the corners, rad/s or m/s.
     widths : (k,) ndarray

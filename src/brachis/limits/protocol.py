@@ -107,9 +107,9 @@ class Role(Enum):
     ROBOT = "robot"
     """A limit of the drives and joints."""
     PROCESS = "process"
-    """A limit of the process, on what the tool does."""
+    """A limit of the process, which restricts the tool."""
     SCENE = "scene"
-    """A limit of the objects around the robot."""
+    """A limit due to the objects around the robot."""
     SAFEGUARD = "safeguard"
     """A numerical limit, not a physical one. Small violations are ignored, and the verification does not check it."""
 
@@ -144,7 +144,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Partials:
-    """Partial derivatives of a limit's c values at K moments, (K, c, n) each; None stands for zeros.
+    """Partial derivatives of a limit's c values at K moments, (K, c, n) each; None means zeros.
 
     `s`, (K, c), is the derivative with respect to the path coordinate, if a value depends on it directly.
     """
@@ -210,9 +210,9 @@ class Description:
         Effect of a longer end time on the values. It relieves everything that grows with speed, such as a velocity,
         an acceleration or an energy.
     at_rest : {"nothing", "posture", "turns"}
-        What the limit restricts while the arm rests. "posture": the posture, where an angle and the same angle plus
-        2 pi count alike, for example the torque that holds the arm against gravity. "turns": also the number of turns,
-        for example a range of joint positions.
+        What the limit restricts while the arm rests. "posture": only the posture, so that an angle and the same angle
+        plus 2 pi count alike; an example is the torque that holds the arm against gravity. "turns": also the number of
+        turns; an example is a range of joint positions.
     breaks : (b,) ndarray
         Path coordinates at which the limit changes abruptly, so that the motion must be checked exactly there.
     order : int
@@ -386,7 +386,7 @@ class Limit(Description, ABC):
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell for each straight step between two postures, (E, n), if the limit holds as at its ends, (E,) bool."""
+        """Tell for each straight step between two postures, (E, n), if the limit is met as at its ends, (E,) bool."""
         return np.ones(len(first), dtype=bool)
 
     def relax(self, bound: Bound, amount: float) -> Self:

@@ -46,7 +46,7 @@ class BranchMargin(Limit):
         self.upper = np.full(count, np.inf)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Compute the margins, (K, c); the motion is a state of the joint map."""
+        """Compute the margins, (K, c), of a motion that is a state of the joint map."""
         return self._joint_map.margins(motion)
 
     def kernel_quantity(self, _chain: Chain) -> FormulaQuantity | None:

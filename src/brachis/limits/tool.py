@@ -129,7 +129,7 @@ class SpeedProfile:
 class ToolMotionLimit(ToolRatios):
     """Ratio of a tool quantity to its limits: speed or acceleration of the frame's origin, or angular speed.
 
-    Virtual joints do not move the tool: their positions are its deviation from the path.
+    Virtual joints do not move the tool: their positions are the deviation of the tool from the path.
 
     Parameters
     ----------

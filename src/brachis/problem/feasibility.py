@@ -154,7 +154,7 @@ def _check_at_rest(
     where: str,
     tolerance: float,
 ) -> None:
-    """Refuse a posture in which a limit is exceeded although the arm stands still."""
+    """Refuse a posture in which a limit is exceeded even though the arm stands still."""
     for limit in limits:
         if limit.at_rest == "nothing":
             continue

@@ -427,7 +427,7 @@ def _largest_usual(robot: Robot, usual: UsualLimit, joint: int) -> float:
         # Arms hold a tenth to five times their own weight at full reach.
         candidates.append(50.0 * holding)
     stated = _stated(robot, usual, joint)
-    # URDFs state 1 for an unknown limit.
+    # URDFs often state 1 for an unknown limit.
     if stated and stated != 1.0:
         candidates.append(max(usual.urdf_factor * stated, usual.urdf_least))
     return float(min(candidates))
@@ -472,7 +472,7 @@ def _curves(robot: Robot) -> Iterator[Issue]:
     # Without load, motors turn at up to twice the rated speed; a speed in rpm is 9.5 times the same speed in rad/s.
     rpm = {"rad": "rpm", "m": "mm per second"}
     usual_speed = UsualLimit(rpm, FASTEST, "velocity", 5.0, 5.0)
-    behind_gear = "; at the joint, behind its gear"
+    behind_gear = "; at the joint, after its gear"
     for i, curve in enumerate(robot.limits.torque_speed):
         if not curve:
             continue

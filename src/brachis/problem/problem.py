@@ -275,7 +275,7 @@ class Decompositions(Sequence[Decomposition]):
 def decompositions_of(
     problem: Problem, families: Sequence[ik.Family] = ()
 ) -> list[Decomposition]:
-    """List the decompositions that the task allows.
+    """List the decompositions, which are choices of redundant joints, that the task allows.
 
     Parameters
     ----------
@@ -315,7 +315,7 @@ def decompositions_of(
     is_bound = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and (is_bound or robot.n < task_map.m):
         if len(tried) <= 1:
-            # There is nothing to choose: report the reasons for the only choice, or the wrong number of joints.
+            # There is nothing to choose: report why the only choice fails, or that the number of joints is wrong.
             ik.find(robot, task_map, (), families=families)
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
@@ -340,7 +340,7 @@ def decompositions_of(
 
 
 def _with_tool_joints(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Add the virtual joints of the tool if these are the redundant joints that `names` leaves out."""
+    """Add the virtual joints of the tool if exactly these are missing from the redundant joints in `names`."""
     robot = task_map.robot
     virtual = [joint.name for joint in robot.tool_joints if joint.name not in names]
     is_short = robot.n - task_map.m - len(names) == len(virtual)

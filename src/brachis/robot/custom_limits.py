@@ -23,7 +23,7 @@ _SECTION = "custom_limits"
 
 
 class LimitModel(Protocol):
-    """A limit as a user gives it, before the robot is known."""
+    """A limit as a user gives it, not yet bound to a robot."""
 
     def bind(self, robot: Robot, /) -> Any:
         """Return the limit for a robot, a `brachis.limits.Limit`."""

@@ -132,7 +132,7 @@ class Friction(Summary):
             if i > 0:
                 joint = model.frames[model.getFrameId(names[i], pin.FrameType.JOINT)]
                 carrier = model.frames[joint.parentFrame].name
-                hint += f". To leave the joint out, end the chain at {carrier} by robot.tool_frame or --tool-frame"
+                hint += f". To leave the joint out, end the chain at {carrier} with robot.tool_frame or --tool-frame"
             raise InputError(
                 f"the Coulomb friction of joint {names[i]!r} is not below its torque limit",
                 where="robot.friction.coulomb",

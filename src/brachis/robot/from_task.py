@@ -1,4 +1,4 @@
-"""The robot that a task describes, alone or together with a given robot; and a description of what acts on it."""
+"""The robot that a task describes, alone or together with a given robot; and a description of its settings in words."""
 
 from __future__ import annotations
 
@@ -238,9 +238,9 @@ def _merge(key: str, robot_value: Any, task_value: Any, names: Sequence[str]) ->
 
 
 def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
-    """Describe in words what is in use, with units: payload, placements, gravity, scaled limits, armature, friction.
+    """Describe a robot in words, with units: payload, placements, gravity, scaled limits, armature, friction.
 
-    The description of friction says where it comes from: from the URDF, unless the task states it. Joints without an
+    The description of friction says whether the values come from the URDF or from the task. Joints without an
     acceleration limit or without a torque limit are also named. If accelerations of a motion, (K, n), are given, the
     largest acceleration without a limit is named. Without masses, the torques are described as unknown.
     """
@@ -297,13 +297,13 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
         figures = getattr(robot.friction, kind)[: len(stated)]
         shown = _by_joint(robot, kind) if figures.any() else "none"
         same = np.array_equal(figures, stated)
-        origin = "as the URDF states it" if same else "other than the URDF's"
+        origin = "as in the URDF" if same else "different from the URDF"
         used[title] = f"{shown} ({origin})"
     return used
 
 
 def _without_limit(robot: Robot, kind: str, motion: np.ndarray | None = None) -> str:
-    """Name the joints without a limit of this kind, and their largest figure in a motion, (K, n)."""
+    """Name the joints without a limit of this kind, and the largest figure of these joints in a motion, (K, n)."""
     names = robot.urdf_joints
     ends = robot.limits.both_ways(kind)[:, : len(names)]
     is_free = ~np.isfinite(ends).all(axis=0)

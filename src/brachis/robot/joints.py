@@ -45,7 +45,7 @@ UNITS: Final[dict[str, dict[str, str]]] = {
     "coulomb": {"rad": "Nm", "m": "N"},
     "armature": {"rad": "kg m^2", "m": "kg"},
 }
-"""Units of joint quantities by the key of the limit or friction in the task, and by the unit of the position."""
+"""Units of joint quantities, by the key of the limit or friction term in the task and by the unit of the position."""
 
 
 def shown_unit(unit: str, *, degrees: bool) -> tuple[str, float]:

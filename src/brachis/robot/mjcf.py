@@ -131,7 +131,7 @@ def _pose(position: np.ndarray, quaternion: np.ndarray) -> pin.SE3:
 def _add_joint(
     model: pin.Model, joint: Any, parent: int, placement: pin.SE3, effort: float
 ) -> int:
-    """Add a joint and return its number. At the position ``ref``, bodies are where the file places them."""
+    """Add a joint and return its number. At the joint position ``ref``, bodies are where the file places them."""
     name = joint.name or f"joint_{joint.id}"
     if joint.type[0] < _SLIDE:  # free and ball joints
         return int(model.addJoint(parent, pin.JointModelFreeFlyer(), placement, name))

@@ -49,7 +49,7 @@ class Issue:
     usual : str
         The usual range of such figures.
     advice : str
-        What to write instead; empty without advice.
+        What to write instead; empty if there is no advice.
     """
 
     where: str
@@ -224,7 +224,7 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
 
 def distance_hint(away: float, far: float) -> str | None:
     """Return a hint if a path at a distance `away` from the first joint, m, may be in mm, given the reach `far`, m."""
-    # A path that is only slightly out of reach is not hundreds of times as far away.
+    # A path in mm is hundreds of times too far away, not only slightly out of reach.
     if 0.05 * far < away / 1000.0 < 3.0 * far:
         return (
             f"The path looks like mm: divided by 1000 it is {away / 1000.0:.3g} m away"
@@ -244,7 +244,7 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
     for order in itertools.permutations(range(len(here))):
         if np.abs(here[list(order)] - stated).max() <= _ROUNDED:
             names = ", ".join(rows[i] for i in order)
-            return f"It looks like the order {names}: the tool is there if they are read so"
+            return f"The numbers may be in the order {names}: read in this order, they are where the tool is"
     return None
 
 

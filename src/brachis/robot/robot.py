@@ -182,7 +182,7 @@ class Robot(Summary):
         frame : str, optional
             Body or added frame that follows the path; used in place of ``tool_frame``.
         geometry : pinocchio.GeometryModel, optional
-            Solids of the links, for the computation of distances.
+            Solids of the links, from which distances are computed.
         **keywords
             As for `from_urdf`.
 

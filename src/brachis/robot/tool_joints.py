@@ -21,7 +21,7 @@ from brachis.task.fields import POSITION
 FREE_ROLL = "pose_free_roll"
 """Name of the task space of poses in which the roll about the tool axis is free."""
 AXIS = "axis"
-"""Word for the direction of the tool's z axis, as a row of a task space or alone."""
+"""Word for the direction of the tool's z axis; it may be a row of a task space, or stand alone."""
 _DIRECTIONS = {
     "roll": (0.0, 0.0, -1.0),
     "lead": (0.0, -1.0, 0.0),

@@ -168,7 +168,7 @@ def _axis(joint: Element) -> np.ndarray:
 
 
 def mass_of(link: Element) -> float:
-    """Return the mass of a checked link, kg. Without a mass, its moments of inertia are ignored."""
+    """Return the mass of a checked link, kg. If a link has no mass, its moments of inertia are ignored."""
     return number_of(link, "inertial/mass", "value", 0.0)
 
 

@@ -1,12 +1,10 @@
 """The lattice of one choice of redundant joints, whose closed form gives the postures.
 
-The ranges of the redundant joints are cut into cells. A node is a cell, a branch and
-the posture that the closed form gives there. Every node is joined to the surrounding
-cells at the next station, on the same branch and clear of its boundary. A single
-redundant joint is searched completely at the lattice's spacing. With several redundant
-joints, nodes are joined to neighbours along one joint at a time and to random ones, and
-a layer keeps a bounded number of nodes: half of them with the shortest joint paths,
-half far apart.
+The ranges of the redundant joints are cut into cells. A node is a cell, a branch and the posture that the closed form
+gives there. Every node is joined to the surrounding cells at the next station, on the same branch and clear of the
+branch's boundary. A single redundant joint is searched completely at the lattice's spacing. With several redundant
+joints, nodes are joined to neighbours along one joint at a time and to random ones, and a layer keeps a bounded number
+of nodes: half of them have the shortest joint paths, and half are far apart.
 """
 
 from __future__ import annotations
@@ -140,7 +138,7 @@ def _near_start(problem: Problem, joint: int) -> float:
 def solve_all(
     decomposition: Decomposition, targets: np.ndarray, q_r: np.ndarray
 ) -> np.ndarray:
-    """Return postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r); some are NaN."""
+    """Return postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r), or NaN."""
     n = decomposition.problem.robot.n
     answers = decomposition.match.solver.solve(targets, q_r)
     q = np.empty((*answers.shape[:3], n))
@@ -187,7 +185,7 @@ class ClosedFormLattice(Lattice):
         return np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1)
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Create nodes all over the ranges of the redundant joints."""
+        """Create nodes spread over the ranges of the redundant joints."""
         cells = self._cells.everywhere(4 * self._nodes, rng)
         branches = np.array(self.decomposition.branches)
         q = self._postures(cells, 0)[:, branches]
@@ -200,7 +198,7 @@ class ClosedFormLattice(Lattice):
         return solve_all(self.decomposition, targets, self._cells.positions(cells))
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
-        """List edges to the surrounding cells; at the last station, also to the cell of the given end."""
+        """List edges to the surrounding cells; at the last station, also to the cell of the given end posture."""
         offsets = self._cells.neighbours(rng)
         nodes = np.arange(len(before.branch))
         node_cells = self._cells.near(before.q[:, self._redundant])

@@ -1,6 +1,6 @@
 """Joint paths by differential inverse kinematics along the path.
 
-As in the paper, the start posture is carried along the path. The null-space motion increases the branch margin and
+As in the paper, the start posture is continued along the path. The null-space motion increases the branch margin and
 stays within the joint ranges, so that the closed form can follow.
 """
 
@@ -66,8 +66,8 @@ def differential_ik_path(
 ) -> np.ndarray | None:
     """Compute the redundant joints along the path by numeric inverse kinematics from the start posture.
 
-    Close to a branch boundary the posture is first unfolded while the tool stays where it is, because any motion of the
-    tool would need fast joints there.
+    Close to a branch boundary, the posture is first unfolded while the tool stays where it is, because any motion of
+    the tool would need fast joints there.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def explain_reach(
         return _NO_TIME
     anywhere = postures
     if not _has_any(_exist(postures)).all():
-        # Wider ranges tell whether the ranges of the redundant joints or the arm itself is to blame.
+        # Wider ranges show whether the ranges of the redundant joints or the arm itself is to blame.
         wider = _sample_postures(decomposition, s, near, deadline, opened=True)
         if wider is None:
             return _NO_TIME
@@ -93,7 +93,7 @@ def _find_obstacles(
     postures: np.ndarray,
     anywhere: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
-    """Yield, for each obstacle, which of S stations are free of it, (S,) bool, and its cause, hint and remedies.
+    """Yield for each obstacle the stations, (S,) bool, that are free of it, and the cause, a hint and remedies.
 
     The redundant joints of `postures`, (S, T, B, A, n), are within their ranges; `anywhere` also has postures beyond
     these ranges. If the task gives a posture, named ``start`` or ``end``, the last obstacles are those on its branch.
@@ -214,7 +214,7 @@ def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
     low = robot.limits.position_lower[joint]
     high = robot.limits.position_upper[joint]
     return (
-        f" (the nearest one has joint {robot.joint_names[joint]!r} {nearest[joint]:.2g} {unit} beyond its range, "
+        f" (in the nearest one, joint {robot.joint_names[joint]!r} is {nearest[joint]:.2g} {unit} beyond its range, "
         f"{low:.4g} to {high:.4g} {unit})"
     )
 
@@ -224,7 +224,8 @@ def _check_at_rest(
 ) -> tuple[np.ndarray, str, list[Remedy]]:
     """Tell at which stations, (S,) bool, a limit allows at least one posture of (S, T, B, A, n) at rest.
 
-    Also say by how much the limit is exceeded at the station whose best posture is the worst, and what to change.
+    Also say by how much the limit is exceeded at the station where even the best posture exceeds it most, and what to
+    change.
     """
     allowed = np.zeros(len(q), dtype=bool)
     worst = 0.0
@@ -249,7 +250,7 @@ def explain_first_failures(
     candidates: Sequence[Candidate],
     deadline: Deadline,
 ) -> PathError | None:
-    """Tell whether the path is out of reach, so that further candidates would be futile.
+    """Tell whether the path is out of reach, because then no further candidates need to be tried.
 
     If lattices were searched and none has a joint path, any unreachable part of the path counts. If no lattice was
     searched, the unreachable part has to be more than a tenth of the path.
@@ -351,7 +352,7 @@ def _explain_dead_ends(
 
 
 def _advise(task: Task, candidates: Sequence[Candidate]) -> str:
-    """Say what may help if there are joint paths, but no motion along them; name only what has not been tried."""
+    """Say what may help if joint paths were found, but no motion along them; name only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
     defaults = SolverSettings()
     solver = task.solver

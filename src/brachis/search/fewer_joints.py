@@ -1,7 +1,7 @@
-"""The search for the motion of a plan, supported by plans with fewer joints.
+"""The search for the motion of a plan, helped by simpler plans with fewer joints.
 
-A plan whose tool stays exactly on the path is sought before tolerances are used. Afterwards, idle joints, which move no
-row of the task space, are held still unless moving them saves time.
+Before tolerances are used, the search looks for a plan in which the tool stays exactly on the path. Afterwards, idle
+joints, which move no row of the task space, are held still unless moving them saves time.
 """
 
 from __future__ import annotations

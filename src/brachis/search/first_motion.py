@@ -51,9 +51,7 @@ from brachis.search.verified import refine_and_verify
 LITTLE_TIME = 5.0
 """A first motion is sought if less time than this remains, s. With more time, the search itself finds a verified
 motion."""
-_NOT_COMPLETED = (
-    "there was time only for a first motion, which may be much slower than the fastest"
-)
+_NOT_COMPLETED = "there was time only for a first motion, which may be much slower than the fastest motion"
 _SOLVE_SHARE = 0.6
 """Fraction of the remaining time in which a first motion is improved by a solve."""
 _LONGEST_SOLVE = 0.5
@@ -235,7 +233,7 @@ def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
         moved = np.linalg.solve(metric, slopes.T)
         forces = np.linalg.solve(_damp(slopes @ moved), goals)
         change = moved @ forces
-        # Rows that are pulled towards their bound are released.
+        # Rows that would otherwise be pulled towards their bound are released.
         is_pulled = np.where(at_low, forces < 0.0, forces > 0.0)
         held[rows[is_pulled & ~is_equal[rows]]] = False
     return change

@@ -64,7 +64,7 @@ def given_guess(
     Returns
     -------
     InitialGuess
-        A guess for the solver that is tried first.
+        A guess that names the solver that is tried first.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def without_tolerances(task: Task) -> Task:
 def lock_idle(
     robot: Robot, task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> tuple[Robot, Task] | None:
-    """Lock the idle joints, on which no row of the task space depends, in a robot and its task; None if none is idle.
+    """Lock the idle joints, on which no row of the task space depends, in robot and task; None if none is idle.
 
     Parameters
     ----------

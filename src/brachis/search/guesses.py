@@ -1,8 +1,8 @@
 """Initial guesses: joint paths from lattices, each smoothed, with coordinates and an estimate of its least time.
 
-If several joints are redundant, the lattice's sample of postures may contain only one class of joint paths, above all
-between two given ends, and a solve from such a path ends at the closest optimum. Solves from random joint paths end at
-other optima.
+If several joints are redundant, the lattice's sample of postures may contain only one class of joint paths, especially
+between two given ends. A solve from such a joint path ends at the closest optimum, whereas solves from random joint
+paths end at other optima.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def lattice_guesses(
     deadline: Deadline = NEVER,
     listener: Listener = ignore,
 ) -> list[InitialGuess] | DeadEnd:
-    """Take the shortest distinct joint paths from a decomposition's lattice; if there is none, from a finer lattice.
+    """Take the shortest distinct joint paths from a decomposition's lattice; if it has none, from a finer lattice.
 
     If several joints are redundant, more joint paths are examined, and the most promising ones are chosen.
 
@@ -224,7 +224,7 @@ def numeric_guesses(
     Parameters
     ----------
     decomposition : Decomposition
-        A decomposition with a given start posture; without one the list is empty.
+        A decomposition with a given start posture; without a start posture, the list is empty.
     count : int
     deadline : Deadline
 

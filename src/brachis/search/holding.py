@@ -92,7 +92,7 @@ class _Load(NamedTuple):
 def explain_holding(
     guesses: Sequence[InitialGuess], *, everywhere: bool = False
 ) -> PlanningError | None:
-    """Tell which limits on means are too low for holding the arm along all joint paths; None if none is.
+    """Tell which limits on mean loads are too low to hold the arm along all joint paths; None if none is.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def _explain_loads(
 
 
 def _loads_along(guess: InitialGuess) -> list[_Load] | None:
-    """List the loads for holding the arm along a guess, for all limits on means; None if it has no postures."""
+    """List the loads needed to hold the arm along a guess, for all limits on means; None if it has no postures."""
     q = postures_along(guess, _S)
     if q is None:
         return None

@@ -75,7 +75,7 @@ class _Speed:
     Attributes
     ----------
     key, name : str
-        Key in the task, and name in words.
+        Key of the speed in the task, and its name in words.
     figure : float
         Value, in `unit`.
     unit : str
@@ -122,7 +122,7 @@ def speeds_of(problem: Problem) -> list[_Speed]:
 
 
 class _SpeedCheck:
-    """Tells which fractions of a task's speeds a joint path allows.
+    """Check of which fractions of a task's speeds a joint path allows.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ class _SpeedCheck:
         return free
 
     def pass_leg(self, leg: int, shares: np.ndarray) -> Timing | None:
-        """Time a leg whose speed is free, between fractions of the speeds, (k,); None if it is too short for them."""
+        """Time a leg whose speed is free, between fractions of the speeds, (k,); None if the leg is too short."""
         rates = []
         for side in (0, -1):
             number = self.speed_at(leg, side)
@@ -253,7 +253,7 @@ def explain_speeds(
         if q is None:
             return None
         check = _SpeedCheck(guess, speeds, s, q)
-        # The phase plane is exact if there are no other joint paths, and no friction that helps to brake.
+        # The phase plane is exact if there are no other joint paths, and no friction helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
         if not check.allows(_LEAST) or check.allows(enough):

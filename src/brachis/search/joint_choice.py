@@ -1,4 +1,4 @@
-"""The choice of single joints that take the place of a chart's rows.
+"""The choice of single joints whose positions take the place of a chart's rows.
 
 At the optimum any rows that are transversal along the motion describe the same motions. But splines of their
 coordinates are different curves: over the same knots, one measure of self-motion may give a motion that is a few tenths

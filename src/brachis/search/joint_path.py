@@ -85,7 +85,7 @@ class DeadEnd:
 
 
 def distinct(joint_paths: Sequence[PosturePath], count: int) -> list[int]:
-    """Choose up to `count` joint paths: the shortest one, and others far from those already chosen.
+    """Choose up to `count` joint paths: the shortest one, and others that are far from the joint paths already chosen.
 
     Each further choice is the joint path with the largest ratio of its distance from the chosen ones to its length. The
     distance to another branch is infinite.
@@ -153,7 +153,7 @@ def sampling_box(
 
 
 def reaches(problem: Problem, s: float) -> bool:
-    """Tell whether Newton's method finds a posture at a path coordinate from any of many random ones."""
+    """Tell whether Newton's method, begun at many random postures, finds a posture at a path coordinate."""
     low, high = sampling_box(problem.robot)
     drawn = np.random.default_rng(0).uniform(low, high, (_TRIES, problem.robot.n))
     targets = np.repeat(problem.path.sample([s]).target, _TRIES, axis=0)

@@ -1,7 +1,7 @@
 """The lattice: joint paths along the path, by dynamic programming over postures.
 
 The path is cut into stations. The nodes of a layer are postures that meet the target at its station. Layer by layer
-from the given start, they are joined to postures at the next station that are close, within the joint ranges, and
+from the given start, nodes are joined to postures at the next station that are close, within the joint ranges, and
 allowed at rest (within the torque limits, the arm can be held against gravity). Of all edges into a node, the one with
 the least total length is kept. If the end posture is given and the start is not, the layers run backwards from the end.
 `ClosedFormLattice` takes its nodes from the closed form of one choice of redundant joints, `PostureLattice` from
@@ -75,7 +75,7 @@ class Layer:
     length : (K,) ndarray
         Length of the shortest joint path to the node.
     parent : (K,) int ndarray
-        The node in the layer before from which this joint path comes.
+        The node in the previous layer from which this joint path comes.
     """
 
     branch: np.ndarray
@@ -119,11 +119,11 @@ class Edges:
     Attributes
     ----------
     parent : (E,) int ndarray
-        Node in the layer before.
+        Node in the previous layer.
     step : (E, n) ndarray
         Step from the node to the posture; NaN if the posture does not exist.
     key : (E, k) int ndarray
-        Key that is equal for edges to the same node.
+        Key that identifies the node to which an edge leads.
     elsewhere : (E,) bool ndarray, optional
         Whether there is a posture on any branch; by default there is.
     allowed : (E,) bool ndarray, optional

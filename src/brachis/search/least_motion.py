@@ -1,8 +1,8 @@
 """The smoothest motion among those that are as fast as the fastest one.
 
-Where the end time leaves freedom (a tool that may roll, joints far from their limits), many motions are time-optimal,
-and the solver may return one that swings light joints to and fro. A second solve from this motion, over the same knots
-and within the same limits,
+Where the shortest end time leaves freedom (a tool that may roll, joints far from their limits), many motions are
+time-optimal, and the solver may return one that swings light joints to and fro. A second solve from this motion, over
+the same knots and within the same limits,
 
     minimises   the mean of sum_i (weights_i qddot_i)^2    subject to    t_E <= (1 + slower) t_E of the fastest
 
@@ -133,7 +133,7 @@ def _solve(
     elif deadline.passed:
         status = "no time was left"
     elif count > _MANY and not task.search.slower:
-        status = f"the fastest motion is kept: with {count} variables no smoother one is looked for"
+        status = f"the fastest motion is kept: with {count} variables no smoother motion is looked for"
     if status:
         return _keep(fastest, status)
     slower = max(task.search.slower, tolerances.END_TIME)

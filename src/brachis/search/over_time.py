@@ -58,7 +58,7 @@ motions left their charts."""
 def solve_over_time(
     guess: InitialGuess, program: Program, session: SolverSession
 ) -> SolvedProgram:
-    """Solve over time, first over few knots: those that the fastest timing needs, or some of the given ones.
+    """Solve over time, first over few knots: those that the fastest timing needs, or some of the given knots.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def _solve_clear_first(
 
 @dataclass(frozen=True)
 class BetterTimings:
-    """The timings of joint paths that the program over time has improved.
+    """Timings of joint paths, as far as the program over time has improved them.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class BetterTimings:
 
     @property
     def t_end(self) -> float:
-        """Time of all phases, s; infinite if one has no timing."""
+        """Time of all phases, s; infinite if a phase has no timing."""
         return least_time(self.timings)
 
     @property

@@ -85,7 +85,7 @@ def rank_candidate(
     """
     if deadline.passed:
         return begin_candidate(guess, NOT_TRIED)
-    # A given motion is the first point of the program over time, if this program gives the solution.
+    # A given motion is the first point of the program over time if this program gives the final solution.
     is_motion = guess.durations is not None
     has_given_knots = guess.problem.task.spline.intervals != "auto"
     try:

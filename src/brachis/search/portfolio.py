@@ -69,7 +69,7 @@ _FIRST_SHARE = 0.6
 _LATER = 0.2
 """Time, s, for which the search continues after its deadline if no first motion was found."""
 _REFINED = 5e-3
-"""Fraction of the end time that refinement usually adds at most; if it adds more, another motion may be faster."""
+"""Fraction of the end time that refinement usually adds at most. If it adds more, another motion may be faster."""
 
 
 class Search:

@@ -112,7 +112,7 @@ def _hand_out(
     function: Callable[..., _Output],
     *shared_arguments: object,
 ) -> list[Future[_Output]]:
-    """Hand out the first arguments to `count` processes, as many as they are free for, but no more than their share."""
+    """Hand out the first arguments to `count` processes: as many as they can take, but no more than their share."""
     workers = _start_workers(count, os.getpid())
     share = len(waiting) * count // (count + 1)
     quota = min(share, workers.count_free())

@@ -1,4 +1,4 @@
-"""Advice with numbers: a number is advised only after a plan with it was verified."""
+"""Advice with numbers: a number is advised only after a plan with this number was verified."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
     if good is None:
         return ""
     verified = "(a plan with it was verified"
-    # Quick trials may miss a plan, so the message says that none was found only after a complete search.
+    # Quick trials may miss a plan, so the message says only after a complete search that no plan was found.
     if bad != remedy.current and not deadline.passed:
         outcome = is_enough(bad, None)
         if outcome:
@@ -136,7 +136,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
 def _bracket(
     remedy: Remedy, is_enough: IsEnough, deadline: Deadline
 ) -> tuple[float | None, float]:
-    """Find the smallest change known to be enough (None if there is none), and the largest one that is not."""
+    """Find the smallest change known to be enough (None if there is none), and the largest change that is not."""
     # Numbers are rounded towards the larger change.
     lowers = remedy.guess < remedy.current
     away = -1.0 if lowers else 1.0

@@ -2,7 +2,7 @@
 
 If the task leaves the choice of redundant joints open, guesses come from the lattice of all postures, and plans are
 made in charts; the closed forms of single choices are tried only while nothing is verified. If the task names its
-redundant joints or its branch, only these are tried. Along a prescribed joint path there is only one guess.
+redundant joints or its branch, only these choices are tried. Along a prescribed joint path there is only one guess.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ def _guess_on_some_branches(
     listener: Listener,
     level: SearchLevel,
 ) -> GuessesAndLattices:
-    """Take a guess from every decomposition in turn; each gives its guesses with the least estimated times first."""
+    """Take a guess from every decomposition in turn; each gives the guesses with the least estimated times first."""
     search = decompositions[0].problem.task.search
     if search.guesses == "numeric":
         count = level.joint_paths

@@ -2,7 +2,7 @@
 
 If several joints are redundant, the length of a joint path and the least time along it say little about the motion that
 an optimiser finds from it. A rough optimisation over the path says more and costs little. The plan then begins with the
-joint path at which it ended.
+joint path at which the rough optimisation ended.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _free_share(guesses: Sequence[InitialGuess]) -> float:
 
 
 def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[InitialGuess]:
-    """Choose the fastest guesses, one for each joint path; those without a time count only if none has one."""
+    """Choose the fastest guesses, one for each joint path; guesses without a time count only if no guess has one."""
     timed = [guess for guess in guesses if np.isfinite(guess.estimate)]
     chosen: list[InitialGuess] = []
     for guess in sorted(timed or guesses, key=lambda guess: guess.estimate):
@@ -95,7 +95,7 @@ def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[Initia
 
 
 def _spread_out(guesses: Sequence[InitialGuess]) -> list[InitialGuess]:
-    """Order guesses so that each differs most from all before it; of equal guesses only the first is kept.
+    """Order guesses so that each differs most from all before it; of equal guesses, only the first one is kept.
 
     Guesses close to each other end in the same optimum. If guesses that are far apart do so, the others do too. Guesses
     without some of their postures come last.

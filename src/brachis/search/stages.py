@@ -1,8 +1,8 @@
 """The stages of a search, each with a frozen type: initial guess, candidate, ranked candidate, finished candidate.
 
-An `InitialGuess` is a joint path. Every attempt to plan from it is a `Candidate`, even if it fails. A candidate whose
-joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then verified, whether it
-passed or not, is a `FinishedCandidate`.
+An `InitialGuess` is a joint path. Every attempt to plan from a guess is a `Candidate`, even if the attempt fails. A
+candidate whose joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then
+verified, whether it passed or not, is a `FinishedCandidate`.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ class Candidate(Summary):
 
     @property
     def t_end(self) -> float:
-        """End time of the trajectory, s; infinite without one."""
+        """End time of the trajectory, s; infinite if there is no trajectory."""
         return np.inf
 
     @property

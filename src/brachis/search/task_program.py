@@ -40,7 +40,7 @@ class TaskProgram(Program):
 
     @cached_property
     def guess(self) -> np.ndarray:
-        """A first point x, (v,): splines through a joint path, slow enough for the limits that a slower motion meets.
+        """A first point x, (v,): splines through a joint path, slow enough to meet the limits that grow with speed.
 
         Raises
         ------

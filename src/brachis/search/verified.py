@@ -46,7 +46,7 @@ def refine_and_verify(
         Candidate from which the program was made.
     program : Program
     reports : tuple of SolverReport
-        Reports of all solves so far; the last one is that of the program.
+        Reports of all solves so far; the last report is that of the program.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     options : RefinementOptions
@@ -127,7 +127,7 @@ def _in_words(
     if refined.violation > tolerance:
         reason = f"limits exceeded by {100.0 * refined.violation:.2g} %"
     elif verification is None:
-        reason = "too sharp for a trajectory"
+        reason = "the motion is too sharp for a trajectory"
     else:
         reason = "the verification fails"
     rounds = write_count(len(refined.reports) - 1, "refinement round")

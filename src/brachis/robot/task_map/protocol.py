@@ -116,7 +116,7 @@ class TaskMap(Summary):
         Raises
         ------
         InputError
-            Their number differs from the number of rows.
+            The number of coordinates differs from the number of rows.
         """
         if isinstance(stated, ToolPose):
             rotation = stated.rotation.as_matrix()
