@@ -37,7 +37,7 @@ def explain_motion(
     motion : SolvedProgram
         `FinishedCandidate.refined`.
     optimum : SolvedProgram
-        `FinishedCandidate.optimum`. A limit is taken to cost the same fraction of this program's end time as of the
+        `FinishedCandidate.optimum`. A limit is assumed to cost the same fraction of this program's end time as of the
         motion's end time.
 
     Returns

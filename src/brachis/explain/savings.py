@@ -91,7 +91,7 @@ def _list_stops(
 def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
     """Derive the time that would be saved if the tool moved faster at the ends of the path, or slowly where it rests.
 
-    The redundant joints stay at rest there, although a motion that passes an end may move them too.
+    In this estimate, the redundant joints stay at rest there, although a motion that passes an end may move them too.
     """
     boundary = problem.task.boundary
     if boundary.periodic:

@@ -22,8 +22,8 @@ ramp:
 
 Where a curve falls more and more steeply, T lies below it. A corner after which the curve falls less steeply is first
 moved to the left by w_k, along the line that follows it, so that the rounded part ends at the corner itself. The
-rounded part is convex, and neither of its ends is above the curve, which is straight there. So it is nowhere above the
-curve.
+rounded part is convex, and neither of its ends is above the curve, which is straight there. So the rounded curve is
+nowhere above the given curve.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class RobotLimit(Limit):
 
     longer_time = "relieves"
     subject: str
-    """Name of the part that has the figure, for labels."""
+    """Name, for labels, of the part of the robot to which the figure belongs."""
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._robot = robot

@@ -344,7 +344,7 @@ JOINT_LIMITS = {
         TorqueRateLimit,
     )
 }
-"""The limit of every row of `LIMIT_KINDS`."""
+"""The class of the limit for every row of `LIMIT_KINDS`."""
 _QUANTITIES: dict[type[Limit], str] = {TorqueLimit: "torque"} | {
     limit: limit.derivative
     for limit in (PositionLimit, VelocityLimit, AccelerationLimit, JerkLimit)

@@ -23,7 +23,7 @@ class SingularityLimit(Limit):
     robot : Robot
     task : Task
     figure : float
-        The required value.
+        Required smallest singular value.
     """
 
     kind = "singularity"

@@ -10,9 +10,9 @@ direction zero, because it is far from its limit.
 
 The maximum speed of the tool frame's origin may be a piecewise linear function of the path coordinate (`SpeedProfile`).
 
-Three tolerances are not only ranges of the tool's virtual joints: a cone, a sphere, and a box in the world's axes. With
-the angles a (side) and b (lead), the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes of
-the path's orientation is R d in the axes of the world, where R is the rotation of the end of the chain.
+Three tolerances need more than ranges of the tool's virtual joints: a cone, a sphere, and a box in the world's axes.
+With the angles a (side) and b (lead), the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
+of the path's orientation is R d in the axes of the world, where R is the rotation of the end of the chain.
 """
 
 from __future__ import annotations

@@ -21,9 +21,9 @@ class Friction(Summary):
     """Armature, viscous friction and Coulomb friction of every joint. The arrays are read-only.
 
     The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.
-    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps it at zero and adds the term here. Pinocchio reads
-    ``damping`` and ``friction`` from a URDF, but its ``rnea`` does not use them. Here they are the viscous and the
-    Coulomb term, unless the task gives other values.
+    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps this attribute at zero and adds the term here.
+    Pinocchio reads ``damping`` and ``friction`` from a URDF, but its ``rnea`` does not use them. Here they are the
+    viscous and the Coulomb term, unless the task gives other values.
 
     Attributes
     ----------

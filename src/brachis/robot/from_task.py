@@ -183,7 +183,8 @@ def _combine(
 ) -> RobotSettings:
     """Merge the settings of the robot and of the task. The URDF always comes from the robot.
 
-    In the task, a key counts as set if it is written. In the robot, it counts as set if its value is not the default.
+    In the task, a key counts as set if it is written. In the robot, a key counts as set if its value is not the
+    default.
     """
     robot_keys = robot_settings.model_dump(exclude_defaults=True)
     written = task_settings.model_dump(exclude_unset=True, exclude={"urdf"})

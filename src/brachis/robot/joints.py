@@ -49,7 +49,7 @@ UNITS: Final[dict[str, dict[str, str]]] = {
 
 
 def shown_unit(unit: str, *, degrees: bool) -> tuple[str, float]:
-    """Return the unit in which figures of an SI unit are shown to a person, and the factor for the conversion.
+    """Return the unit in which figures in an SI unit are shown to a person, and the conversion factor.
 
     With `degrees`, angles and their time derivatives are shown in deg, deg/s, ...; other units do not change.
     """

@@ -50,11 +50,11 @@ class Limits(_Figures, Summary):  # type: ignore[misc]
     position_lower, position_upper : (n,) ndarray
         Ends of the ranges, rad or m.
     velocity_lower, velocity_upper : (n,) ndarray
-        Limits below and above zero, rad/s or m/s.
+        Limits in the negative and in the positive direction, rad/s or m/s.
     acceleration : (n,) ndarray
         rad/s^2 or m/s^2.
     torque_lower, torque_upper : (n,) ndarray
-        Limits below and above zero, Nm or N.
+        Limits in the negative and in the positive direction, Nm or N.
     power : (n,) ndarray
         W.
     rms_torque : (n,) ndarray
@@ -115,7 +115,7 @@ class Limits(_Figures, Summary):  # type: ignore[misc]
 
 
 def _arrays_of(kind: str, pairs: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the arrays of a kind, by name, from lower and upper limits, (2, n)."""
+    """Return the arrays of one kind of limit, by name, from lower and upper limits, (2, n)."""
     names = LIMIT_KINDS[kind].ends
     return dict(zip(names, pairs[-len(names) :], strict=True))
 

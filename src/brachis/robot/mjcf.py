@@ -156,7 +156,7 @@ _NEGLIGIBLE = pin.Inertia.FromSphere(1e-9, 1e-3)
 _ON_JOINT = 1
 """Largest code that MuJoCo uses for a transmission to a joint."""
 _SLIDE = 2
-"""MuJoCo's code of a prismatic joint; free and ball joints have smaller codes."""
+"""MuJoCo's code for a prismatic joint; free and ball joints have smaller codes."""
 
 
 def _effort_limits(compiled: Any) -> np.ndarray:

@@ -493,7 +493,7 @@ class Robot(Summary):
 
 
 def _without_defaults(settings: RobotSettings) -> RobotSettings:
-    """Leave out settings that have their default value, so that they can be set later."""
+    """Return the settings without those that have their default value, so that these can be set later."""
     default = RobotSettings()
     return RobotSettings(
         **{key: value for key, value in settings if value != getattr(default, key)}

@@ -149,7 +149,7 @@ def _robot_element(text: str, where: str) -> Element:
 
 
 def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
-    """Return the links or joints by their names."""
+    """Return the links, or the joints, of a robot by their names."""
     named: dict[str, Element] = {}
     repeated: dict[str, None] = {}
     for element in robot.findall(kind):
@@ -230,7 +230,7 @@ class Entry:
     attribute : str
     unit : str
     count : int, optional
-        Count of numbers, separated by spaces.
+        Number of values, which are separated by spaces.
     required : bool, optional
         Whether the element must have the attribute.
     largest : float, optional

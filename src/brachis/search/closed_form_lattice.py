@@ -54,8 +54,8 @@ class Cells:
         """Lay out the cells of a choice of redundant joints.
 
         If joint paths begin at a given posture, (n,), it is the middle of a cell. If no posture is given, the cells
-        cover closed ranges, one turn of an open revolute joint, and the part of an open prismatic joint close to the
-        beginning of the path.
+        cover closed ranges, one turn of an open revolute joint, and the part of an open prismatic joint's range that is
+        close to the start of the path.
         """
         problem = decomposition.problem
         joints = list(decomposition.redundant)

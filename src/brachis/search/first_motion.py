@@ -75,7 +75,7 @@ _ENOUGH = 1e-10
 """Violation that counts as small enough; with 1e-8, the tool moved backwards on its path between knots close to each
 other."""
 _DAMPING = 1e-8
-"""Fraction of the largest diagonal entry that is added to a diagonal: some joints have no weight, rows may be
+"""Fraction of the largest diagonal entry that is added to a diagonal: some joints have no weight, and rows may be
 dependent."""
 
 

@@ -98,7 +98,7 @@ _DRIFT = 2.0
 """Maximum standard deviation of a drift, rad or m, in the scales of the joints; it displaces the end by half as much.
 
 On average over 14 tasks, the best of 16 joint paths is 0.5 % slower than with the best of the drifts 1, 2, 4 and 8 for
-each task. With other drifts, it is 0.8 to 1.1 % slower, although larger drifts lead to more distinct joint paths.
+the same task. With other drifts, it is 0.8 to 1.1 % slower, although larger drifts lead to more distinct joint paths.
 """
 _LOOKED_AT = 4
 """Number of joint paths that are examined for each joint path that is chosen, if several joints are redundant."""
@@ -178,7 +178,7 @@ def _take_guesses(
 def _smooth(joint_path: PosturePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; the last is piecewise linear."""
     s = joint_path.s
-    # Sampled more finely than at the lattice's stations.
+    # The samples are closer together than the lattice's stations.
     fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
     weights = np.ones((len(s), 1))
     weights[[0, -1]] = 1e3  # nearly exact at both ends

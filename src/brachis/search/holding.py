@@ -38,7 +38,7 @@ def explain_beyond(
     s : (S,) ndarray
         Path coordinates, ascending.
     q : (S, n) ndarray
-        Postures there, rad or m.
+        Postures at these coordinates, rad or m.
     """
     values, beyond = beyond_at_rest(limit, q, problem.task.refinement.tolerance)
     station, column = np.unravel_index(np.argmax(beyond), beyond.shape)
@@ -61,7 +61,7 @@ def explain_beyond(
 
 
 def explain_postures(guesses: Sequence[InitialGuess]) -> PathError | None:
-    """If all joint paths exceed a limit on postures, explain which limit it is, for the one with the least excess."""
+    """If all joint paths exceed a limit on postures, explain the excess on the joint path where it is smallest."""
     nearest = []
     for guess in guesses:
         q = postures_along(guess, _S)

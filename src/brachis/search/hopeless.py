@@ -132,7 +132,7 @@ class _SpeedCheck:
     s : (S,) ndarray
         Path coordinates, including the ends of the legs.
     q : (S, n) ndarray
-        Postures there.
+        Postures at these coordinates.
     """
 
     def __init__(

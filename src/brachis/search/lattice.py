@@ -196,7 +196,7 @@ class Lattice(ABC):
     _given_branch: int = 0
     """Branch of the given start or end posture."""
     _modulo: np.ndarray
-    """Joints, (n,) bool, whose steps are taken modulo 2 pi."""
+    """Joints, (n,) bool, whose steps are computed modulo 2 pi."""
 
     @abstractmethod
     def _start_nodes(self, rng: np.random.Generator) -> Layer:

@@ -72,7 +72,7 @@ class LeastMotion(Summary):
     reduction : float
         Fraction by which the root mean square of the joint accelerations is lower; 0 if the fastest motion is kept.
     later : float
-        Fraction by which the end time is longer.
+        Fraction by which the end time is later than the end time of the fastest motion.
     status : str
         Outcome in plain words.
     reports : tuple of SolverReport
@@ -173,7 +173,7 @@ def _solve(
 
 
 def _reason(report: SolverReport) -> str:
-    """Say why a solve found no smoother motion; the advice in its status is meant for other solves."""
+    """Say why a solve found no smoother motion; the advice in the solver's status does not apply here."""
     if report.status is SolveStatus.TIME_LIMIT:
         return "time ran out before a smoother one was found"
     if report.status in (SolveStatus.EVALUATION_ERROR, SolveStatus.FAILED):
@@ -195,9 +195,9 @@ def least_acceleration(
 ) -> LeastAcceleration:
     """Return the objective that is 1 at x, (v,), and lets phases last longer by a fraction of up to `slower`.
 
-    Every joint's acceleration is measured relative to the joint's largest velocity. This is the velocity limit or,
-    without one, the largest velocity at x of all joints with the same unit and without such a limit. Joints without any
-    limit, such as the virtual roll of a tool, do not count.
+    Every joint's acceleration is measured relative to the joint's largest velocity. This is the velocity limit or, if
+    there is none, the largest velocity at x of all joints with the same unit and without such a limit. Joints without
+    any limit, such as the virtual roll of a tool, do not count.
     """
     robot = program.phases[0].joint_map.robot
     states = program.states(x)

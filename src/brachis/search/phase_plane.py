@@ -65,7 +65,7 @@ def fastest_times(
     s : (S,) ndarray
         Path coordinates, ascending from 0 to 1.
     q : (S, n) ndarray
-        Postures there, rad or m, continuous.
+        Postures at these coordinates, rad or m; the joint path is continuous.
 
     Returns
     -------

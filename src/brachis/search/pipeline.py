@@ -179,7 +179,7 @@ def _finish_over_path(
     options: RefinementOptions,
     to_beat: Marks,
 ) -> Candidate:
-    """Improve joint paths further over the path, then over time, and follow the timing of the faster one.
+    """Improve joint paths further over the path, then over time, and follow the faster of the two timings.
 
     The joint path that the program over time improves is kept. The time that its knots cost is regained by splines that
     are laid along the timing.

@@ -91,7 +91,7 @@ class Search:
     guesses : list of InitialGuess
         All guesses from which candidates were begun.
     best : FinishedCandidate or None
-        The fastest verified candidate; without one, the candidate closest to the limits.
+        The fastest verified candidate; if none is verified, the candidate closest to the limits.
     interrupted : bool
         Whether Ctrl-C or the time limit ended the search.
     """
@@ -394,7 +394,8 @@ class Search:
         return self.is_satisfied or self._first_motion is not None
 
     def _by_time(self, first: int = 0) -> list[int]:
-        """Return the numbers, from `first` on, of the ranked candidates, by the times along their joint paths."""
+        """Return the numbers of ranked candidates, from `first` on, in the order of the times along their joint
+        paths."""
         return sorted(
             (number for number in self._ranked if number >= first),
             key=lambda number: (round_end_time(self._ranked[number].estimate), number),

@@ -84,7 +84,7 @@ class PostureLattice(Lattice):
     def _choose(
         self, joint_paths: list[PosturePath], ends: Layer, count: int
     ) -> list[PosturePath]:
-        """Choose joint paths no longer than those to neighbouring nodes, then some that differ; name their seeds.
+        """Choose joint paths no longer than the ones to neighbouring nodes, then different ones; name their seeds.
 
         With several redundant joints, the nodes are samples, which have no such minima.
         """
@@ -136,8 +136,8 @@ class PostureLattice(Lattice):
     def _choose_start_nodes(self, layer: Layer) -> Layer:
         """Label the start nodes; joint paths with different labels do not displace each other.
 
-        With one redundant joint, each connected component of the self-motion manifold has a label. With several, a few
-        postures far from each other have one label each.
+        With one redundant joint, each connected component of the self-motion manifold has a label. With several
+        redundant joints, a few postures that are far apart have one label each.
         """
         q = layer.q
         if self._r > 1:

@@ -23,9 +23,9 @@ from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
 _WORTH_STARTING = 3.0
-"""Remaining work, s, for which other processes are started; starting takes a second or two."""
+"""Minimum remaining work, s, for which other processes are started; starting them takes a second or two."""
 _WORTH_SENDING = 0.7
-"""Remaining work, s, that is handed out to processes that were started before."""
+"""Minimum remaining work, s, for which work is handed out to processes that were started earlier."""
 _IDLE_TIME = 300.0
 """Time, s, after which a process without work ends."""
 _HEARTBEAT = 0.1
@@ -56,9 +56,9 @@ def run_in_processes(
     *shared_arguments : object
         Further arguments, the same for all calls.
     jobs : int or "auto"
-        With 1, and within the workers of another program, the work is done in this process, call by call as results are
-        requested. With ``auto`` this is also the case until the remaining work is expected to take longer than 3 s, or
-        0.7 s if an earlier plan has started the processes. Work that cannot be sent to other processes is done here
+        With 1, or inside a worker of another program, the work is done in this process, one call at a time, as results
+        are requested. With ``auto`` this is also the case until the remaining work is expected to take longer than 3 s,
+        or 0.7 s if an earlier plan has started the processes. Work that cannot be sent to other processes is done here
         too.
     listener : callable
         Called only for work that is done in this process.

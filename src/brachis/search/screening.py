@@ -95,7 +95,7 @@ def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[Initia
 
 
 def _spread_out(guesses: Sequence[InitialGuess]) -> list[InitialGuess]:
-    """Order guesses so that each differs most from all before it; of equal guesses, only the first one is kept.
+    """Order guesses so that each differs most from all earlier guesses; of equal guesses, only the first one is kept.
 
     Guesses close to each other end in the same optimum. If guesses that are far apart do so, the others do too. Guesses
     without some of their postures come last.

@@ -2,7 +2,7 @@
 
 An `InitialGuess` is a joint path. Every attempt to plan from a guess is a `Candidate`, even if the attempt fails. A
 candidate whose joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then
-verified, whether it passed or not, is a `FinishedCandidate`.
+checked by the verification, whether it passed or not, is a `FinishedCandidate`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SearchMap = ClosedFormMap | ChartMap | JointSpaceMap
 
 
 def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
-    """Name the coordinates, besides s, in which a motion is planned: redundant joints, those of a chart, or none."""
+    """Name the coordinates, besides s, of a planned motion: redundant joints, coordinates of a chart, or none."""
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
@@ -168,7 +168,7 @@ class Candidate(Summary):
 
     @property
     def is_settled(self) -> bool:
-        """Whether the candidate is verified, or fails only checks that the task wants reported and not enforced."""
+        """Whether the candidate is verified, or fails only checks that the task wants to be reported, not enforced."""
         return False
 
     def describe(self) -> str:
@@ -335,7 +335,7 @@ class FinishedCandidate(Candidate):
 
     @property
     def is_settled(self) -> bool:
-        """Whether the candidate is verified, or fails only checks that the task wants reported and not enforced."""
+        """Whether the candidate is verified, or fails only checks that the task wants to be reported, not enforced."""
         return all(
             check.passed or not check.is_kept for check in self.verification.checks
         )
