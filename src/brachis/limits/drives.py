@@ -69,7 +69,7 @@ class RobotLimit(Limit):
 
     @classmethod
     def build(cls, robot: Robot, _task: Task) -> Self | None:
-        """Build the limit; None if the robot has none."""
+        """Build the limit; None if the robot has no such limit."""
         figure = getattr(robot.limits, cls.kind)
         return cls(robot, figure) if np.isfinite(figure) else None
 

@@ -363,7 +363,7 @@ class Limit(Description, ABC):
 
         Examples
         --------
-        The partials of the example of `values`:
+        The partial derivatives for the example of `values`:
 
         >>> def partials(self, motion):
         ...     first = np.eye(self.robot.n)[None, :1] / 2.0

@@ -298,7 +298,7 @@ def decompositions_of(
         A given posture is singular, or it is not on the branch to which the task's branch or redundant joints restrict
         the motion.
     UnknownNameError
-        The robot has no joint, or the closed form has no branch, of the name that the task gives.
+        The robot has no joint, or the closed form has no branch, with the name that the task gives.
     """
     task = problem.task
     robot = problem.robot

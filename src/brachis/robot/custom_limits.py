@@ -170,7 +170,7 @@ def check_ratios(
     Raises
     ------
     InputError
-        The result of the method is not finite, or has a different shape.
+        The result of the method is not finite, or has the wrong shape.
     """
     with name_failures(where, "check"):
         ratios = model.check(robot, *motion)

@@ -23,7 +23,7 @@ _TOO_HEAVY = 1.05
 _FAR_TOO_HEAVY = 1.5
 """The same ratio for a redundant robot, which has more joint paths than those that were found."""
 _S = np.linspace(0.0, 1.0, 101)
-"""Path coordinates at which the arm is held at rest."""
+"""Path coordinates at which loads at rest are computed."""
 
 
 def explain_beyond(

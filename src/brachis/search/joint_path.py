@@ -22,7 +22,7 @@ NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
 NO_TIME = "the time was up"
 _TRIES = 1000
-"""Number of random postures from which Newton's method begins before a target counts as out of reach."""
+"""Number of random postures from which Newton's method is tried before a target counts as out of reach."""
 
 
 @dataclass(frozen=True)

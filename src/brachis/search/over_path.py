@@ -47,7 +47,7 @@ _TRANSVERSAL = 0.5
 
 
 _EXCESS_FACTOR = 1.2
-"""Fraction of time by which a motion is lengthened, divided by its violation."""
+"""Relative lengthening of a motion in time, divided by the violation of the motion."""
 _LARGEST_EXCESS = 0.1
 """Violation above which a motion is not lengthened."""
 _LENGTHENINGS = 4

@@ -153,8 +153,8 @@ class Search:
         motion : Trajectory, optional
             A motion that is tried first. If it leads to a verified motion, nothing else is tried.
         exact : FinishedCandidate, optional
-            A verified plan of the same task without tolerances. It is the plan unless a faster one is found. The search
-            looks close to this plan first, and elsewhere only if it found nothing there or is exhaustive.
+            A verified plan of the same task without tolerances. It is the result unless a faster plan is found. The
+            search looks close to this plan first, and elsewhere only if it found nothing there or is exhaustive.
         max_batches : int, optional
             Maximum number of batches.
 
@@ -394,8 +394,7 @@ class Search:
         return self.is_satisfied or self._first_motion is not None
 
     def _by_time(self, first: int = 0) -> list[int]:
-        """Return the numbers of ranked candidates, from `first` on, in the order of the times along their joint
-        paths."""
+        """Return the numbers of ranked candidates, from `first` on, by the times along their joint paths."""
         return sorted(
             (number for number in self._ranked if number >= first),
             key=lambda number: (round_end_time(self._ranked[number].estimate), number),

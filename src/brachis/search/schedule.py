@@ -124,7 +124,7 @@ def batches(
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
-    """Tell whether motions are planned in charts: the task leaves the joints open, and the robot is redundant."""
+    """Tell whether motions are planned in charts: the choice of joints is open, and the robot is redundant."""
     task = problem.task
     is_open = task.redundant_joints == task.branch == "auto"
     if not is_open or task.search.guesses != "lattice":

@@ -293,7 +293,7 @@ class FinishedCandidate(Candidate):
     Attributes
     ----------
     problem : Problem
-        What was planned: the task, or a simpler one (see `widen_plan`).
+        The problem that was planned: that of the task, or a simpler one (see `widen_plan`).
     family : str
         Name of the closed form's family.
     refined : SolvedProgram
