@@ -1,8 +1,8 @@
 """Limits on a quantity of each joint: position, velocity, acceleration, jerk, power, torque, torque rate, mean torque.
 
 A value is (quantity - middle) / (half the distance between the lower and the upper limit), in [-1, 1]. If both
-directions have the same limit, this is the ratio to the limit. Positions with a wide or open range are measured in rad
-or m instead.
+directions have the same limit, the value is the ratio of the quantity to the limit. Positions with a wide or open range
+are measured in rad or m instead.
 
 The rate of the torque tau(q, qdot, qddot) is
 

@@ -233,7 +233,7 @@ def distance_hint(away: float, far: float) -> str | None:
 
 
 def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str | None:
-    """Return a hint if a stated position, (p,), where the tool is not, looks like mm or like swapped rows."""
+    """Return a hint if a stated position, (p,), that is not the tool's, may be in mm or have swapped rows."""
     if not np.abs(here - stated).max(initial=0.0) > _ROUNDED:
         return None
     is_at_origin = np.abs(here).max() <= _ROUNDED

@@ -330,7 +330,7 @@ class Search:
             failure = failure or explain_speeds(self.guesses, are_tried=True)
         if failure is not None:
             return failure
-        # The time limit of the search may have ended every solve before its own time limit.
+        # The time limit of the search may have ended every solve before the solve's own time limit.
         last = [
             candidate.reports[-1] for candidate in self.candidates if candidate.reports
         ]
